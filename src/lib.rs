@@ -1,0 +1,7 @@
+//! pendularm: a real-time planar robot arm that any rosbridge client can drive.
+//!
+//! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), [`protocol`] (pure: bytes
+//! and JSON) and [`actors`] (joins the two, one actor per node). `math` and `protocol` do not know each other.
+
+pub mod math;
+pub mod protocol;

@@ -1,0 +1,3 @@
+//! The thin binary: options in, exit status out.
+
+fn main() {}

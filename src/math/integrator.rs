@@ -1,0 +1,184 @@
+//! The four one-step methods, side by side: each advances `q̈ = a(t, q, q̇)` from `t` to `t + h`.
+//!
+//! | method | order | evaluations | map, with `a₁ = a(t, q, v)` |
+//! | --- | --- | --- | --- |
+//! | Euler | 1 | 1 | `q + h v`, `v + h a₁` |
+//! | midpoint | 2 | 2 | `qₘ = q + h/2 v`, `vₘ = v + h/2 a₁`; `q + h vₘ`, `v + h a(t + h/2, qₘ, vₘ)` |
+//! | Verlet | 2 | 2 | `q' = q + h v + h²/2 a₁`; `v + h/2 (a₁ + a(t + h, q', v + h a₁))` |
+//! | Runge-Kutta 4 | 4 | 4 | classical 1:2:2:1 on the pair `(q, v)` |
+//!
+//! The live arm and `/arm_sim/integration_step` are stepped by [`increment`] and nothing else.
+//!
+//! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
+
+use std::fmt;
+use std::str::FromStr;
+
+/// One of the four selectable one-step methods.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Method {
+    /// Forward Euler, order 1. Gains energy on every undamped swing.
+    Euler,
+    /// Explicit midpoint, order 2. Undamped oscillation grows slowly at every timestep.
+    Midpoint,
+    /// Velocity Verlet with a predicted velocity, order 2. Not symplectic where forces depend on velocity.
+    Verlet,
+    /// Classical Runge-Kutta, order 4. Four evaluations a step.
+    Rk4,
+}
+
+impl Method {
+    /// All methods, in the order in which they are taught.
+    pub const ALL: [Self; 4] = [Self::Euler, Self::Midpoint, Self::Verlet, Self::Rk4];
+
+    /// The name that requests and messages use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Euler => "euler",
+            Self::Midpoint => "midpoint",
+            Self::Verlet => "verlet",
+            Self::Rk4 => "rk4",
+        }
+    }
+
+    /// Order of the global error in the timestep.
+    #[must_use]
+    pub const fn order(self) -> u32 {
+        match self {
+            Self::Euler => 1,
+            Self::Midpoint | Self::Verlet => 2,
+            Self::Rk4 => 4,
+        }
+    }
+
+    /// Acceleration evaluations that one step makes.
+    #[must_use]
+    pub const fn evaluations(self) -> u32 {
+        match self {
+            Self::Euler => 1,
+            Self::Midpoint | Self::Verlet => 2,
+            Self::Rk4 => 4,
+        }
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// A name that is none of the four methods'.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("must be one of euler, midpoint, verlet, rk4")]
+pub struct UnknownMethod;
+
+impl FromStr for Method {
+    type Err = UnknownMethod;
+
+    fn from_str(name: &str) -> Result<Self, UnknownMethod> {
+        Self::ALL
+            .into_iter()
+            .find(|method| method.name() == name)
+            .ok_or(UnknownMethod)
+    }
+}
+
+/// What one step adds to position and velocity: `(Δq, Δv)`.
+pub type Increment<const N: usize> = ([f64; N], [f64; N]);
+
+/// The increment of one step of length `h` \[s\] from `(q, v)` at time `t` \[s\].
+///
+/// `acceleration(t, q, v)` is evaluated [`Method::evaluations`] times. Increments, not states, are returned, so that a
+/// caller can sum them with compensation.
+#[inline]
+pub fn increment<const N: usize>(
+    method: Method,
+    acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> Increment<N> {
+    match method {
+        Method::Euler => euler(acceleration, t, q, v, h),
+        Method::Midpoint => midpoint(acceleration, t, q, v, h),
+        Method::Verlet => verlet(acceleration, t, q, v, h),
+        Method::Rk4 => rk4(acceleration, t, q, v, h),
+    }
+}
+
+fn euler<const N: usize>(
+    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> Increment<N> {
+    let a = acceleration(t, q, v);
+    (scaled(h, v), scaled(h, &a))
+}
+
+fn midpoint<const N: usize>(
+    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> Increment<N> {
+    let half = 0.5 * h;
+    let a1 = acceleration(t, q, v);
+    let qm = moved(q, half, v);
+    let vm = moved(v, half, &a1);
+    let am = acceleration(t + half, &qm, &vm);
+    (scaled(h, &vm), scaled(h, &am))
+}
+
+fn verlet<const N: usize>(
+    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> Increment<N> {
+    let half = 0.5 * h;
+    let a1 = acceleration(t, q, v);
+    let dq: [f64; N] = std::array::from_fn(|i| h * (v[i] + half * a1[i]));
+    let predicted_q = std::array::from_fn(|i| q[i] + dq[i]);
+    let predicted_v = moved(v, h, &a1);
+    let a2 = acceleration(t + h, &predicted_q, &predicted_v);
+    (dq, std::array::from_fn(|i| half * (a1[i] + a2[i])))
+}
+
+fn rk4<const N: usize>(
+    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
+    t: f64,
+    q: &[f64; N],
+    v: &[f64; N],
+    h: f64,
+) -> Increment<N> {
+    let half = 0.5 * h;
+    let a1 = acceleration(t, q, v);
+    let v2 = moved(v, half, &a1);
+    let a2 = acceleration(t + half, &moved(q, half, v), &v2);
+    let v3 = moved(v, half, &a2);
+    let a3 = acceleration(t + half, &moved(q, half, &v2), &v3);
+    let v4 = moved(v, h, &a3);
+    let a4 = acceleration(t + h, &moved(q, h, &v3), &v4);
+    let sixth = h / 6.0;
+    (
+        std::array::from_fn(|i| sixth * (v[i] + 2.0 * (v2[i] + v3[i]) + v4[i])),
+        std::array::from_fn(|i| sixth * (a1[i] + 2.0 * (a2[i] + a3[i]) + a4[i])),
+    )
+}
+
+#[inline(always)]
+fn scaled<const N: usize>(h: f64, x: &[f64; N]) -> [f64; N] {
+    x.map(|x| h * x)
+}
+
+#[inline(always)]
+fn moved<const N: usize>(x: &[f64; N], h: f64, rate: &[f64; N]) -> [f64; N] {
+    std::array::from_fn(|i| x[i] + h * rate[i])
+}

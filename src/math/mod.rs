@@ -1,0 +1,16 @@
+//! The physics and the control of the arm: plain values and pure functions that are told the time.
+//!
+//! **Invariant:** no clock, no I/O, no JSON, no threads, no actors in here.
+
+pub mod arm;
+pub mod dynamics;
+pub mod expression;
+pub mod goal;
+pub mod integrator;
+pub mod kinematics;
+pub mod pacer;
+pub mod particle;
+pub mod pid;
+pub mod simulation;
+pub mod trial;
+pub mod trig;

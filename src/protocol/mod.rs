@@ -1,0 +1,11 @@
+//! The rosbridge side: bytes and JSON in and out.
+//!
+//! **Invariant:** no sockets, no clock, no physics in here; whatever depends on time is told the time.
+
+pub mod catalog;
+pub mod fields;
+pub mod frame;
+pub mod json;
+pub mod messages;
+pub mod op;
+pub mod outbox;
