@@ -9,3 +9,6 @@ pub mod json;
 pub mod messages;
 pub mod op;
 pub mod outbox;
+mod text;
+mod throttle;
+pub mod trajectory;
