@@ -279,6 +279,7 @@ fn printing_leaves_out_the_parentheses_that_change_nothing() {
         ("-(sin(t))", "-sin(t)"),
         (".50", "0.5"),
         ("5.", "5"),
+        ("0.0", "0"),
         ("1e300", "1e300"),
         ("0.00000025", "2.5e-7"),
         ("1e9999", "1e999"),

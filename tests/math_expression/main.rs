@@ -6,6 +6,7 @@
 //! **Invariant:** values are compared exactly: the expected ones are whole numbers or binary fractions, or take the same
 //! floating-point operations in the same order.
 #![allow(clippy::float_cmp, reason = "the expected values are exact, see above")]
+#![allow(clippy::panic, reason = "a test that panics has failed")]
 
 mod accepted;
 mod properties;

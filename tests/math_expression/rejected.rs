@@ -132,6 +132,7 @@ fn implied_multiplication_is_rejected() {
         ("2exp(t)", "expected an operator at column 2, found 'exp'"),
         ("0x10", "expected an operator at column 2, found 'x10'"),
         ("1_000", "expected an operator at column 2, found '_000'"),
+        ("1e_3", "expected an operator at column 2, found 'e_3'"),
     ]);
 }
 

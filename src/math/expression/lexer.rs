@@ -59,14 +59,9 @@ impl<'a> Lexer<'a> {
         Ok(Some(Token { kind, text, start }))
     }
 
-    /// The column, from 1, of the character at a byte offset.
-    pub(super) fn column(&self, offset: usize) -> usize {
-        1 + self.text.get(..offset).unwrap_or_default().chars().count()
-    }
-
-    /// The column just after the last character that is not white space.
+    /// The column just after the last character that is not white space. For a text that has been read to its end.
     pub(super) fn end_column(&self) -> usize {
-        self.column(self.text.trim_ascii_end().len())
+        column(self.text.trim_ascii_end().len())
     }
 
     /// Digits with at most one point, at least one digit, then perhaps an exponent.
@@ -110,7 +105,7 @@ impl<'a> Lexer<'a> {
 
     fn expected_digit(&self, start: usize) -> ExpressionError {
         ExpressionError::ExpectedDigit {
-            column: self.column(self.at),
+            column: column(self.at),
             found: Found::text(self.text.get(start..self.at).unwrap_or_default()),
         }
     }
@@ -119,7 +114,7 @@ impl<'a> Lexer<'a> {
         let rest = self.text.get(self.at..).unwrap_or_default();
         let length = rest.chars().next().map_or(0, char::len_utf8);
         ExpressionError::UnrecognizedCharacter {
-            column: self.column(self.at),
+            column: column(self.at),
             found: Found::text(rest.get(..length).unwrap_or_default()),
         }
     }
@@ -136,4 +131,10 @@ impl<'a> Lexer<'a> {
         }
         self.at - start
     }
+}
+
+/// The column, from 1, of the character at a byte offset. What stands before the first mistake, or in a text without
+/// one, is ASCII: every other character is unrecognized. So bytes are characters there.
+pub(super) const fn column(offset: usize) -> usize {
+    offset + 1
 }

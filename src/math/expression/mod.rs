@@ -12,8 +12,8 @@
 //! constant, no implied multiplication. Names are case-sensitive. Values are ordinary `f64`: a domain error is NaN, a
 //! literal too large for `f64`, such as `1e999`, is infinity.
 //!
-//! [`lexer`] cuts the text into tokens, [`parser`] orders them into the flat postfix program that [`Expression`] holds,
-//! [`display`] writes that program as text again.
+//! `lexer` cuts the text into tokens, `parser` orders them into the flat postfix program that [`Expression`] holds,
+//! `display` writes that program as text again.
 //!
 //! **Invariant:** nothing here recurses. Time and memory of parsing, evaluating, printing and dropping grow linearly
 //! with the text, however deeply it nests.
@@ -192,4 +192,29 @@ impl Expression {
 #[inline(always)]
 fn below(stack: &mut Vec<f64>) -> f64 {
     stack.pop().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Expression;
+
+    #[test]
+    fn an_evaluation_needs_the_room_that_was_reserved_and_no_more() {
+        for (text, depth) in [
+            ("t", 1),
+            ("-sin(t)", 1),
+            ("1+t", 2),
+            ("1+2+3+t", 2),
+            ("1*2+3*t", 3),
+            ("1+(2+(3+t))", 4),
+            ("t^t^t^t^t", 5),
+        ] {
+            let expression = Expression::parse(text).unwrap();
+            assert_eq!(expression.depth, depth, "{text}");
+            let mut stack = expression.stack();
+            let reserved = stack.0.capacity();
+            let _ = expression.evaluate_in(&mut stack, 1.0);
+            assert_eq!(stack.0.capacity(), reserved, "{text}");
+        }
+    }
 }

@@ -5,7 +5,7 @@
 //! one value.
 
 use super::error::{ExpressionError, Found};
-use super::lexer::{Kind, Lexer, Token};
+use super::lexer::{Kind, Lexer, Token, column};
 use super::{Arity, Expression, Level, Op};
 
 /// What waits on the parser's stack.
@@ -72,7 +72,7 @@ impl Parser<'_> {
                 Ok(Expect::Operand)
             }
             Kind::Sign(_) => Err(ExpressionError::ExpectedOperand {
-                column: self.lexer.column(token.start),
+                column: column(token.start),
                 found: Found::text(token.text),
             }),
         }
@@ -85,7 +85,7 @@ impl Parser<'_> {
             .find(|(name, _)| *name == token.text);
         let Some((name, op)) = function else {
             return Err(ExpressionError::UnknownName {
-                column: self.lexer.column(token.start),
+                column: column(token.start),
                 found: Found::text(token.text),
             });
         };
@@ -119,7 +119,7 @@ impl Parser<'_> {
             Kind::Sign(b')') => return self.close(token),
             _ => {
                 return Err(ExpressionError::ExpectedOperator {
-                    column: self.lexer.column(token.start),
+                    column: column(token.start),
                     found: Found::text(token.text),
                 });
             }
@@ -139,7 +139,7 @@ impl Parser<'_> {
             Some(Pending::Open | Pending::Operator(_)) => {}
             None => {
                 return Err(ExpressionError::Unopened {
-                    column: self.lexer.column(token.start),
+                    column: column(token.start),
                 });
             }
         }
@@ -158,7 +158,7 @@ impl Parser<'_> {
         self.emit_while(|_| true);
         if !self.pending.is_empty() {
             return Err(ExpressionError::Unclosed {
-                column: self.lexer.column(innermost_open(text)),
+                column: column(innermost_open(text)),
             });
         }
         let Program {
@@ -187,7 +187,7 @@ impl Parser<'_> {
 
     fn place(&self, token: Option<&Token<'_>>) -> (usize, Found) {
         match token {
-            Some(token) => (self.lexer.column(token.start), Found::text(token.text)),
+            Some(token) => (column(token.start), Found::text(token.text)),
             None => (self.lexer.end_column(), Found::End),
         }
     }
