@@ -24,45 +24,46 @@ pub fn forward_dynamics<const N: usize>(
         rate += qd[i];
         arm.lengths()[i] * rate * rate
     });
-    // What is carried by the tip of link i, in its frame and in units of its mass.
-    let (mut a, mut b, mut c, mut d) = (0.0, 0.0, 0.0, 0.0);
-    let (mut bx, mut by) = (0.0, 0.0);
+    let (mut x, mut d, mut phi, mut psi, mut vx, mut vy, mut s, mut c) =
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     let mut saved = [(0.0, 0.0, 0.0); N];
     let mut outer = 0.0;
     for i in (0..N).rev() {
         let u = (tau[i] - outer) * of.per_mass_length[i];
         outer = tau[i];
-        let pw = 1.0 / (1.0 + 3.0 * c);
-        let z = u - by;
-        saved[i] = (pw, b, z);
+        let axx = x * vx * vx + d * s * s;
+        let axy = x * vx * vy - d * s * c;
+        let ayy = x * vy * vy + d * c * c;
+        let det = x * d;
+        let bx = x * phi * vx - psi * s;
+        let by = x * phi * vy + psi * c;
+        let big_w = 1.0 + 3.0 * ayy;
+        let per_w = 1.0 / big_w;
+        saved[i] = (3.0 * per_w * (u - by), 3.0 * per_w * axy, 0.5 * per_w);
         if i == 0 {
             break;
         }
-        let x = 1.0 + a + 3.0 * (c + d);
-        let px = 1.0 / x;
-        let xx = x * pw;
-        let k = -0.5 * b * px;
-        let rest = (0.25 * (1.0 + a) + c + d) * px;
-        let fx = bx + 3.0 * b * pw * z - w[i] * ((a + 3.0 * d) * pw + 0.5);
-        let fy = u + 0.5 * pw * (z + w[i] * b);
-        let (s, co) = (sin[i], cos[i]);
+        let big_x = 1.0 + axx + 3.0 * (ayy + det);
+        let per_x = 1.0 / big_x;
+        let k = -0.5 * axy * per_x;
+        let e1 = x * (d * phi * c - psi * vy);
+        let e2 = x * (d * phi * s + psi * vx);
+        phi = (bx + 3.0 * (e1 + axy * u) + 0.5 * w[i] * big_w) * per_x - w[i];
+        psi = u + (u * (1.0 + axx) + 0.5 * axy * w[i] - by - e2) * (0.5 * per_x);
         let r = of.mass_ratio[i];
-        let vx = co - s * k;
-        let vy = s + co * k;
-        a = r * (xx * vx * vx + rest * s * s);
-        c = r * (xx * vy * vy + rest * co * co);
-        b = r * (xx * vx * vy - rest * s * co);
-        d = r * r * xx * rest;
-        bx = r * (co * fx - s * fy);
-        by = r * (s * fx + co * fy);
+        psi *= r;
+        x = r * (big_x * per_w);
+        d = r * ((0.25 * (1.0 + axx) + ayy + det) * per_x);
+        (s, c) = (sin[i], cos[i]);
+        (vx, vy) = (c - s * k, s + c * k);
     }
     let (mut px, mut py) = (0.0, arm.gravity());
     let mut inner = 0.0;
     std::array::from_fn(|i| {
         (px, py) = (cos[i] * px + sin[i] * py, cos[i] * py - sin[i] * px);
-        let (pw, b, z) = saved[i];
+        let (z, b, h) = saved[i];
         let tx = px - w[i];
-        let ty = pw * (3.0 * (z - b * tx) - 0.5 * py);
+        let ty = (z - h * py) - b * tx;
         let alpha = (ty - py) * of.per_length[i];
         let qdd = alpha - inner;
         inner = alpha;
