@@ -97,23 +97,120 @@ impl Outbox {
         self.release(now);
         let mut bytes = 0;
         for taken in 0..max_frames.max(1) {
-            let next = match (self.topics.front(), self.responses.front()) {
-                (Some((topic, _)), Some((response, _))) if topic < response => &mut self.topics,
-                (Some(_), None) => &mut self.topics,
-                _ => &mut self.responses,
+            let is_response = match (self.topics.front(), self.responses.front()) {
+                (Some((topic, _)), Some((response, _))) => response < topic,
+                (Some(_), None) => false,
+                (None, Some(_)) => true,
+                (None, None) => break,
             };
-            let Some((_, frame)) = next.front() else {
-                break;
+            let queue = if is_response {
+                &mut self.responses
+            } else {
+                &mut self.topics
             };
-            bytes += frame.len();
+            let length = queue.front().map_or(0, |(_, frame)| frame.len());
+            bytes += length;
             if taken > 0 && bytes > max_bytes {
                 break;
             }
-            let Some((number, frame)) = next.pop_front() else {
+            let Some((_, frame)) = queue.pop_front() else {
                 break;
             };
+            if !is_response {
+                self.topic_bytes -= length;
+            }
+            self.in_flight.push_back((length, is_response));
             batch.push(frame);
-            let _ = number;
+        }
+        self.shrink();
+    }
+
+    /// The next `bytes` of what was taken have been written.
+    pub fn written(&mut self, mut bytes: usize) {
+        while let Some((left, is_response)) = self.in_flight.front_mut() {
+            let done = bytes.min(*left);
+            *left -= done;
+            bytes -= done;
+            if *is_response {
+                self.response_bytes -= done;
+            }
+            if *left > 0 {
+                return;
+            }
+            self.in_flight.pop_front();
+        }
+    }
+
+    /// When the next held back message is due, if any is held back: the time to take a batch again.
+    pub fn next_release(&mut self) -> Option<Instant> {
+        self.throttles.next_release()
+    }
+
+    /// Whether there is nothing to be taken now (held back messages that are not due do not count).
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.topics.is_empty() && self.responses.is_empty()
+    }
+
+    /// Bytes of responses that wait, those in the batch being written included.
+    #[must_use]
+    pub const fn response_bytes(&self) -> usize {
+        self.response_bytes
+    }
+
+    /// Bytes of topic messages that wait, those held back included; at most [`MAX_TOPIC_BYTES`].
+    #[must_use]
+    pub const fn topic_bytes(&self) -> usize {
+        self.topic_bytes + self.throttles.bytes()
+    }
+
+    /// Topic messages dropped so far for want of room. What throttling replaces by something newer is not counted.
+    #[must_use]
+    pub const fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    fn number(&mut self) -> u64 {
+        self.produced += 1;
+        self.produced
+    }
+
+    fn enqueue(&mut self, number: u64, frame: Bytes) {
+        self.topic_bytes += frame.len();
+        self.topics.push_back((number, frame));
+    }
+
+    /// Queues the held back messages whose time has come.
+    fn release(&mut self, now: Instant) {
+        while let Some(frame) = self.throttles.release(now) {
+            let number = self.number();
+            self.enqueue(number, frame);
+        }
+    }
+
+    /// Drops the oldest topic messages until what is left fits: of the queue's first and the longest held back, the older.
+    fn make_room(&mut self) {
+        while self.topic_bytes() > MAX_TOPIC_BYTES {
+            let queued = self.topics.front().map(|(number, _)| *number);
+            let held = self.throttles.oldest();
+            if held.is_some_and(|held| queued.is_none_or(|queued| held < queued)) {
+                self.throttles.drop_oldest();
+            } else if let Some((_, frame)) = self.topics.pop_front() {
+                self.topic_bytes -= frame.len();
+            } else {
+                debug_assert!(false, "bytes are counted that no message has");
+                return;
+            }
+            self.dropped += 1;
+        }
+    }
+
+    /// Gives back the memory of a burst once it has been taken.
+    fn shrink(&mut self) {
+        for queue in [&mut self.topics, &mut self.responses] {
+            if queue.is_empty() && queue.capacity() > 4 * KEPT_FRAMES {
+                queue.shrink_to(KEPT_FRAMES);
+            }
         }
     }
 }
