@@ -18,7 +18,10 @@ pub struct Tip {
 #[must_use]
 pub fn forward<const N: usize>(lengths: &[f64; N], q: &[f64; N]) -> Tip {
     let position = joints(lengths, q).last().copied().unwrap_or(DVec2::ZERO);
-    Tip { position, orientation: q.iter().sum() }
+    Tip {
+        position,
+        orientation: q.iter().sum(),
+    }
 }
 
 /// Where each link ends \[m\]; the last is the end effector.
@@ -38,5 +41,7 @@ pub fn joints<const N: usize>(lengths: &[f64; N], q: &[f64; N]) -> [DVec2; N] {
 /// The unit vector along the last link at joint angles `q` \[rad\].
 #[must_use]
 pub fn heading<const N: usize>(q: &[f64; N]) -> DVec2 {
-    q.iter().fold(DVec2::X, |heading, &angle| heading.rotate(DVec2::from_angle(angle)))
+    q.iter().fold(DVec2::X, |heading, &angle| {
+        heading.rotate(DVec2::from_angle(angle))
+    })
 }

@@ -51,7 +51,9 @@ pub fn solve<const N: usize>(
     target: &Target,
 ) -> Result<[f64; N], Unreachable> {
     debug_assert!(
-        lengths.iter().all(|length| length.is_finite() && *length > 0.0),
+        lengths
+            .iter()
+            .all(|length| length.is_finite() && *length > 0.0),
         "an arm's lengths are checked where they come in"
     );
     let present = present.map(|q| if q.is_finite() { q } else { 0.0 });
@@ -102,7 +104,12 @@ impl Links {
         const EXPONENT: u64 = 0x7ff << 52;
         let longest = l1.max(l2).max(l3);
         let unit = f64::from_bits(longest.to_bits() & EXPONENT).max(f64::MIN_POSITIVE);
-        Self { unit, l1: l1 / unit, l2: l2 / unit, l3: l3 / unit }
+        Self {
+            unit,
+            l1: l1 / unit,
+            l2: l2 / unit,
+            l3: l3 / unit,
+        }
     }
 
     /// Distances that links 1 and 2 give the wrist.
@@ -167,12 +174,16 @@ impl Links {
         self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
         let distance = distance * self.unit;
         Err(match side {
-            Outside::Beyond => {
-                Unreachable::WristBeyond { phi, distance, limit: reach.outer * self.unit }
-            }
-            Outside::TooClose => {
-                Unreachable::WristTooClose { phi, distance, limit: reach.inner * self.unit }
-            }
+            Outside::Beyond => Unreachable::WristBeyond {
+                phi,
+                distance,
+                limit: reach.outer * self.unit,
+            },
+            Outside::TooClose => Unreachable::WristTooClose {
+                phi,
+                distance,
+                limit: reach.inner * self.unit,
+            },
         })
     }
 
@@ -245,15 +256,21 @@ impl Links {
 fn nearer<const N: usize>(first: [f64; N], second: [f64; N], present: &[f64; N]) -> [f64; N] {
     // Sums of the squares and of the sizes of the differences: the latter tell how far the former are rounded.
     let measured = |pose: &[f64; N]| {
-        pose.iter().zip(present).fold((0.0, 0.0), |(squares, sizes), (&q, &present)| {
-            let difference = turn(present, q);
-            (squares + difference * difference, sizes + difference.abs())
-        })
+        pose.iter()
+            .zip(present)
+            .fold((0.0, 0.0), |(squares, sizes), (&q, &present)| {
+                let difference = turn(present, q);
+                (squares + difference * difference, sizes + difference.abs())
+            })
     };
     let (first_squares, first_sizes) = measured(&first);
     let (second_squares, second_sizes) = measured(&second);
     let rounding = ANGLE_ROUNDING * (first_sizes + second_sizes);
-    if second_squares < first_squares - rounding { second } else { first }
+    if second_squares < first_squares - rounding {
+        second
+    } else {
+        first
+    }
 }
 
 /// Sine and cosine of half the angle between sides `p` and `q` of a triangle whose third side is `w`, both up to one
@@ -261,7 +278,11 @@ fn nearer<const N: usize>(first: [f64; N], second: [f64; N], present: &[f64; N])
 fn half_angle(p: f64, q: f64, w: f64) -> (f64, f64) {
     let (long, short) = if p >= q { (p, q) } else { (q, p) };
     // Each difference is taken between the two sides that are nearest in size, where it is exact.
-    let excess = if short >= w { w - (long - short) } else { short - (long - w) };
+    let excess = if short >= w {
+        w - (long - short)
+    } else {
+        short - (long - w)
+    };
     let sin = excess.max(0.0).sqrt() * (w + (long - short)).sqrt();
     let cos = ((long - w) + short).max(0.0).sqrt() * (long + short + w).sqrt();
     (sin, cos)

@@ -55,7 +55,10 @@ impl Reach {
                 rest += length;
             }
         }
-        Self { inner: f64::max(0.0, longest - rest), outer: longest + rest }
+        Self {
+            inner: f64::max(0.0, longest - rest),
+            outer: longest + rest,
+        }
     }
 }
 
