@@ -6,6 +6,7 @@ use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
+use pendularm::actors::runtime;
 use pendularm::logging;
 use pendularm::options::{Options, Parsed};
 
@@ -35,7 +36,7 @@ fn serve(options: &Options) -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    let outcome = stub::run(options);
+    let outcome = runtime::run(options);
     log.finish();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -49,24 +50,4 @@ fn serve(options: &Options) -> ExitCode {
 /// One line on standard error. If that is broken there is nobody left to tell.
 fn complain(error: &dyn Display) {
     let _ = writeln!(io::stderr(), "pendularm: {error}");
-}
-
-/// Stands in for `pendularm::actors::runtime` until it is there: listens, answers nobody, ends at a signal.
-mod stub {
-    use std::io::{self, Write};
-
-    use tokio::net::TcpListener;
-    use tokio::signal::unix::{SignalKind, signal};
-
-    use super::Options;
-
-    #[tokio::main(flavor = "current_thread")]
-    pub(super) async fn run(options: &Options) -> io::Result<()> {
-        let mut terminate = signal(SignalKind::terminate())?;
-        let listener = TcpListener::bind(options.bind).await?;
-        let _ = writeln!(io::stdout(), "listening on {}", listener.local_addr()?);
-        tracing::info!(links = options.links.count(), "nothing is served yet");
-        terminate.recv().await;
-        Ok(())
-    }
 }

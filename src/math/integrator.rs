@@ -11,6 +11,11 @@
 //!
 //! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
 
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
 use std::fmt;
 use std::str::FromStr;
 

@@ -9,3 +9,7 @@ pub mod json;
 pub mod messages;
 pub mod op;
 pub mod outbox;
+pub mod streamed;
+mod text;
+mod throttle;
+pub mod trajectory;
