@@ -95,6 +95,7 @@ impl Throttles {
             }
         }
         self.schedule(topic);
+        self.tidy();
         VecDeque::new()
     }
 
@@ -144,11 +145,10 @@ impl Throttles {
         self.bytes += frame.len();
         throttle.held.push_back((number, frame));
         let first = throttle.held.len() == 1;
-        if throttle.held.len() > throttle.queue_length {
-            if let Some((_, replaced)) = throttle.held.pop_front() {
-                self.count -= 1;
-                self.bytes -= replaced.len();
-            }
+        let full = throttle.held.len() > throttle.queue_length;
+        if let Some((_, replaced)) = full.then(|| throttle.held.pop_front()).flatten() {
+            self.count -= 1;
+            self.bytes -= replaced.len();
         }
         self.ages.push_back((number, Arc::clone(topic)));
         if first {
