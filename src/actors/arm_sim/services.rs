@@ -3,10 +3,11 @@
 //!
 //! **Invariant:** a request that changes nothing leaves the arm exactly as it was, down to the fraction of a step.
 
+use actix::prelude::*;
 use serde::Serialize;
 
-use super::ArmSim;
-use crate::actors::node::ServiceCall;
+use super::{ArmSim, GoalJudged};
+use crate::actors::node::{Reply, ServiceCall};
 use crate::math::arm::{Arm, ArmError};
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
@@ -46,7 +47,7 @@ struct GainsOf<'a> {
 
 impl<const N: usize> ArmSim<N> {
     /// Answers one call. The caller's next request waits until this has returned.
-    pub(super) fn serve(&mut self, call: ServiceCall) {
+    pub(super) fn serve(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
         let ServiceCall {
             service,
             arguments,
@@ -79,13 +80,8 @@ impl<const N: usize> ArmSim<N> {
                 reply.answer(&Switch { data }, &fields.status());
             }
             Service::Reset => {
-                self.reset();
-                let state = self.simulation.state();
-                let pose = Pose {
-                    position: &state.position,
-                    velocity: &state.velocity,
-                };
-                reply.answer(&pose, &fields.status());
+                let ended = self.reset();
+                self.answer_reset(reply, ended, ctx);
             }
             Service::Enable => {
                 let data = self.enable(&mut fields);
@@ -152,13 +148,39 @@ impl<const N: usize> ArmSim<N> {
         self.paused
     }
 
-    fn reset(&mut self) {
+    /// Gives the goal that ended by it, and who is to hear of that.
+    fn reset(&mut self) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
+        let ended = self.end_goal_for_reset();
         let diverged = self.simulation.divergence().is_some();
         self.simulation.reset();
         self.restart_pacer();
         self.restart_energy_drift();
         if diverged {
             self.publish_diagnostics();
+        }
+        ended
+    }
+
+    /// Answers with the pose after the reset, but not before the goal's owner has published how the goal ended.
+    fn answer_reset(
+        &self,
+        mut reply: Reply,
+        ended: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
+        ctx: &mut Context<Self>,
+    ) {
+        let state = *self.simulation.state();
+        let mut answer = move || {
+            reply.succeed(&Pose {
+                position: &state.position,
+                velocity: &state.velocity,
+            });
+        };
+        match ended {
+            None => answer(),
+            Some((owner, news)) => {
+                let heard = owner.send(news).into_actor(self);
+                ctx.spawn(heard.map(move |_, _, _| answer()));
+            }
         }
     }
 
