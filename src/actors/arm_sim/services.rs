@@ -173,7 +173,7 @@ impl<const N: usize> ArmSim<N> {
     }
 
     fn set_gains(&mut self, fields: &mut Fields) {
-        let mut gains = self.simulation.pid().gains();
+        let mut gains = *self.simulation.pid().gains();
         for (name, values) in [
             ("kp", &mut gains.kp),
             ("ki", &mut gains.ki),
