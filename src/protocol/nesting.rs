@@ -4,6 +4,8 @@
 
 use super::frame::MAX_NESTING;
 
+const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
+
 /// What a scan of an object came upon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Event {
