@@ -116,7 +116,7 @@ fn an_absent_optional_field_is_no_rejection() {
     let (value, status) = reading(Service::SetIntegrator, "{}", |fields| {
         (
             fields.number("timestep", Bound::Positive),
-            fields.text("method"),
+            fields.boolean("method"),
         )
     });
     assert_eq!((value, status.as_str()), ((None, None), ""));
