@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** a message is compared whole: it is what the sender of a request has to go by.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::fields::{Bound, Fields, Reason, Rejection};
 use pendularm::protocol::op::Arguments;

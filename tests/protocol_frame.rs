@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** whatever is checked of a stream is checked of every way to cut it up.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use pendularm::protocol::frame::{
     Foreign, Frame, FrameError, FrameReader, MAX_FRAME, MAX_NESTING, Opening, opening,
 };

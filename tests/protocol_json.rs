@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** what is not a non-finite number passes byte for byte.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use std::borrow::Cow;
 use std::time::{Duration, Instant};
 

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** every encoder's output is looked at whole.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use bytes::Bytes;
 use pendularm::protocol::messages::{
     Clock, DiagnosticArray, DiagnosticStatus, Empty, Header, JointState, JointTrajectory,

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** the joints are named as a 3-link arm's or a 2-link arm's are.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use pendularm::protocol::trajectory::{SetpointRequest, TrajectoryError, joint_trajectory};
 use proptest::prelude::*;
 use serde_json::value::RawValue;
