@@ -167,7 +167,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             .send(Connect(outlets))
             .into_actor(self)
             .map(|answer, connection, ctx| {
-                connection.begin(answer.unwrap_or(Err(Refused::Closed)), ctx)
+                connection.begin(answer.unwrap_or(Err(Refused::Closed)), ctx);
             })
             .wait(ctx);
     }

@@ -120,6 +120,12 @@ impl FrameReader {
         self.buffer.extend_from_slice(bytes);
     }
 
+    /// How much memory the reader holds, in bytes.
+    #[must_use]
+    pub const fn buffered(&self) -> usize {
+        self.buffer.capacity()
+    }
+
     /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {

@@ -4,6 +4,8 @@
 
 use super::frame::MAX_NESTING;
 
+const _: () = assert!(MAX_NESTING <= u128::BITS as usize, "one bit per level");
+
 /// What a scan of an object came upon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Event {
@@ -106,9 +108,14 @@ impl Nesting {
 
 /// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
 fn plain_in_string(bytes: &[u8]) -> usize {
-    /// A block that the compiler can compare with a few vector instructions.
+    /// Most strings are keys and names: they end before a block would pay.
+    const SHORT: usize = 16;
+    /// What the compiler compares with a few vector instructions.
     const BLOCK: usize = 32;
     let special = |byte: &u8| matches!(byte, b'"' | b'\\' | b'\n');
+    if let Some(end) = bytes.iter().take(SHORT).position(special) {
+        return end;
+    }
     let blocks = bytes
         .chunks_exact(BLOCK)
         .take_while(|block| !block.iter().fold(false, |any, byte| any | special(byte)))

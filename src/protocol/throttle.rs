@@ -258,3 +258,45 @@ impl Throttles {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One message is held back for a year, in front of all that comes after it in both indexes.
+    #[test]
+    fn the_indexes_stay_small_though_what_is_oldest_stays_for_long() {
+        let mut throttles = Throttles::default();
+        let (slow, fast) = (Arc::<str>::from("/slow"), Arc::<str>::from("/fast"));
+        let mut now = Instant::now();
+        let mut number = 0;
+        let mut offer = |throttles: &mut Throttles, topic, now| {
+            number += 1;
+            throttles.offer(topic, number, Bytes::from_static(b"x"), now)
+        };
+        throttles.set(&slow, Some((Duration::from_secs(365 * 24 * 3600), 1)));
+        throttles.set(&fast, Some((Duration::from_millis(1), 1)));
+        for _ in 0..2 {
+            offer(&mut throttles, &slow, now);
+        }
+        for round in 0..10_000 {
+            offer(&mut throttles, &fast, now);
+            offer(&mut throttles, &fast, now);
+            match round % 4 {
+                0 => throttles.discard(&fast),
+                1 => drop(throttles.set(&fast, Some((Duration::from_millis(1), 1)))),
+                2 => now += Duration::from_millis(2),
+                _ => {}
+            }
+            let _ = throttles.release(now);
+            assert!(
+                throttles.ages.len() <= 2 * 3 + SLACK + 1,
+                "{} ages",
+                throttles.ages.len()
+            );
+            let releases = throttles.releases.len();
+            assert!(releases <= 2 * 2 + SLACK + 1, "{releases} releases");
+        }
+        assert_eq!(throttles.oldest(), Some(2));
+    }
+}

@@ -13,6 +13,7 @@ use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 use crate::protocol::catalog::Service;
 use crate::protocol::fields::{Bound, Fields};
+use crate::protocol::messages::Empty;
 
 #[derive(Serialize)]
 struct Integrator {
@@ -51,22 +52,22 @@ impl<const N: usize> ArmSim<N> {
         let ServiceCall {
             service,
             arguments,
-            mut reply,
+            reply,
         } = call;
         let mut fields = match Fields::read(&arguments, service) {
             Ok(fields) => fields,
-            Err(rejection) => return reply.refuse(&rejection.to_string()),
+            Err(rejection) => return reply.conclude(&Empty {}, &rejection.to_string()),
         };
         match service {
             Service::SetIntegrator => {
                 let values = self.set_integrator(&mut fields);
-                reply.answer(&values, &fields.status());
+                reply.conclude(&values, &fields.status());
             }
             Service::SetParams => {
                 self.set_params(&mut fields);
                 let arm = self.simulation.arm();
                 let (gravity, masses, lengths) = (arm.gravity(), arm.masses(), arm.lengths());
-                reply.answer(
+                reply.conclude(
                     &Parameters {
                         gravity,
                         masses,
@@ -77,7 +78,7 @@ impl<const N: usize> ArmSim<N> {
             }
             Service::Pause => {
                 let data = self.pause(&mut fields);
-                reply.answer(&Switch { data }, &fields.status());
+                reply.conclude(&Switch { data }, &fields.status());
             }
             Service::Reset => {
                 let ended = self.reset();
@@ -85,16 +86,16 @@ impl<const N: usize> ArmSim<N> {
             }
             Service::Enable => {
                 let data = self.enable(&mut fields);
-                reply.answer(&Switch { data }, &fields.status());
+                reply.conclude(&Switch { data }, &fields.status());
             }
             Service::SetGains => {
                 self.set_gains(&mut fields);
                 let Gains { kp, ki, kd } = self.simulation.pid().gains();
-                reply.answer(&GainsOf { kp, ki, kd }, &fields.status());
+                reply.conclude(&GainsOf { kp, ki, kd }, &fields.status());
             }
             other => {
                 debug_assert!(false, "{} is not the arm's", other.name());
-                reply.refuse("the arm does not serve this");
+                reply.conclude(&Empty {}, "the arm does not serve this");
             }
         }
     }
@@ -164,16 +165,17 @@ impl<const N: usize> ArmSim<N> {
     /// Answers with the pose after the reset, but not before the goal's owner has published how the goal ended.
     fn answer_reset(
         &self,
-        mut reply: Reply,
+        reply: Reply,
         ended: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
         ctx: &mut Context<Self>,
     ) {
         let state = *self.simulation.state();
-        let mut answer = move || {
-            reply.succeed(&Pose {
+        let answer = move || {
+            let pose = Pose {
                 position: &state.position,
                 velocity: &state.velocity,
-            });
+            };
+            reply.conclude(&pose, "");
         };
         match ended {
             None => answer(),
@@ -195,7 +197,7 @@ impl<const N: usize> ArmSim<N> {
     }
 
     fn set_gains(&mut self, fields: &mut Fields) {
-        let mut gains = self.simulation.pid().gains().clone();
+        let mut gains = *self.simulation.pid().gains();
         for (name, values) in [
             ("kp", &mut gains.kp),
             ("ki", &mut gains.ki),

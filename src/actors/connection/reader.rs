@@ -153,7 +153,8 @@ impl Reader {
         if let Op::CallService(CallService { service, .. }) = &request.op
             && Service::from_name(service).is_some_and(Service::is_computation)
         {
-            return self.shared.enqueue_computation(request, &self.registry);
+            self.shared.enqueue_computation(request, &self.registry);
+            return;
         }
         if let Ok(handled) = self.registry.send(request).await
             && let Some(effect) = handled.0

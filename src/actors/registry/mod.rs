@@ -172,6 +172,8 @@ pub struct Respond {
     pub frame: Bytes,
     /// The service that it answers; `None` for a status.
     pub service: Option<Service>,
+    /// Dropped once the frame is on its way, where that is also the end of the call.
+    pub done: Option<oneshot::Sender<()>>,
 }
 
 /// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
