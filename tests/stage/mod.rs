@@ -11,10 +11,11 @@
 
 use std::future::Future;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::arm_sim::{ArmSim, Snapshot, TakeSnapshot};
+use pendularm::actors::arm_sim::{ArmPose, ArmSim, Snapshot, TakeSnapshot};
 use pendularm::actors::connection::Connection;
 use pendularm::actors::gauges::Gauges;
 use pendularm::actors::ik::Ik;
@@ -33,14 +34,24 @@ pub const PATIENCE: Duration = Duration::from_secs(600);
 
 /// Runs a test on one thread in virtual time.
 pub fn in_virtual_time<T>(test: impl Future<Output = T>) -> T {
-    System::with_tokio_rt(|| {
+    counting_wake_ups(|_| test)
+}
+
+/// The same; the test is told how often the thread has gone to sleep, and so how often something woke it.
+pub fn counting_wake_ups<T, F: Future<Output = T>>(test: impl FnOnce(Arc<AtomicU64>) -> F) -> T {
+    let sleeps = Arc::new(AtomicU64::new(0));
+    let counter = Arc::clone(&sleeps);
+    let system = System::with_tokio_rt(move || {
         tokio::runtime::Builder::new_current_thread()
             .enable_all()
             .start_paused(true)
+            .on_thread_park(move || {
+                counter.fetch_add(1, Ordering::Relaxed);
+            })
             .build()
             .unwrap()
-    })
-    .block_on(test)
+    });
+    system.block_on(test(sleeps))
 }
 
 pub fn ms(milliseconds: u64) -> Duration {
@@ -76,28 +87,12 @@ where
         )
         .start();
         ArmSim::attach(&arm, &mut nodes);
-        let ik = Ik::<N>::new(arm.clone().recipient()).start();
-        Ik::attach(&ik, &mut nodes);
         let tracker = GoalTracker {
             track: arm.clone().recipient(),
             end: arm.clone().recipient(),
         };
-        let publish = registry.clone().recipient();
-        let action = IkAction::<N>::new(ik.recipient(), tracker, publish).start();
-        IkAction::attach(&action, &mut nodes);
-        let goals = GoalClient {
-            send: action.clone().recipient(),
-            cancel: action.clone().recipient(),
-            settle: action.clone().recipient(),
-        };
-        let trial = IkTrial::<N>::new(
-            arm.clone().recipient(),
-            goals,
-            registry.clone().recipient(),
-            fastrand::Rng::with_seed(seed),
-        )
-        .start();
-        IkTrial::attach(&trial, &mut nodes);
+        let pose = arm.clone().recipient();
+        let action = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         Self {
             registry,
@@ -108,15 +103,7 @@ where
     }
 
     pub fn connect(&self) -> Client {
-        let (ours, theirs) = tokio::io::duplex(1 << 20);
-        Connection::start_on(theirs, self.registry.clone(), Arc::clone(&self.gauges));
-        let (reader, writer) = tokio::io::split(ours);
-        Client {
-            reader: BufReader::new(reader),
-            writer,
-            calls: 0,
-            heard: Vec::new(),
-        }
+        connect(&self.registry, &self.gauges)
     }
 
     /// The arm's whole simulation, as it is now.
@@ -134,6 +121,43 @@ where
             .await;
         client.ask("/arm_sim/reset", json!({})).await;
         (stage, client)
+    }
+}
+
+/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to.
+pub fn start_goal_nodes<const N: usize>(
+    registry: &Addr<Registry>,
+    pose: Recipient<ArmPose<N>>,
+    tracker: GoalTracker<N>,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> Addr<IkAction<N>> {
+    let publish = || registry.clone().recipient();
+    let ik = Ik::<N>::new(pose.clone()).start();
+    Ik::attach(&ik, nodes);
+    let action = IkAction::<N>::new(ik.recipient(), tracker, publish()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        settle: action.clone().recipient(),
+    };
+    let rng = fastrand::Rng::with_seed(seed);
+    let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
+    IkTrial::attach(&trial, nodes);
+    action
+}
+
+/// A client in the registry's own thread, through an in-memory pipe.
+pub fn connect(registry: &Addr<Registry>, gauges: &Arc<Gauges>) -> Client {
+    let (ours, theirs) = tokio::io::duplex(1 << 20);
+    Connection::start_on(theirs, registry.clone(), Arc::clone(gauges));
+    let (reader, writer) = tokio::io::split(ours);
+    Client {
+        reader: BufReader::new(reader),
+        writer,
+        calls: 0,
+        heard: Vec::new(),
     }
 }
 
