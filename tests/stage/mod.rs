@@ -15,18 +15,22 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::arm_sim::{ArmPose, ArmSim, Snapshot, TakeSnapshot};
+use pendularm::actors::arm_sim::{
+    ArmPose, ArmSim, EndGoal, GoalJudged, Pose, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+};
 use pendularm::actors::connection::Connection;
 use pendularm::actors::gauges::Gauges;
 use pendularm::actors::ik::Ik;
 use pendularm::actors::ik_action::{GoalTracker, IkAction};
 use pendularm::actors::ik_trial::{GoalClient, IkTrial};
-use pendularm::actors::registry::{Attach, Nodes, Registry};
+use pendularm::actors::registry::{Attach, Nodes, Publish, Registry};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
+use pendularm::protocol::catalog::Topic;
 use serde_json::{Value, json};
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, DuplexStream, ReadHalf, WriteHalf};
+use tokio::sync::mpsc::UnboundedSender;
 use tokio::time::{sleep, timeout};
 
 /// Virtual time that anything may take before a test gives up.
@@ -316,4 +320,67 @@ pub fn number(value: &Value) -> f64 {
 
 pub fn numbers(value: &Value) -> Vec<f64> {
     value.as_array().unwrap().iter().map(number).collect()
+}
+
+/// An arm that says nothing unless it is asked, and makes no steps.
+pub struct SilentArm;
+
+impl SilentArm {
+    /// An arm as `ik_action` wants it.
+    pub fn tracker(address: &Addr<Self>) -> GoalTracker<2> {
+        GoalTracker {
+            track: address.clone().recipient(),
+            end: address.clone().recipient(),
+        }
+    }
+}
+
+impl Actor for SilentArm {
+    type Context = Context<Self>;
+}
+
+impl Handler<ArmPose<2>> for SilentArm {
+    type Result = Pose<2>;
+
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
+        Pose {
+            lengths: [1.0, 1.0],
+            positions: [0.0, 0.0],
+            simulated: 0.0,
+        }
+    }
+}
+
+impl Handler<TrackGoal<2>> for SilentArm {
+    type Result = Tracking<2>;
+
+    fn handle(&mut self, goal: TrackGoal<2>, _: &mut Context<Self>) -> Tracking<2> {
+        Tracking {
+            positions: goal.solution,
+            before: None,
+        }
+    }
+}
+
+impl Handler<EndGoal<2>> for SilentArm {
+    type Result = Option<GoalJudged<2>>;
+
+    fn handle(&mut self, _: EndGoal<2>, _: &mut Context<Self>) -> Self::Result {
+        None
+    }
+}
+
+/// Takes what nodes publish in the registry's place: here nothing is left out for want of subscribers.
+pub struct Published(pub UnboundedSender<Topic>);
+
+impl Actor for Published {
+    type Context = Context<Self>;
+}
+
+impl Handler<Publish> for Published {
+    type Result = ();
+
+    fn handle(&mut self, message: Publish, _: &mut Context<Self>) {
+        self.0.send(message.topic).unwrap();
+    }
 }
