@@ -5,7 +5,7 @@ use pendularm::math::integrator::{Method, increment};
 use std::hint::black_box;
 use std::time::Instant;
 
-const REPEATS: usize = 25;
+const REPEATS: usize = 1000;
 
 fn best(n: usize, mut f: impl FnMut()) -> f64 {
     let mut best = f64::INFINITY;
@@ -34,23 +34,34 @@ fn states<const N: usize>() -> Vec<State<N>> {
 }
 
 #[inline(never)]
-fn throughput<const N: usize>(arm: &Arm<N>, states: &[State<N>], out: &mut [[f64; N]]) {
+fn throughput<const N: usize>(
+    arm: &Arm<N>,
+    states: &[State<N>],
+    tau: &[f64; N],
+    out: &mut [[f64; N]],
+) {
     for (s, out) in states.iter().zip(out) {
-        *out = forward_dynamics(arm, &s.position, &s.velocity, &[0.3; N]);
+        *out = forward_dynamics(arm, &s.position, &s.velocity, tau);
     }
 }
 
 #[inline(never)]
-fn steps<const N: usize>(arm: &Arm<N>, method: Method, state: &mut State<N>, steps: usize) {
-    let tau = [0.3; N];
+fn steps<const N: usize>(
+    arm: &Arm<N>,
+    method: Method,
+    tau: &[f64; N],
+    h: f64,
+    state: &mut State<N>,
+    steps: usize,
+) {
     for k in 0..steps {
         let (dq, dv) = increment(
             method,
-            |_, q, v| forward_dynamics(arm, q, v, &tau),
-            k as f64 * 1e-3,
+            |_, q, v| forward_dynamics(arm, q, v, tau),
+            k as f64 * h,
             &state.position,
             &state.velocity,
-            1e-3,
+            h,
         );
         for i in 0..N {
             state.position[i] += dq[i];
@@ -64,16 +75,28 @@ fn report<const N: usize>() {
         let arm = black_box(Arm::<N>::new([1.0; N], [1.0; N], g).unwrap());
         let states = states::<N>();
         let mut out = vec![[0.0; N]; states.len()];
-        let ns = best(states.len() * 100, || {
-            for _ in 0..100 {
-                throughput(black_box(&arm), black_box(&states), black_box(&mut out));
+        let ns = best(states.len(), || {
+            {
+                throughput(
+                    black_box(&arm),
+                    black_box(&states),
+                    black_box(&[0.3; N]),
+                    black_box(&mut out),
+                );
             }
         });
         println!("n={N} g={g} forward dynamics, throughput {ns:.1} ns");
         for method in Method::ALL {
-            let ns = best(20_000, || {
-                let mut state = State::rest();
-                steps(black_box(&arm), black_box(method), &mut state, 20_000);
+            let ns = best(500, || {
+                let mut state = State { position: [0.3; N], velocity: [0.2; N] };
+                steps(
+                    black_box(&arm),
+                    black_box(method),
+                    black_box(&[0.3; N]),
+                    black_box(1e-3),
+                    &mut state,
+                    black_box(500),
+                );
                 black_box(state);
             });
             println!("n={N} g={g} {method:10} {ns:.1} ns");
