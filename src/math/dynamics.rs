@@ -36,21 +36,16 @@ use glam::DVec2;
 #[must_use]
 pub fn mass_matrix<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [[f64; N]; N] {
     let u = directions(q);
-    let mut m = [[0.0; N]; N];
-    for i in 0..N {
-        for j in 0..=i {
-            // Joint i moves the links a >= i, joint j the links b >= j.
-            m[i][j] = (i..N)
-                .map(|a| {
-                    (j..N)
-                        .map(|b| coupling(arm, a, b) * u[a].dot(u[b]))
-                        .sum::<f64>()
-                })
-                .sum();
-            m[j][i] = m[i][j];
-        }
-    }
-    m
+    // Joint i moves the links a >= i, joint j the links b >= j. Summed for i >= j only, so that M is symmetric to the bit.
+    let entry = |i: usize, j: usize| -> f64 {
+        let row = |a: usize| {
+            (j..N)
+                .map(|b| coupling(arm, a, b) * u[a].dot(u[b]))
+                .sum::<f64>()
+        };
+        (i..N).map(row).sum()
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i.max(j), i.min(j))))
 }
 
 /// Coriolis and centrifugal effort `C(q, q̇) q̇` \[N m\] at joint positions `q` \[rad\] and rates `qd` \[rad/s\].

@@ -21,10 +21,11 @@
     clippy::indexing_slicing,
     reason = "indices run over 0..N of arrays that have N elements, and over the six coefficients"
 )]
+use std::array::from_fn;
+use std::f64::consts::FRAC_2_PI;
+
 /// Largest magnitude of an angle \[rad\] for which the reduction holds: beyond it `k` would need more than 17 bits.
 const LIMIT: f64 = 2.0e5;
-
-const TWO_OVER_PI: f64 = 0.636_619_772_367_581_4;
 
 /// Adding this rounds to an integer, which is then in the low bits of the sum: `1.5 * 2^52`.
 const ROUND: f64 = 6_755_399_441_055_744.0;
@@ -60,9 +61,7 @@ const C: [f64; 6] = [
 #[must_use]
 #[inline(always)]
 pub fn sin_cos<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
-    use std::array::from_fn;
-
-    let shifted = angles.map(|angle| angle * TWO_OVER_PI + ROUND);
+    let shifted = angles.map(|angle| angle * FRAC_2_PI + ROUND);
     let k = shifted.map(|shifted| shifted - ROUND);
     let first: [f64; N] = from_fn(|i| angles[i] - k[i] * HALF_PI[0]);
     let second = k.map(|k| k * HALF_PI[1]);
