@@ -11,6 +11,7 @@ mod nesting;
 pub mod op;
 pub mod opening;
 pub mod outbox;
+pub mod streamed;
 mod text;
 mod throttle;
 pub mod trajectory;
