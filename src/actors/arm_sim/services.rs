@@ -11,7 +11,8 @@ use crate::math::arm::{Arm, ArmError};
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 use crate::protocol::catalog::Service;
-use crate::protocol::fields::{Bound, Fields};
+use crate::protocol::fields::{Bound, Fields, Rejection};
+use crate::protocol::op::Arguments;
 
 #[derive(Serialize)]
 struct Integrator {
@@ -52,7 +53,8 @@ impl<const N: usize> ArmSim<N> {
             arguments,
             mut reply,
         } = call;
-        let mut fields = match Fields::read(&arguments, service) {
+        let nothing = Arguments::none();
+        let mut fields = match read(&arguments, &nothing, service) {
             Ok(fields) => fields,
             Err(rejection) => return reply.refuse(&rejection.to_string()),
         };
@@ -79,7 +81,10 @@ impl<const N: usize> ArmSim<N> {
                 reply.answer(&Switch { data }, &fields.status());
             }
             Service::Reset => {
-                self.reset();
+                // A reset has no fields: what is rejected here is `args` itself.
+                if fields.accepted() {
+                    self.reset();
+                }
                 let state = self.simulation.state();
                 let pose = Pose {
                     position: &state.position,
@@ -185,6 +190,20 @@ impl<const N: usize> ArmSim<N> {
         }
         self.simulation.set_gains(gains);
     }
+}
+
+/// The fields of a request. Arguments that are rejected as a whole count as `nothing`, so that the answer to them, too, echoes
+/// the values as they are.
+fn read<'a>(
+    arguments: &'a Arguments,
+    nothing: &'a Arguments,
+    service: Service,
+) -> Result<Fields<'a>, Rejection> {
+    Fields::read(arguments, service).or_else(|rejection| {
+        let mut fields = Fields::read(nothing, service)?;
+        fields.refuse(&rejection.field, &rejection.reason);
+        Ok(fields)
+    })
 }
 
 /// The values as an array; the reader has checked how many they are.
