@@ -7,10 +7,11 @@
 
 use super::super::arm::Arm;
 use super::super::trig;
+use glam::DVec2;
 
 /// Joint accelerations \[rad/s²\] at `q` \[rad\], `qd` \[rad/s\] under the efforts `tau` \[N m\].
 #[must_use]
-#[inline]
+#[inline(always)]
 pub fn forward_dynamics<const N: usize>(
     arm: &Arm<N>,
     q: &[f64; N],
@@ -24,50 +25,119 @@ pub fn forward_dynamics<const N: usize>(
         rate += qd[i];
         arm.lengths()[i] * rate * rate
     });
-    let (mut x, mut d, mut phi, mut psi, mut vx, mut vy, mut s, mut c) =
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
-    let mut saved = [(0.0, 0.0, 0.0); N];
     let mut outer = 0.0;
+    let mut hinges = [(0.0, 0.0, 0.0); N];
+    let mut load = Load {
+        a: 0.0,
+        b: 0.0,
+        c: 0.0,
+        det: 0.0,
+        bias: DVec2::ZERO,
+        e: DVec2::ZERO,
+    };
     for i in (0..N).rev() {
         let u = (tau[i] - outer) * of.per_mass_length[i];
         outer = tau[i];
-        let axx = x * vx * vx + d * s * s;
-        let axy = x * vx * vy - d * s * c;
-        let ayy = x * vy * vy + d * c * c;
-        let det = x * d;
-        let bx = x * phi * vx - psi * s;
-        let by = x * phi * vy + psi * c;
-        let big_w = 1.0 + 3.0 * ayy;
+        let big_w = 1.0 + 3.0 * load.c;
         let per_w = 1.0 / big_w;
-        saved[i] = (3.0 * per_w * (u - by), 3.0 * per_w * axy, 0.5 * per_w);
-        if i == 0 {
-            break;
+        hinges[i] = (
+            3.0 * per_w * (u - load.bias.y),
+            3.0 * per_w * load.b,
+            0.5 * per_w,
+        );
+        if i > 0 {
+            let link = if i + 1 == N {
+                Link {
+                    x: 1.0,
+                    k: 0.0,
+                    d: 0.25,
+                    phi: -0.5 * w[i],
+                    psi: 1.5 * u,
+                }
+            } else {
+                load.inner(u, w[i], big_w, per_w)
+            };
+            let dir = DVec2::new(cos[i], sin[i]);
+            load = if i + 1 == N {
+                link.carry_straight(of.mass_ratio[i], dir)
+            } else {
+                link.carry(of.mass_ratio[i], dir)
+            };
         }
-        let big_x = 1.0 + axx + 3.0 * (ayy + det);
-        let per_x = 1.0 / big_x;
-        let k = -0.5 * axy * per_x;
-        let e1 = x * (d * phi * c - psi * vy);
-        let e2 = x * (d * phi * s + psi * vx);
-        phi = (bx + 3.0 * (e1 + axy * u) + 0.5 * w[i] * big_w) * per_x - w[i];
-        psi = u + (u * (1.0 + axx) + 0.5 * axy * w[i] - by - e2) * (0.5 * per_x);
-        let r = of.mass_ratio[i];
-        psi *= r;
-        x = r * (big_x * per_w);
-        d = r * ((0.25 * (1.0 + axx) + ayy + det) * per_x);
-        (s, c) = (sin[i], cos[i]);
-        (vx, vy) = (c - s * k, s + c * k);
     }
-    let (mut px, mut py) = (0.0, arm.gravity());
+    let mut p = DVec2::new(0.0, arm.gravity());
     let mut inner = 0.0;
     std::array::from_fn(|i| {
-        (px, py) = (cos[i] * px + sin[i] * py, cos[i] * py - sin[i] * px);
-        let (z, b, h) = saved[i];
-        let tx = px - w[i];
-        let ty = (z - h * py) - b * tx;
-        let alpha = (ty - py) * of.per_length[i];
+        let dir = DVec2::new(cos[i], sin[i]);
+        p = DVec2::new(dir.dot(p), dir.perp_dot(p));
+        let (z, b, h) = hinges[i];
+        let tx = p.x - w[i];
+        let ty = (z - h * p.y) - b * tx;
+        let alpha = (ty - p.y) * of.per_length[i];
         let qdd = alpha - inner;
         inner = alpha;
-        (px, py) = (tx, ty);
+        p = DVec2::new(tx, ty);
         qdd
     })
+}
+
+#[derive(Clone, Copy)]
+struct Link {
+    x: f64,
+    k: f64,
+    d: f64,
+    phi: f64,
+    psi: f64,
+}
+
+impl Link {
+    #[inline(always)]
+    fn carry_straight(self, ratio: f64, u: DVec2) -> Load {
+        self.carry_along(ratio, u, u)
+    }
+    #[inline(always)]
+    fn carry(self, ratio: f64, u: DVec2) -> Load {
+        self.carry_along(ratio, u, u + self.k * u.perp())
+    }
+    #[inline(always)]
+    fn carry_along(self, ratio: f64, u: DVec2, v: DVec2) -> Load {
+        let x = ratio * self.x;
+        let d = ratio * self.d;
+        let psi = ratio * self.psi;
+        let w = u.perp();
+        Load {
+            a: x * v.x * v.x + d * w.x * w.x,
+            b: x * v.x * v.y + d * w.x * w.y,
+            c: x * v.y * v.y + d * w.y * w.y,
+            det: x * d,
+            bias: x * self.phi * v + psi * w,
+            e: x * (d * self.phi * u + psi * v.perp()),
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Load {
+    a: f64,
+    b: f64,
+    c: f64,
+    det: f64,
+    bias: DVec2,
+    e: DVec2,
+}
+
+impl Load {
+    #[inline(always)]
+    fn inner(&self, u: f64, w: f64, big_w: f64, per_w: f64) -> Link {
+        let big_x = 1.0 + self.a + 3.0 * (self.c + self.det);
+        let per_x = 1.0 / big_x;
+        Link {
+            x: big_x * per_w,
+            k: -0.5 * self.b * per_x,
+            d: (0.25 * (1.0 + self.a) + self.c + self.det) * per_x,
+            phi: (self.bias.x + 3.0 * (self.e.x + self.b * u) + 0.5 * w * big_w) * per_x - w,
+            psi: u
+                + (u * (1.0 + self.a) + 0.5 * self.b * w - self.bias.y - self.e.y) * (0.5 * per_x),
+        }
+    }
 }
