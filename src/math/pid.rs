@@ -25,7 +25,7 @@
 
 use super::arm::State;
 
-/// Bound of each joint's integral \[rad s\]. With the default gains it stands for thousands of times the effort that
+/// Bound of each joint's integral \[rad s\]. With the default gains it stands for over a thousand times the effort that
 /// gravity asks for, so it never hinders; without it a blocked or impossible setpoint would wind up for ever.
 pub const INTEGRAL_LIMIT: f64 = 50.0;
 
