@@ -3,5 +3,8 @@
 //! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), [`protocol`] (pure: bytes
 //! and JSON) and [`actors`] (joins the two, one actor per node). `math` and `protocol` do not know each other.
 
+pub mod actors;
+pub mod logging;
 pub mod math;
+pub mod options;
 pub mod protocol;

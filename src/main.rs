@@ -1,3 +1,53 @@
 //! The thin binary: options in, exit status out.
+//!
+//! **Invariant:** nothing here panics, also with standard output or standard error closed, full or broken.
 
-fn main() {}
+use std::fmt::Display;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use pendularm::actors::runtime;
+use pendularm::logging;
+use pendularm::options::{Options, Parsed};
+
+/// Exit status for a bad option or a bad environment variable.
+const BAD_USAGE: u8 = 2;
+
+fn main() -> ExitCode {
+    match Options::parse(std::env::args_os(), |variable| std::env::var_os(variable)) {
+        Ok(Parsed::Serve(options)) => serve(&options),
+        Ok(Parsed::Show(text)) => {
+            // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
+            let _ = io::stdout().write_all(text.as_bytes());
+            ExitCode::SUCCESS
+        }
+        Err(error) => {
+            complain(&error);
+            ExitCode::from(BAD_USAGE)
+        }
+    }
+}
+
+fn serve(options: &Options) -> ExitCode {
+    let log = match logging::start(options.log) {
+        Ok(log) => log,
+        Err(error) => {
+            complain(&format_args!("cannot log to standard error: {error}"));
+            return ExitCode::FAILURE;
+        }
+    };
+    let outcome = runtime::run(options);
+    log.finish();
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(&error);
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// One line on standard error. If that is broken there is nobody left to tell.
+fn complain(error: &dyn Display) {
+    let _ = writeln!(io::stderr(), "pendularm: {error}");
+}

@@ -1,1 +1,191 @@
-//! (being written: pid)
+//! The control law: per joint, proportional, integral and derivative on a held setpoint.
+//!
+//! ```text
+//! e = q* - q        I = clamp(I + e dt, -I_max, +I_max)        τ = kp e + ki I + kd (q̇* - q̇)
+//! ```
+//!
+//! | symbol | name | unit | where |
+//! | --- | --- | --- | --- |
+//! | q*, q̇* | setpoint | rad, rad/s | [`Setpoint`] |
+//! | kp, ki, kd | gains | N m/rad, N m/(rad s), N m s/rad | [`Gains`] |
+//! | I | integral of the position error | rad s | [`Pid::integral`] |
+//! | `I_max` | anti-windup limit | rad s | [`INTEGRAL_LIMIT`] |
+//! | τ | effort | N m | [`Control`] |
+//!
+//! The derivative acts on the measured velocity, which is known, instead of differencing the error. Nothing else
+//! compensates gravity: with ki = 0 the arm sags until kp e carries its load.
+//!
+//! **Invariant:** the law is a pure function of the state at the start of a step; the integral that it reckoned
+//! counts only once the caller commits it, so that a step that is not taken leaves nothing behind.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
+use super::arm::State;
+
+/// Bound of each joint's integral \[rad s\]. With the default gains it stands for over a thousand times the effort that
+/// gravity asks for, so it never hinders; without it a blocked or impossible setpoint would wind up for ever.
+pub const INTEGRAL_LIMIT: f64 = 50.0;
+
+/// Gains of every joint; each is finite and not negative.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gains<const N: usize> {
+    /// Proportional gains \[N m/rad\].
+    pub kp: [f64; N],
+    /// Integral gains \[N m/(rad s)\].
+    pub ki: [f64; N],
+    /// Derivative gains \[N m s/rad\].
+    pub kd: [f64; N],
+}
+
+/// Gains for the default 2-link arm: any setpoint within ±2π, from rest or out of a free swing, is reached to 0.02 rad
+/// and 0.02 m within 2 s. Stable in every pose up to a timestep of 4.3 ms.
+///
+/// Other numbers of links have no default: gains must fit the inertia that each joint moves.
+impl Default for Gains<2> {
+    fn default() -> Self {
+        Self {
+            kp: [1000.0, 250.0],
+            ki: [3000.0, 750.0],
+            kd: [110.0, 22.0],
+        }
+    }
+}
+
+/// Gains for the default 3-link arm: as for two links, within 3.5 s. Stable in every pose up to a timestep of 3.1 ms.
+///
+/// Found by a search for the least settling time that keeps turns of 4π from diverging at 3 ms with any method. The last
+/// joint has little damping of its own, because `kd dt` there is what limits the timestep.
+impl Default for Gains<3> {
+    fn default() -> Self {
+        Self {
+            kp: [1900.0, 240.0, 115.0],
+            ki: [4800.0, 500.0, 340.0],
+            kd: [185.0, 32.0, 5.0],
+        }
+    }
+}
+
+/// Where the arm is to be held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Setpoint<const N: usize> {
+    /// Joint positions q* \[rad\], not wrapped: a setpoint of 2π asks for a whole turn.
+    pub position: [f64; N],
+    /// Joint velocities q̇* \[rad/s\]. They are held too, they do not move the positions.
+    pub velocity: [f64; N],
+}
+
+/// The starting pose, q = 0, at rest.
+impl<const N: usize> Default for Setpoint<N> {
+    fn default() -> Self {
+        Self {
+            position: [0.0; N],
+            velocity: [0.0; N],
+        }
+    }
+}
+
+/// What the law answers for one step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Control<const N: usize> {
+    /// Effort τ to hold for the step \[N m\].
+    pub effort: [f64; N],
+    /// The integral that went into it \[rad s\], to be committed if the step is taken.
+    pub integral: [f64; N],
+}
+
+/// The controller: gains, setpoint, integral, and whether it is on. It starts off.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pid<const N: usize> {
+    gains: Gains<N>,
+    setpoint: Setpoint<N>,
+    /// Integral of the position error, as of the last step taken \[rad s\].
+    integral: [f64; N],
+    enabled: bool,
+}
+
+impl<const N: usize> Pid<N> {
+    /// A controller that is off, with its setpoint at the starting pose.
+    #[must_use]
+    pub fn new(gains: Gains<N>) -> Self {
+        Self {
+            gains,
+            setpoint: Setpoint::default(),
+            integral: [0.0; N],
+            enabled: false,
+        }
+    }
+
+    /// The law for one step of `dt` \[s\] that starts at `state`. Asked whether the controller is on or off.
+    #[inline]
+    #[must_use]
+    pub fn control(&self, state: &State<N>, dt: f64) -> Control<N> {
+        let Gains { kp, ki, kd } = &self.gains;
+        let position_error: [f64; N] =
+            std::array::from_fn(|i| self.setpoint.position[i] - state.position[i]);
+        let integral: [f64; N] = std::array::from_fn(|i| {
+            (self.integral[i] + position_error[i] * dt).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+        });
+        let effort = std::array::from_fn(|i| {
+            let velocity_error = self.setpoint.velocity[i] - state.velocity[i];
+            kp[i] * position_error[i] + ki[i] * integral[i] + kd[i] * velocity_error
+        });
+        Control { effort, integral }
+    }
+
+    /// Keeps the integral \[rad s\] of a step that was taken.
+    #[inline]
+    pub fn commit(&mut self, integral: [f64; N]) {
+        self.integral = integral;
+    }
+
+    /// Turns the controller on or off. From off to on the integral starts at zero; what is on already stays as it is.
+    pub fn enable(&mut self, on: bool) {
+        if on && !self.enabled {
+            self.integral = [0.0; N];
+        }
+        self.enabled = on;
+    }
+
+    /// Setpoint to the starting pose at rest, integral to zero; gains and on or off stay.
+    pub fn reset(&mut self) {
+        self.setpoint = Setpoint::default();
+        self.integral = [0.0; N];
+    }
+
+    /// Changes the gains and keeps the integral, so that their effect shows against what has accumulated.
+    pub fn set_gains(&mut self, gains: Gains<N>) {
+        self.gains = gains;
+    }
+
+    /// Changes the setpoint and keeps the integral.
+    pub fn set_setpoint(&mut self, setpoint: Setpoint<N>) {
+        self.setpoint = setpoint;
+    }
+
+    /// Whether the controller is on.
+    #[must_use]
+    pub fn is_enabled(&self) -> bool {
+        self.enabled
+    }
+
+    /// The gains in force.
+    #[must_use]
+    pub fn gains(&self) -> &Gains<N> {
+        &self.gains
+    }
+
+    /// The setpoint held.
+    #[must_use]
+    pub fn setpoint(&self) -> &Setpoint<N> {
+        &self.setpoint
+    }
+
+    /// Integral of the position error \[rad s\], each within [`INTEGRAL_LIMIT`].
+    #[must_use]
+    pub fn integral(&self) -> &[f64; N] {
+        &self.integral
+    }
+}

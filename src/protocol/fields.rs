@@ -1,1 +1,347 @@
-//! (being written: fields)
+//! Reads a request field by field and collects what it rejects, by name.
+//!
+//! Every field is read alone: a bad one is left out and remembered, the others still count. The catalog says which fields a
+//! service has, in which order a positional array gives them, and which must be there.
+//!
+//! **Invariant:** each rejected field is named once or, where entries of an array are at fault, once for each of these.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use serde_json::value::RawValue;
+
+use super::catalog::{Field, Service};
+use super::json;
+use super::op::Arguments;
+use super::text;
+
+/// Longest `status` in characters: room for every field of the largest service.
+const MAX_STATUS: usize = 2048;
+/// Longest reason, in characters, that another layer gives.
+const MAX_REASON: usize = 256;
+
+/// What a number must be, besides finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// Any finite number.
+    Finite,
+    /// Greater than 0.
+    Positive,
+    /// 0 or greater.
+    NonNegative,
+}
+
+impl Bound {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Self::Finite => true,
+            Self::Positive => value > 0.0,
+            Self::NonNegative => value >= 0.0,
+        }
+    }
+}
+
+impl fmt::Display for Bound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Finite => "finite",
+            Self::Positive => "greater than 0",
+            Self::NonNegative => "at least 0",
+        })
+    }
+}
+
+/// A field that was not taken, and why. Reads as a sentence: `masses[1] must be greater than 0, got -2`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{field} {reason}")]
+pub struct Rejection {
+    /// The field, with the index of the entry where one entry is at fault.
+    pub field: String,
+    /// What is wrong with it.
+    pub reason: Reason,
+}
+
+/// Why a field was not taken.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Reason {
+    /// It has to be there.
+    #[error("is required")]
+    Missing,
+    /// Another type or value was expected.
+    #[error("must be {expected}, got {found}")]
+    Mistyped {
+        /// What it must be.
+        expected: Cow<'static, str>,
+        /// What it is, shortened.
+        found: String,
+    },
+    /// `NaN`, infinite, or a literal that overflows.
+    #[error("must be a finite number")]
+    NotFinite,
+    /// Out of bounds.
+    #[error("must be {bound}, got {found}")]
+    OutOfBounds {
+        /// The bound.
+        bound: Bound,
+        /// The number as it came, shortened.
+        found: String,
+    },
+    /// Above a limit.
+    #[error("must be at most {limit}, got {found}")]
+    TooLarge {
+        /// The limit.
+        limit: u64,
+        /// The number as it came, shortened.
+        found: String,
+    },
+    /// An array of the wrong length.
+    #[error("must have {expected} entries, got {got}")]
+    Length {
+        /// How many it must have.
+        expected: usize,
+        /// How many it has.
+        got: usize,
+    },
+    /// A positional array with more entries than the service has fields.
+    #[error("must have at most {limit} entries, got {got}")]
+    TooMany {
+        /// Fields of the service.
+        limit: usize,
+        /// Entries of the array.
+        got: usize,
+    },
+    /// What the layer that was to use the value says of it.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// The fields of one request.
+#[derive(Debug)]
+pub struct Fields<'a> {
+    service: Service,
+    /// What came, in the order of the catalog.
+    values: Vec<Option<&'a RawValue>>,
+    rejections: Vec<Rejection>,
+}
+
+impl<'a> Fields<'a> {
+    /// Sorts the arguments of a call into the fields of the service. Unknown fields are ignored.
+    ///
+    /// # Errors
+    /// Where a positional array has more entries than the service has fields.
+    pub fn read(args: &'a Arguments, service: Service) -> Result<Self, Rejection> {
+        let fields = service.fields();
+        let mut values = vec![None; fields.len()];
+        let refused = |reason| Rejection {
+            field: "args".to_owned(),
+            reason,
+        };
+        let not = |expected, raw: &RawValue| {
+            refused(Reason::Mistyped {
+                expected: Cow::Borrowed(expected),
+                found: text::found(raw),
+            })
+        };
+        match args {
+            Arguments::Object(raw) => {
+                let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+                json::members_into(raw.get(), &names, &mut values)
+                    .map_err(|_| not("an object", raw))?;
+            }
+            Arguments::Positional(raw) => {
+                let entries =
+                    json::entries(raw, fields.len()).ok_or_else(|| not("an array", raw))?;
+                if entries.count > fields.len() {
+                    let (limit, got) = (fields.len(), entries.count);
+                    return Err(refused(Reason::TooMany { limit, got }));
+                }
+                for (value, entry) in values.iter_mut().zip(entries.first) {
+                    *value = Some(entry);
+                }
+            }
+        }
+        Ok(Self {
+            service,
+            values,
+            rejections: Vec::new(),
+        })
+    }
+
+    /// A finite number within `bound`.
+    pub fn number(&mut self, name: &'static str, bound: Bound) -> Option<f64> {
+        let raw = self.take(name)?;
+        match finite(raw, bound) {
+            Ok(value) => Some(value),
+            Err(reason) => self.rejected_as(name, reason),
+        }
+    }
+
+    /// An array of `count` finite numbers within `bound`.
+    pub fn numbers(&mut self, name: &'static str, count: usize, bound: Bound) -> Option<Vec<f64>> {
+        let raw = self.take(name)?;
+        let Some(entries) = json::entries(raw, count) else {
+            let expected = format!("an array of {count} numbers");
+            return self.mistyped(name, expected, raw);
+        };
+        if entries.count != count {
+            return self.rejected_as(
+                name,
+                Reason::Length {
+                    expected: count,
+                    got: entries.count,
+                },
+            );
+        }
+        let mut values = Vec::with_capacity(count);
+        for (index, entry) in entries.first.into_iter().enumerate() {
+            match finite(entry, bound) {
+                Ok(value) => values.push(value),
+                Err(reason) => {
+                    let field = format!("{name}[{index}]");
+                    self.rejections.push(Rejection { field, reason });
+                }
+            }
+        }
+        (values.len() == count).then_some(values)
+    }
+
+    /// `true` or `false`.
+    pub fn boolean(&mut self, name: &'static str) -> Option<bool> {
+        let raw = self.take(name)?;
+        match json::boolean(raw) {
+            Some(value) => Some(value),
+            None => self.mistyped(name, "true or false", raw),
+        }
+    }
+
+    /// A string.
+    pub fn text(&mut self, name: &'static str) -> Option<Cow<'a, str>> {
+        let raw = self.take(name)?;
+        match json::text(raw) {
+            Some(text) => Some(text),
+            None => self.mistyped(name, "a string", raw),
+        }
+    }
+
+    /// A whole number from 1 to `limit`; `10.0` counts as 10.
+    pub fn count(&mut self, name: &'static str, limit: u64) -> Option<u64> {
+        let raw = self.take(name)?;
+        match json::integer(raw) {
+            Some(value) if value > limit => {
+                let found = text::excerpt(raw.get());
+                self.rejected_as(name, Reason::TooLarge { limit, found })
+            }
+            Some(value) if value > 0 => Some(value),
+            _ if json::number(raw).is_some_and(f64::is_infinite) => {
+                self.rejected_as(name, Reason::NotFinite)
+            }
+            _ => self.mistyped(name, "an integer, at least 1", raw),
+        }
+    }
+
+    /// One of `options`, by its name.
+    pub fn choice<T: Copy>(
+        &mut self,
+        name: &'static str,
+        options: &[T],
+        name_of: impl Fn(T) -> &'static str,
+    ) -> Option<T> {
+        let raw = self.take(name)?;
+        let text = json::text(raw);
+        let chosen = options
+            .iter()
+            .copied()
+            .find(|&option| Some(name_of(option)) == text.as_deref());
+        if chosen.is_some() {
+            return chosen;
+        }
+        let names: Vec<&str> = options.iter().map(|&option| name_of(option)).collect();
+        self.mistyped(name, format!("one of {}", names.join(", ")), raw)
+    }
+
+    /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
+    pub fn refuse(&mut self, name: &str, reason: &impl fmt::Display) {
+        let reason = Reason::Refused(text::shortened(&reason.to_string(), MAX_REASON));
+        self.rejections.push(Rejection {
+            field: name.to_owned(),
+            reason,
+        });
+    }
+
+    /// What has been rejected so far, in the order of reading.
+    #[must_use]
+    pub fn rejections(&self) -> &[Rejection] {
+        &self.rejections
+    }
+
+    /// Whether every field that was read so far was good: the `result` of the response.
+    #[must_use]
+    pub fn accepted(&self) -> bool {
+        self.rejections.is_empty()
+    }
+
+    /// All rejections in one line; empty if there are none: the `status` of the response.
+    #[must_use]
+    pub fn status(&self) -> String {
+        let sentences: Vec<String> = self.rejections.iter().map(Rejection::to_string).collect();
+        text::shortened(&sentences.join("; "), MAX_STATUS)
+    }
+
+    /// What came under that name. Absent, a required field is rejected.
+    fn take(&mut self, name: &'static str) -> Option<&'a RawValue> {
+        let fields = self.service.fields();
+        let index = fields.iter().position(|field| field.name == name);
+        debug_assert!(index.is_some(), "{name} is not in the catalog");
+        let index = index?;
+        let required = fields
+            .get(index)
+            .is_some_and(|field: &Field| field.required);
+        let raw = self.values.get(index).copied().flatten();
+        let null_is_absent = self.service.all_or_nothing() && !required;
+        match raw {
+            Some(raw) if null_is_absent && raw.get() == "null" => None,
+            None if required => self.rejected_as(name, Reason::Missing),
+            raw => raw,
+        }
+    }
+
+    fn mistyped<T>(
+        &mut self,
+        name: &str,
+        expected: impl Into<Cow<'static, str>>,
+        raw: &RawValue,
+    ) -> Option<T> {
+        let reason = Reason::Mistyped {
+            expected: expected.into(),
+            found: text::found(raw),
+        };
+        self.rejected_as(name, reason)
+    }
+
+    fn rejected_as<T>(&mut self, name: &str, reason: Reason) -> Option<T> {
+        self.rejections.push(Rejection {
+            field: name.to_owned(),
+            reason,
+        });
+        None
+    }
+}
+
+fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
+    let Some(value) = json::number(raw) else {
+        return Err(Reason::Mistyped {
+            expected: "a number".into(),
+            found: text::found(raw),
+        });
+    };
+    if !value.is_finite() {
+        return Err(Reason::NotFinite);
+    }
+    if !bound.holds(value) {
+        return Err(Reason::OutOfBounds {
+            bound,
+            found: text::excerpt(raw.get()),
+        });
+    }
+    Ok(value)
+}

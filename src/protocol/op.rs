@@ -1,1 +1,200 @@
-//! (being written: op)
+//! Every rosbridge operation that a client may send, read from a frame.
+//!
+//! Payloads (`msg`, `args`, `values`) stay raw: what only passes through is never parsed further than its syntax.
+//!
+//! **Invariant:** every frame gives exactly one operation or exactly one error that names what is wrong with it, and its `id`
+//! either way.
+
+mod reader;
+
+use std::time::Duration;
+
+use serde_json::value::RawValue;
+
+pub use reader::read;
+
+/// Longest topic or service name, and subscription id, in bytes: the registry keeps them for as long as a connection lives.
+pub const MAX_NAME: usize = 1024;
+/// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
+pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
+/// Largest `queue_length`: the [outbox](super::outbox) bounds what is held back by bytes, and no message is shorter than 40.
+pub const MAX_QUEUE_LENGTH: usize = 100_000;
+/// Longest `timeout` of a forwarded call: a day.
+pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
+
+/// A frame, read.
+#[derive(Debug)]
+pub struct Incoming {
+    /// The sender's `id`, as it came; there also where the operation is in error.
+    pub id: Option<Box<RawValue>>,
+    /// What is asked for.
+    pub op: Result<Op, OpError>,
+}
+
+/// An operation.
+#[derive(Debug, Clone)]
+pub enum Op {
+    /// Registers the sender as a publisher.
+    Advertise {
+        /// Topic name.
+        topic: String,
+        /// Message type, if given.
+        type_name: Option<String>,
+    },
+    /// Withdraws that.
+    Unadvertise {
+        /// Topic name.
+        topic: String,
+    },
+    /// Delivers a message to the topic's subscribers.
+    Publish {
+        /// Topic name.
+        topic: String,
+        /// The message, an object.
+        msg: Box<RawValue>,
+    },
+    /// Registers the sender as a subscriber.
+    Subscribe(Subscribe),
+    /// Withdraws one subscription (the frame's id) or all.
+    Unsubscribe {
+        /// Topic name.
+        topic: String,
+    },
+    /// Makes the sender the provider of a service.
+    AdvertiseService {
+        /// Service name.
+        service: String,
+        /// Service type, if given.
+        type_name: Option<String>,
+    },
+    /// Withdraws that.
+    UnadvertiseService {
+        /// Service name.
+        service: String,
+    },
+    /// Calls a service.
+    CallService(CallService),
+    /// A provider's answer to a forwarded call.
+    ServiceResponse {
+        /// Service name.
+        service: String,
+        /// Any value.
+        values: Box<RawValue>,
+        /// Whether the call succeeded.
+        result: bool,
+        /// The provider's own `status`, if it is a string.
+        status: Option<String>,
+    },
+}
+
+/// A subscription.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Subscribe {
+    /// Topic name.
+    pub topic: String,
+    /// Message type, if given.
+    pub type_name: Option<String>,
+    /// Least time between deliveries; zero for no throttling; at most [`MAX_THROTTLE`].
+    pub throttle: Duration,
+    /// How many messages throttling may hold back; 1 to [`MAX_QUEUE_LENGTH`].
+    pub queue_length: usize,
+}
+
+/// A service call.
+#[derive(Debug, Clone)]
+pub struct CallService {
+    /// Service name.
+    pub service: String,
+    /// Its arguments.
+    pub args: Arguments,
+    /// How long an external provider may take, if given; at most [`MAX_TIMEOUT`].
+    pub timeout: Option<Duration>,
+}
+
+/// The arguments of a call.
+#[derive(Debug, Clone)]
+pub enum Arguments {
+    /// Fields by name; `{}` where `args` was absent or `null`.
+    Object(Box<RawValue>),
+    /// Fields in documented order.
+    Positional(Box<RawValue>),
+}
+
+impl Arguments {
+    /// No arguments: `{}`.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::Object(RawValue::from_string("{}".to_owned()).unwrap_or_default())
+    }
+
+    /// The arguments as they came.
+    #[must_use]
+    pub fn raw(&self) -> &RawValue {
+        match self {
+            Self::Object(raw) | Self::Positional(raw) => raw,
+        }
+    }
+}
+
+/// Why a frame is no operation, and how its sender hears of it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OpError {
+    /// Answered by an error `status`.
+    #[error("{0}")]
+    Status(Problem),
+    /// A call that can be told apart from others by its service and id: answered by `service_response` with `result: false`.
+    #[error("{problem}")]
+    Call {
+        /// The service that was called.
+        service: String,
+        /// What is wrong.
+        problem: Problem,
+    },
+}
+
+/// What is wrong with an operation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    /// Not a JSON object; holds the parser's complaint, shortened.
+    #[error("malformed frame: {0}")]
+    NotJson(String),
+    /// There is no `op`.
+    #[error("malformed frame: op is required")]
+    NoOp,
+    /// `op` is no string; holds what it is.
+    #[error("malformed frame: op must be a string, got {0}")]
+    OpNotText(String),
+    /// No operation of ours; holds its name, shortened.
+    #[error("unknown op \"{0}\"")]
+    UnknownOp(String),
+    /// A required field is absent.
+    #[error("{op}: {field} is required")]
+    Missing {
+        /// The operation.
+        op: &'static str,
+        /// The field.
+        field: &'static str,
+    },
+    /// A field is not what it has to be.
+    #[error("{op}: {field} must be {expected}, got {found}")]
+    Mistyped {
+        /// The operation.
+        op: &'static str,
+        /// The field.
+        field: &'static str,
+        /// What it has to be.
+        expected: &'static str,
+        /// What it is, shortened.
+        found: String,
+    },
+    /// A name or id is longer than [`MAX_NAME`] bytes.
+    #[error("{op}: {field} must be at most {MAX_NAME} bytes long, got {length}")]
+    TooLong {
+        /// The operation.
+        op: &'static str,
+        /// The field.
+        field: &'static str,
+        /// How long it is, in bytes.
+        length: usize,
+    },
+}

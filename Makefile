@@ -1,0 +1,48 @@
+# Every target says what it does and stops at the first failure. Needed: a Rust toolchain; bash and tar for packaging.
+
+CARGO ?= cargo
+TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
+ARCHIVE := submission.tar.gz
+
+.DEFAULT_GOAL := help
+.PHONY: help build run test lint doc clean vendor submission test-submission
+
+help: ## Show this list
+	@echo "pendularm, a planar robot arm on the wire. Targets:"
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+build: ## Build the program (release); needs no network once the dependencies are there
+	@echo "make build: $(TARGET_DIR)/release/pendularm"
+	$(CARGO) build --release --locked
+
+run: build ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3"
+	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
+	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
+
+test: ## Run every test
+	@echo "make test: unit, property, wire and documentation tests"
+	$(CARGO) test --locked
+
+lint: ## Check formatting and lints; any warning fails
+	@echo "make lint: rustfmt, clippy"
+	$(CARGO) fmt --check
+	$(CARGO) clippy --locked --all-targets -- -D warnings
+
+# Private items are documented too, for whoever reads the source, so links to them are as good as any.
+doc: ## Build the documentation; any warning fails
+	@echo "make doc: $(TARGET_DIR)/doc/pendularm/index.html"
+	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --locked --no-deps --document-private-items
+
+clean: ## Remove what was built and packed; vendored sources stay
+	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"
+	$(CARGO) clean
+	rm -f $(ARCHIVE)
+
+vendor: ## Fetch the dependencies' sources into vendor/, so that every later build is offline
+	@bash scripts/vendor.sh
+
+submission: ## Pack submission.tar.gz: this project with its dependencies' sources, ready to build offline
+	@bash scripts/package.sh $(ARCHIVE)
+
+test-submission: submission ## Pack, then build and start the archive's program with no network and an empty CARGO_HOME
+	@bash scripts/test-package.sh $(ARCHIVE)

@@ -1,0 +1,372 @@
+//! One client: bytes in, ops to the registry; messages and answers back, through a bounded outbox.
+//!
+//! Three parts on one thread share one [`Shared`]: the reading task hands one op at a time to the registry and waits
+//! until it has taken effect; the actor moves what it is sent into the outbox; the writing task drains the outbox. A
+//! client that reads slowly fills its own outbox and nothing else.
+//!
+//! Generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
+//!
+//! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
+
+mod reader;
+mod writer;
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::Duration;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::sync::Notify;
+use tokio::time::Instant;
+
+use self::reader::Reader;
+use super::ConnectionId;
+use super::gauges::Gauges;
+use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Request, Throttle};
+use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::messages::{self, Level};
+use crate::protocol::outbox::Outbox;
+
+/// While more bytes of responses than this wait, the client is not read and none of its computations starts.
+pub const MAX_RESPONSES_WAITING: usize = 32 * 1024 * 1024;
+/// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.
+pub const MAX_COMPUTATIONS_WAITING: usize = 16;
+/// A client that takes no byte for so long while responses wait is disconnected.
+pub const STALL_LIMIT: Duration = Duration::from_secs(20);
+/// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
+/// end of the stream itself may take.
+pub const LINGER: Duration = Duration::from_secs(5);
+/// How long a client that has stopped sending is owed the answers of other clients: longer than these usually have.
+pub const CALLS_OWED: Duration = Duration::from_secs(30);
+
+/// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
+const ARM_STATE: [&str; 3] = [
+    Topic::JointStates.name(),
+    Topic::Clock.name(),
+    Topic::Diagnostics.name(),
+];
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The actor of one client.
+pub struct Connection<S> {
+    /// The stream, until the tasks take it.
+    stream: Option<S>,
+    registry: Addr<Registry>,
+    shared: Rc<Shared>,
+}
+
+/// What the actor and its two tasks share; one thread, so plain cells do.
+struct Shared {
+    id: Cell<Option<ConnectionId>>,
+    outbox: RefCell<Outbox>,
+    /// Since when responses have been waiting without a break.
+    responses_since: Cell<Option<Instant>>,
+    computations: RefCell<Computations>,
+    /// Something may be written, or the connection is finishing.
+    outgoing: Notify,
+    /// Something was written or computed: the reader may go on.
+    room: Notify,
+    /// What is owed is still sent; nothing more is read.
+    finishing: Cell<bool>,
+    /// The client speaks something else, or is one too many: it is told so, and its input swallowed.
+    refusing: Cell<bool>,
+    /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
+    unbatched: Cell<bool>,
+    /// Bytes of responses in the outbox, for the registry to look at.
+    backlog: Arc<AtomicUsize>,
+    gauges: Arc<Gauges>,
+}
+
+/// The heavy calls of one connection: one runs, some wait.
+#[derive(Default)]
+struct Computations {
+    waiting: VecDeque<Request>,
+    running: bool,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
+    /// Starts the actor for `stream` in the present system.
+    pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
+        let shared = Rc::new(Shared {
+            id: Cell::new(None),
+            outbox: RefCell::new(Outbox::new()),
+            responses_since: Cell::new(None),
+            computations: RefCell::default(),
+            outgoing: Notify::new(),
+            room: Notify::new(),
+            finishing: Cell::new(false),
+            refusing: Cell::new(false),
+            unbatched: Cell::new(false),
+            backlog: Arc::default(),
+            gauges,
+        });
+        Self {
+            stream: Some(stream),
+            registry,
+            shared,
+        }
+        .start()
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// A topic message for this client. From the registry; may be dropped, oldest first, when the client is slow.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub struct Deliver {
+    /// The topic, for throttling.
+    pub topic: Arc<str>,
+    /// The whole frame, shared by all subscribers.
+    pub frame: Bytes,
+}
+
+/// A response, a status, or a call forwarded to this client as a provider. From the registry; never dropped.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub struct Answer {
+    /// The whole frame.
+    pub frame: Bytes,
+    /// The runtime's own service that it answers.
+    pub service: Option<Service>,
+}
+
+/// How a topic is throttled for this client; `None` once it is not subscribed. From the registry.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub struct Configure {
+    /// The topic.
+    pub topic: Arc<str>,
+    /// The smallest of the subscriptions' values.
+    pub throttle: Option<Throttle>,
+}
+
+/// Send what is owed, then end. From the registry when the runtime ends, and from the reader at the end of the stream.
+#[derive(Message, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct Finish;
+
+/// The writing task has ended: nothing can be sent any more. From the connection's own task.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Ended;
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        let address = ctx.address();
+        let outlets = Outlets {
+            deliver: address.clone().recipient(),
+            answer: address.clone().recipient(),
+            configure: address.clone().recipient(),
+            finish: address.recipient(),
+            gone: Arc::new(AtomicBool::new(false)),
+            backlog: Arc::clone(&self.shared.backlog),
+        };
+        // Nothing is read before the registry knows the client.
+        self.registry
+            .send(Connect(outlets))
+            .into_actor(self)
+            .map(|answer, connection, ctx| {
+                connection.begin(answer.unwrap_or(Err(Refused::Closed)), ctx);
+            })
+            .wait(ctx);
+    }
+
+    fn stopped(&mut self, _: &mut Context<Self>) {
+        if let Some(id) = self.shared.id.take() {
+            self.registry.do_send(Disconnect(id));
+        }
+    }
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, message: Deliver, _: &mut Context<Self>) {
+        let mut outbox = self.shared.outbox.borrow_mut();
+        let before = outbox.dropped();
+        outbox.push(&message.topic, message.frame, Instant::now().into_std());
+        self.shared.gauges.add_dropped(outbox.dropped() - before);
+        self.shared.outgoing.notify_one();
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Answer> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, answer: Answer, _: &mut Context<Self>) {
+        let of_arm = answer
+            .service
+            .is_some_and(|one| one.owner() == Node::ArmSim);
+        self.shared
+            .send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] });
+        if answer.service.is_some_and(Service::is_computation) {
+            self.shared.computations.borrow_mut().running = false;
+            self.shared.start_computation(&self.registry);
+            self.shared.room.notify_one();
+        }
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Configure> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, configure: Configure, _: &mut Context<Self>) {
+        let mut outbox = self.shared.outbox.borrow_mut();
+        match configure.throttle {
+            Some(Throttle {
+                interval,
+                queue_length,
+            }) => {
+                outbox.set_throttle(&configure.topic, Some((interval, queue_length)));
+            }
+            None => outbox.forget(&configure.topic),
+        }
+        self.shared.outgoing.notify_one();
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Finish> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, _: Finish, _: &mut Context<Self>) {
+        self.shared.finish();
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Ended> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, _: Ended, ctx: &mut Context<Self>) {
+        ctx.stop();
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
+    /// Starts the two tasks; a client that was refused is told why and finished.
+    fn begin(&mut self, answer: Result<ConnectionId, Refused>, ctx: &mut Context<Self>) {
+        let Some(stream) = self.stream.take() else {
+            return;
+        };
+        let (input, output) = tokio::io::split(stream);
+        let registry = self.registry.clone();
+        let finish = ctx.address().recipient();
+        let reading = match answer {
+            Ok(id) => {
+                self.shared.id.set(Some(id));
+                let reader = Reader::new(id, Rc::clone(&self.shared), registry.clone(), finish);
+                actix_rt::spawn(reader.run(input))
+            }
+            Err(why) => {
+                self.shared.refusing.set(true);
+                self.shared
+                    .send(messages::status(Level::Error, &why.to_string(), None));
+                self.shared.finish();
+                actix_rt::spawn(reader::discard(input))
+            }
+        };
+        let (shared, address) = (Rc::clone(&self.shared), ctx.address());
+        actix_rt::spawn(async move {
+            let all_written = writer::run(output, &shared, &registry).await;
+            if all_written && shared.refusing.get() {
+                let _ = reading.await;
+            } else {
+                reading.abort();
+            }
+            address.do_send(Ended);
+        });
+    }
+}
+
+impl Shared {
+    /// Puts a response or a status into the outbox.
+    fn send(&self, frame: Bytes) {
+        self.send_superseding(frame, &[]);
+    }
+
+    /// The same; messages of `topics` that throttling still holds back are discarded, being older than the response.
+    fn send_superseding(&self, frame: Bytes, topics: &[&str]) {
+        let mut outbox = self.outbox.borrow_mut();
+        if outbox.response_bytes() == 0 {
+            self.responses_since.set(Some(Instant::now()));
+        }
+        outbox.push_response(frame, topics);
+        self.backlog
+            .store(outbox.response_bytes(), Ordering::Relaxed);
+        self.outgoing.notify_one();
+    }
+
+    /// The client may be read: neither its responses nor its computations pile up.
+    fn may_read(&self) -> bool {
+        self.may_compute() && self.computations.borrow().waiting.len() < MAX_COMPUTATIONS_WAITING
+    }
+
+    /// Another computation may start: its answer would not come on top of too many.
+    fn may_compute(&self) -> bool {
+        self.outbox.borrow().response_bytes() <= MAX_RESPONSES_WAITING
+    }
+
+    /// So many bytes are on their way to the client: there may be room again.
+    fn written(&self, bytes: usize, registry: &Addr<Registry>) {
+        let mut outbox = self.outbox.borrow_mut();
+        outbox.written(bytes);
+        self.backlog
+            .store(outbox.response_bytes(), Ordering::Relaxed);
+        if outbox.response_bytes() == 0 {
+            self.responses_since.set(None);
+        }
+        drop(outbox);
+        self.room.notify_one();
+        self.start_computation(registry);
+    }
+
+    /// Queues a heavy call behind the connection's others.
+    fn enqueue_computation(&self, request: Request, registry: &Addr<Registry>) {
+        self.computations.borrow_mut().waiting.push_back(request);
+        self.start_computation(registry);
+    }
+
+    /// Starts the next computation if none runs and its answer would find room.
+    fn start_computation(&self, registry: &Addr<Registry>) {
+        let mut computations = self.computations.borrow_mut();
+        if computations.running || !self.may_compute() {
+            return;
+        }
+        if let Some(request) = computations.waiting.pop_front() {
+            computations.running = true;
+            registry.do_send(request);
+        }
+    }
+
+    /// True while a computation runs or waits.
+    fn is_computing(&self) -> bool {
+        let computations = self.computations.borrow();
+        computations.running || !computations.waiting.is_empty()
+    }
+
+    /// Nobody waits for the computations any more.
+    fn abandon_computations(&self) {
+        *self.computations.borrow_mut() = Computations::default();
+    }
+
+    /// Nothing more is read; what is owed is sent.
+    fn finish(&self) {
+        self.finishing.set(true);
+        self.outgoing.notify_one();
+        self.room.notify_one();
+    }
+}

@@ -1,0 +1,142 @@
+//! The writing task of a connection: drains the outbox, several frames in one vectored write.
+//!
+//! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
+
+use std::io::IoSlice;
+
+use actix::prelude::*;
+use bytes::{Buf, Bytes};
+use tokio::io::{AsyncWrite, AsyncWriteExt};
+use tokio::time::{Instant, sleep_until, timeout_at};
+
+use super::{LINGER, STALL_LIMIT, Shared};
+use crate::actors::registry::Registry;
+
+/// Frames in one write.
+const BATCH_FRAMES: usize = 64;
+/// Bytes offered in one write: after that much the other connections have a turn.
+const BATCH_BYTES: usize = 256 * 1024;
+
+/// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
+/// True if all that was owed has been written.
+pub(super) async fn run<W: AsyncWrite + Unpin>(
+    mut output: W,
+    shared: &Shared,
+    registry: &Addr<Registry>,
+) -> bool {
+    let mut batch = Vec::with_capacity(BATCH_FRAMES);
+    loop {
+        let now = Instant::now().into_std();
+        // Clients that end no line take what one read gives them for one frame.
+        let frames = if shared.unbatched.get() {
+            1
+        } else {
+            BATCH_FRAMES
+        };
+        shared
+            .outbox
+            .borrow_mut()
+            .take_batch(now, frames, BATCH_BYTES, &mut batch);
+        if !batch.is_empty() {
+            if !write_batch(&mut output, &mut batch, shared, registry).await {
+                return false;
+            }
+        } else if shared.finishing.get() && !shared.is_computing() {
+            return timeout_at(Instant::now() + LINGER, output.shutdown())
+                .await
+                .is_ok();
+        } else {
+            wait(shared).await;
+        }
+    }
+}
+
+/// Waits until there is something to write.
+async fn wait(shared: &Shared) {
+    let release = shared.outbox.borrow_mut().next_release();
+    match release {
+        None => shared.outgoing.notified().await,
+        Some(release) => {
+            let _ = timeout_at(Instant::from_std(release), shared.outgoing.notified()).await;
+        }
+    }
+}
+
+/// Writes the whole batch; false if the client is gone or stalled.
+async fn write_batch<W: AsyncWrite + Unpin>(
+    output: &mut W,
+    batch: &mut Vec<Bytes>,
+    shared: &Shared,
+    registry: &Addr<Registry>,
+) -> bool {
+    let mut first = 0;
+    while first < batch.len() {
+        let written = tokio::select! {
+            biased;
+            written = write_some(output, batch.get(first..).unwrap_or_default()) => written,
+            () = stalled(shared, Instant::now()) => return false,
+        };
+        let Some(mut left) = written else {
+            return false;
+        };
+        shared.written(left, registry);
+        let fair = left >= BATCH_BYTES / 2;
+        while left > 0 {
+            let Some(frame) = batch.get_mut(first) else {
+                break;
+            };
+            let step = left.min(frame.len());
+            frame.advance(step);
+            left -= step;
+            if frame.is_empty() {
+                first += 1;
+            }
+        }
+        if fair {
+            tokio::task::yield_now().await;
+        }
+    }
+    batch.clear();
+    true
+}
+
+/// One vectored write; `None` if the client is gone.
+async fn write_some<W: AsyncWrite + Unpin>(output: &mut W, frames: &[Bytes]) -> Option<usize> {
+    let mut slices = [IoSlice::new(&[]); BATCH_FRAMES];
+    let mut room = BATCH_BYTES;
+    let mut count = 0;
+    for (slice, frame) in slices.iter_mut().zip(frames) {
+        let offered = frame.len().min(room);
+        *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
+        count += 1;
+        room -= offered;
+        if room == 0 {
+            break;
+        }
+    }
+    let offered = slices.get(..count).unwrap_or_default();
+    output
+        .write_vectored(offered)
+        .await
+        .ok()
+        .filter(|&written| written > 0)
+}
+
+/// Ends when the client has taken nothing since `last_byte` for too long: while responses wait, or because the
+/// connection is finishing.
+async fn stalled(shared: &Shared, last_byte: Instant) {
+    loop {
+        let waiting_since = shared.responses_since.get();
+        let limit = match waiting_since {
+            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
+            None => shared.finishing.get().then(|| last_byte + LINGER),
+        };
+        match limit {
+            None => shared.outgoing.notified().await,
+            Some(limit) => tokio::select! {
+                () = sleep_until(limit) => return,
+                () = shared.outgoing.notified() => {}
+            },
+        }
+    }
+}

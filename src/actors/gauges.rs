@@ -1,0 +1,39 @@
+//! Counters that one node writes and another reports: what `/diagnostics` says about the gateway.
+//!
+//! The arm publishes `/diagnostics` from its own thread; asking the registry once a second would make the gateway part
+//! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
+//!
+//! **Invariant:** statistics only; nothing is decided by them.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Numbers about the gateway, shared by reference.
+#[derive(Debug, Default)]
+pub struct Gauges {
+    connections: AtomicU64,
+    messages_dropped: AtomicU64,
+}
+
+impl Gauges {
+    /// Clients connected now.
+    #[must_use]
+    pub fn connections(&self) -> u64 {
+        self.connections.load(Ordering::Relaxed)
+    }
+
+    /// Topic messages that full outboxes have dropped since the start.
+    #[must_use]
+    pub fn messages_dropped(&self) -> u64 {
+        self.messages_dropped.load(Ordering::Relaxed)
+    }
+
+    /// Sets the number of clients connected.
+    pub fn set_connections(&self, connections: u64) {
+        self.connections.store(connections, Ordering::Relaxed);
+    }
+
+    /// Adds newly dropped topic messages.
+    pub fn add_dropped(&self, messages: u64) {
+        self.messages_dropped.fetch_add(messages, Ordering::Relaxed);
+    }
+}

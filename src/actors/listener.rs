@@ -1,0 +1,100 @@
+//! Accepts clients and gives each its connection actor.
+//!
+//! **Invariant:** an error of `accept` (too many open files, a client gone already) never ends the listening and never
+//! spins.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use tokio::net::TcpListener;
+
+use super::connection::Connection;
+use super::gauges::Gauges;
+use super::registry::Registry;
+
+/// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
+const BACKOFF: Duration = Duration::from_millis(50);
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The actor that owns one listening socket.
+pub struct Listener {
+    socket: Arc<TcpListener>,
+    registry: Addr<Registry>,
+    gauges: Arc<Gauges>,
+}
+
+impl Listener {
+    /// A listener on a socket that is bound already.
+    #[must_use]
+    pub fn new(socket: TcpListener, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
+        Self {
+            socket: Arc::new(socket),
+            registry,
+            gauges,
+        }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// No more clients are accepted. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct StopListening;
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl Actor for Listener {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        let accepting = accept(
+            Arc::clone(&self.socket),
+            self.registry.clone(),
+            Arc::clone(&self.gauges),
+        );
+        ctx.spawn(accepting.into_actor(self));
+    }
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Handler<StopListening> for Listener {
+    type Result = ();
+
+    fn handle(&mut self, _: StopListening, ctx: &mut Context<Self>) {
+        ctx.stop();
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+async fn accept(socket: Arc<TcpListener>, registry: Addr<Registry>, gauges: Arc<Gauges>) {
+    loop {
+        match socket.accept().await {
+            Ok((stream, peer)) => {
+                // Small frames must not wait for one another's acknowledgements.
+                if let Err(error) = stream.set_nodelay(true) {
+                    tracing::debug!(%peer, %error, "TCP_NODELAY refused");
+                }
+                tracing::debug!(%peer, "client connected");
+                Connection::start_on(stream, registry.clone(), Arc::clone(&gauges));
+            }
+            Err(error) => {
+                tracing::warn!(%error, "cannot accept a client; trying again");
+                actix_rt::time::sleep(BACKOFF).await;
+            }
+        }
+    }
+}
+
+/// Binds a TCP socket in the present runtime.
+///
+/// # Errors
+/// The operating system's, for instance when the port is in use.
+pub async fn bind(address: SocketAddr) -> std::io::Result<TcpListener> {
+    TcpListener::bind(address).await
+}

@@ -1,0 +1,37 @@
+//! The nodes: one actix actor each, joined by typed messages. They read with `protocol`, ask `math`, answer with
+//! `protocol`, and decide only *who hears what*.
+//!
+//! ```text
+//!              accepts                 Request, Disconnect              ServiceCall, TopicMessage, Interest
+//!  listener ───────────▶ connection ───────────────────────▶ registry ──────────────────────────────────────▶ nodes
+//!                        (one per client)                     (one)                                       arm_sim (own thread)
+//!                            ▲     Deliver, Answer, Finish      │ ▲         Publish, Respond             integration (worker pool)
+//!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial
+//! ```
+//!
+//! | message | from | to | meaning |
+//! | --- | --- | --- | --- |
+//! | [`registry::Connect`] / [`registry::Disconnect`] | connection | registry | a client is there, is gone |
+//! | [`registry::Request`] | connection | registry | one rosbridge op of that client |
+//! | [`node::ServiceCall`] | registry | the node that serves it | answered exactly once, through its [`node::Reply`] |
+//! | [`node::TopicMessage`] | registry | the node that subscribes | a message on a topic the runtime listens to |
+//! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: no encoding without |
+//! | [`registry::Publish`] / [`registry::Respond`] | nodes | registry | a topic message; an answer |
+//! | [`connection::Deliver`] / [`connection::Answer`] / [`connection::Finish`] | registry | connection | bytes to send; the end |
+//!
+//! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
+//! sees a node's answers and messages in the order in which the node produced them.
+
+pub mod arm_sim;
+pub mod connection;
+pub mod gauges;
+pub mod integration;
+pub mod listener;
+pub mod node;
+pub mod registry;
+pub mod runtime;
+pub mod workers;
+
+/// Names one client connection for as long as the process lives; never reused.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ConnectionId(pub u64);

@@ -1,0 +1,447 @@
+//! The registry: every client, topic and service; fans published topics out to subscribed connections, and routes calls.
+//!
+//! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
+
+mod ops;
+mod refusal;
+mod services;
+mod topics;
+
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde_json::value::RawValue;
+use tokio::sync::oneshot;
+
+use self::refusal::Refusal;
+use self::services::{Forwarded, Services};
+pub use self::topics::Throttle;
+use self::topics::{Subscription, Topics};
+use super::ConnectionId;
+use super::connection::{Answer, Configure, Deliver, Finish, MAX_RESPONSES_WAITING};
+use super::gauges::Gauges;
+use super::node::{Interest, ServiceCall, TopicMessage};
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::{self, Level};
+use crate::protocol::op::Op;
+
+/// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
+/// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
+pub const MAX_CONNECTIONS: usize = 960;
+/// Subscriptions (topic and id) of one connection.
+pub const MAX_SUBSCRIPTIONS: usize = 1024;
+/// Topics that one connection advertises.
+pub const MAX_ADVERTISED: usize = 1024;
+/// Services that one connection provides.
+pub const MAX_PROVIDED: usize = 256;
+/// Calls of one connection that wait for clients to answer.
+pub const MAX_WAITING_CALLS: usize = 256;
+/// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
+/// answers to its own calls) is refused: it has not been read for long then, but others would go on.
+pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The registry actor.
+pub struct Registry {
+    clients: HashMap<ConnectionId, Client>,
+    topics: Topics,
+    services: Services,
+    nodes: Nodes,
+    gauges: Arc<Gauges>,
+    connections_made: u64,
+    /// Why no call is taken any more, once the runtime is ending.
+    closed: Option<&'static str>,
+}
+
+/// What the registry knows of one client.
+struct Client {
+    outlets: Outlets,
+    advertised: HashSet<Box<str>>,
+    /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
+    /// dropped until it advertises again.
+    withdrawn: HashSet<Topic>,
+    subscriptions: HashMap<Arc<str>, Vec<Subscription>>,
+    provided: HashSet<Box<str>>,
+    /// Dropped once no call of this client waits any more, if it has stopped sending.
+    answered: Option<oneshot::Sender<()>>,
+}
+
+/// The runtime's own nodes: who serves, listens and publishes what.
+#[derive(Default)]
+pub struct Nodes {
+    /// The node that answers each service.
+    pub services: HashMap<Service, Recipient<ServiceCall>>,
+    /// The node that listens to each topic the runtime subscribes to.
+    pub listeners: HashMap<Topic, Recipient<TopicMessage>>,
+    /// The node that publishes each of the runtime's topics.
+    pub publishers: HashMap<Topic, Recipient<Interest>>,
+}
+
+impl Registry {
+    /// A registry without nodes; they come with [`Attach`].
+    #[must_use]
+    pub fn new(gauges: Arc<Gauges>) -> Self {
+        Self {
+            clients: HashMap::new(),
+            topics: Topics::default(),
+            services: Services::default(),
+            nodes: Nodes::default(),
+            gauges,
+            connections_made: 0,
+            closed: None,
+        }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// The runtime's nodes. From the runtime, once, before any client is accepted.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Attach(pub Nodes);
+
+/// A new client. From its connection; the answer is its id.
+#[derive(Message)]
+#[rtype(result = "Result<ConnectionId, Refused>")]
+pub struct Connect(pub Outlets);
+
+/// The ways to a connection; one mailbox behind all of them, so order is kept between them.
+#[derive(Clone)]
+pub struct Outlets {
+    /// Topic messages.
+    pub deliver: Recipient<Deliver>,
+    /// Responses and statuses.
+    pub answer: Recipient<Answer>,
+    /// Throttling of topics.
+    pub configure: Recipient<Configure>,
+    /// The end.
+    pub finish: Recipient<Finish>,
+    /// Set when the client is gone: heavy computations for it stop.
+    pub gone: Arc<AtomicBool>,
+    /// Bytes of responses that wait to be written; kept by the connection.
+    pub backlog: Arc<AtomicUsize>,
+}
+
+/// Why a client was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// The limit is reached.
+    #[error("too many connections: this runtime serves {MAX_CONNECTIONS} clients at once")]
+    Full,
+    /// The runtime is ending.
+    #[error("shutting down")]
+    Closed,
+}
+
+/// The client has stopped sending: all that it registered is withdrawn. From its connection; the receiver, if there is
+/// one, ends when the calls that it made have been answered.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Retire(pub ConnectionId);
+
+/// The client is gone: all that it registered is withdrawn. From its connection; repeating is harmless.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Disconnect(pub ConnectionId);
+
+/// One op of a client. From its connection, which waits for [`Handled`] before it reads on.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Request {
+    /// The client.
+    pub from: ConnectionId,
+    /// The frame's `id`, if it had one.
+    pub id: Option<Box<RawValue>>,
+    /// What it asks.
+    pub op: Op,
+}
+
+/// The op has been routed; if it went to a node, the receiver ends when it has taken effect there.
+#[derive(MessageResponse)]
+pub struct Handled(pub Option<oneshot::Receiver<()>>);
+
+/// A message on a topic. From the node that owns it.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Publish {
+    /// The topic.
+    pub topic: Topic,
+    /// The whole `publish` frame, encoded once.
+    pub frame: Bytes,
+    /// The message alone, for the runtime's own listener, on topics that it also subscribes to.
+    pub msg: Option<Box<RawValue>>,
+}
+
+/// A frame for one client: an answer or a status. From a node.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Respond {
+    /// The client.
+    pub connection: ConnectionId,
+    /// The whole frame.
+    pub frame: Bytes,
+    /// The service that it answers; `None` for a status.
+    pub service: Option<Service>,
+    /// Dropped once the frame is on its way, where that is also the end of the call.
+    pub done: Option<oneshot::Sender<()>>,
+}
+
+/// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct RefuseCalls(pub &'static str);
+
+/// Every connection sends what it has and ends. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct FinishAll;
+
+/// A forwarded call has waited as long as its caller allowed. From the registry's own timers.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct TimedOut(u64);
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl Actor for Registry {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Handler<Attach> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
+        self.nodes = nodes;
+    }
+}
+
+impl Handler<Connect> for Registry {
+    type Result = Result<ConnectionId, Refused>;
+
+    fn handle(&mut self, Connect(outlets): Connect, _: &mut Context<Self>) -> Self::Result {
+        if self.closed.is_some() {
+            return Err(Refused::Closed);
+        }
+        if self.clients.len() >= MAX_CONNECTIONS {
+            return Err(Refused::Full);
+        }
+        self.connections_made += 1;
+        let id = ConnectionId(self.connections_made);
+        self.clients.insert(id, Client::new(outlets));
+        self.gauges.set_connections(self.clients.len() as u64);
+        Ok(id)
+    }
+}
+
+impl Handler<Retire> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
+        self.withdraw(id);
+        if self.services.waiting_for(id) == 0 {
+            return Handled(None);
+        }
+        let (answered, all_answered) = oneshot::channel();
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.answered = Some(answered);
+        }
+        Handled(Some(all_answered))
+    }
+}
+
+impl Handler<Disconnect> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
+        self.withdraw(id);
+        self.services.forget_caller(id);
+        if let Some(client) = self.clients.remove(&id) {
+            client.outlets.gone.store(true, Ordering::Relaxed);
+            self.gauges.set_connections(self.clients.len() as u64);
+        }
+    }
+}
+
+impl Handler<Request> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+        if !self.clients.contains_key(&request.from) {
+            return Handled(None);
+        }
+        self.perform(request, ctx)
+    }
+}
+
+impl Handler<Publish> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, message: Publish, _: &mut Context<Self>) {
+        self.fan_out(message.topic.name(), || message.frame.clone());
+        if let Some(msg) = message.msg
+            && let Some(listener) = self.nodes.listeners.get(&message.topic)
+        {
+            listener.do_send(TopicMessage { msg, sender: None });
+        }
+    }
+}
+
+impl Handler<Respond> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
+        if let Some(client) = self.clients.get(&respond.connection) {
+            client.send(respond.frame, respond.service);
+        }
+    }
+}
+
+impl Handler<RefuseCalls> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, RefuseCalls(why): RefuseCalls, _: &mut Context<Self>) {
+        self.closed = Some(why);
+        for call in self.services.take_all() {
+            self.answer_forwarded(&call, &Refusal::Closed(why));
+        }
+    }
+}
+
+impl Handler<FinishAll> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
+        for client in self.clients.values() {
+            client.outlets.finish.do_send(Finish);
+        }
+    }
+}
+
+impl Handler<TimedOut> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, TimedOut(number): TimedOut, _: &mut Context<Self>) {
+        if let Some(call) = self.services.take(number) {
+            let why = Refusal::TimedOut(call.service.to_string());
+            self.answer_forwarded(&call, &why);
+        }
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl Client {
+    fn new(outlets: Outlets) -> Self {
+        Self {
+            outlets,
+            advertised: HashSet::new(),
+            withdrawn: HashSet::new(),
+            subscriptions: HashMap::new(),
+            provided: HashSet::new(),
+            answered: None,
+        }
+    }
+
+    fn send(&self, frame: Bytes, service: Option<Service>) {
+        self.outlets.answer.do_send(Answer { frame, service });
+    }
+
+    /// Bytes of responses that it has not taken yet.
+    fn backlog(&self) -> usize {
+        self.outlets.backlog.load(Ordering::Relaxed)
+    }
+}
+
+impl Registry {
+    /// Delivers a frame to everybody who subscribes to `topic`; without subscribers it is never encoded.
+    fn fan_out(&self, topic: &str, encode: impl FnOnce() -> Bytes) {
+        let Some((name, subscribers)) = self.topics.subscribers(topic) else {
+            return;
+        };
+        let frame = encode();
+        for subscriber in subscribers {
+            let message = Deliver {
+                topic: Arc::clone(name),
+                frame: frame.clone(),
+            };
+            subscriber.outlet.do_send(message);
+        }
+    }
+
+    /// Withdraws all that a client has registered, and fails the calls that wait for it as provider.
+    fn withdraw(&mut self, id: ConnectionId) {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return;
+        };
+        client.advertised.clear();
+        let subscriptions = std::mem::take(&mut client.subscriptions);
+        let provided = std::mem::take(&mut client.provided);
+        for topic in subscriptions.keys() {
+            self.drop_subscriber(topic, id);
+        }
+        for service in provided {
+            self.services.withdraw(&service, id);
+        }
+        for call in self.services.take_provided_by(id) {
+            let why = Refusal::ProviderGone(call.service.to_string());
+            self.answer_forwarded(&call, &why);
+        }
+    }
+
+    /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
+    fn drop_subscriber(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+        if self.topics.remove(topic, connection) {
+            self.tell_owner(topic, false);
+        }
+    }
+
+    fn tell_owner(&self, topic: &str, wanted: bool) {
+        if let Some(topic) = Topic::from_name(topic)
+            && let Some(owner) = self.nodes.publishers.get(&topic)
+        {
+            owner.do_send(Interest { topic, wanted });
+        }
+    }
+
+    /// The flag that computations for a client look at.
+    fn gone(&self, id: ConnectionId) -> Arc<AtomicBool> {
+        self.clients
+            .get(&id)
+            .map_or_else(Arc::default, |client| Arc::clone(&client.outlets.gone))
+    }
+
+    fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&RawValue>) {
+        if let Some(client) = self.clients.get(&to) {
+            client.send(messages::status(level, msg, id), None);
+        }
+    }
+
+    /// Fails a forwarded call.
+    fn answer_forwarded(&mut self, call: &Forwarded, why: &Refusal) {
+        self.send_response(call.caller, &call.service, call.id.as_deref(), why);
+        self.note_answered(call.caller);
+    }
+
+    /// A call of `caller` has been answered: if it was the last one, a client that has stopped sending may go.
+    fn note_answered(&mut self, caller: ConnectionId) {
+        if self.services.waiting_for(caller) == 0
+            && let Some(client) = self.clients.get_mut(&caller)
+        {
+            client.answered = None;
+        }
+    }
+
+    /// Answers a call with `result: false`.
+    fn send_response(&self, to: ConnectionId, service: &str, id: Option<&RawValue>, why: &Refusal) {
+        if let Some(client) = self.clients.get(&to) {
+            let frame = messages::failure(service, id, &why.to_string());
+            client.send(frame, Service::from_name(service));
+        }
+    }
+}

@@ -1,0 +1,354 @@
+//! What each rosbridge op does, in the order of the protocol's table.
+//!
+//! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
+
+use std::time::Duration;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde_json::value::RawValue;
+use tokio::sync::oneshot;
+
+use super::refusal::Refusal;
+use super::services::{Forwarded, Services};
+use super::topics::{Subscription, Throttle};
+use super::{
+    Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
+    Registry, Request, TimedOut,
+};
+use crate::actors::ConnectionId;
+use crate::actors::connection::Configure;
+use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
+use crate::protocol::catalog::{Direction, Service, Topic};
+use crate::protocol::messages::{self, Level};
+use crate::protocol::op::{CallService, MAX_NAME, Op, Subscribe};
+
+/// How long a provider may take when its caller does not say.
+const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Who sent the frame that is being performed, and its `id`.
+struct Origin {
+    from: ConnectionId,
+    id: Option<Box<RawValue>>,
+}
+
+impl Registry {
+    /// Performs one op of a client that is known.
+    pub(super) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+        let origin = Origin {
+            from: request.from,
+            id: request.id,
+        };
+        let refusal = match request.op {
+            Op::Publish { topic, msg } => return self.publish(origin, &topic, msg),
+            Op::CallService(call) => return self.call(origin, call, ctx),
+            Op::Advertise { topic, .. } => self.advertise(&origin, &topic),
+            Op::Unadvertise { topic } => {
+                self.unadvertise(&origin, &topic);
+                Ok(())
+            }
+            Op::Subscribe(subscribe) => self.subscribe(&origin, &subscribe),
+            Op::Unsubscribe { topic } => {
+                self.unsubscribe(&origin, &topic);
+                Ok(())
+            }
+            Op::AdvertiseService { service, .. } => self.advertise_service(&origin, &service),
+            Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
+            Op::ServiceResponse {
+                service,
+                values,
+                result,
+                status,
+            } => {
+                let status = status.unwrap_or_default();
+                self.complete(&origin, &service, |service, id| {
+                    messages::response_raw(service, id, &values, result, &status)
+                })
+            }
+        };
+        if let Err(why) = refusal {
+            self.send_status(
+                origin.from,
+                Level::Error,
+                &why.to_string(),
+                origin.id.as_deref(),
+            );
+        }
+        Handled(None)
+    }
+
+    fn advertise(&mut self, origin: &Origin, topic: &str) -> Result<(), Refusal> {
+        refuse_runtime_topic(topic)?;
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        if client.advertised.len() >= MAX_ADVERTISED && !client.advertised.contains(topic) {
+            return Err(Refusal::TooManyAdvertised);
+        }
+        client.advertised.insert(topic.into());
+        if let Some(topic) = Topic::from_name(topic) {
+            client.withdrawn.remove(&topic);
+        }
+        Ok(())
+    }
+
+    fn unadvertise(&mut self, origin: &Origin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        client.advertised.remove(topic);
+        if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
+            client.withdrawn.insert(topic);
+        }
+    }
+
+    /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
+    fn publish(&mut self, origin: Origin, topic: &str, msg: Box<RawValue>) -> Handled {
+        if let Err(why) = refuse_runtime_topic(topic) {
+            self.send_status(
+                origin.from,
+                Level::Error,
+                &why.to_string(),
+                origin.id.as_deref(),
+            );
+            return Handled(None);
+        }
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled(None);
+        };
+        let listener = Topic::from_name(topic)
+            .filter(|topic| is_listened_to(*topic) && !client.withdrawn.contains(topic))
+            .and_then(|topic| self.nodes.listeners.get(&topic));
+        if listener.is_none() && !client.advertised.contains(topic) {
+            return Handled(None);
+        }
+        self.fan_out(topic, || messages::publish_raw(topic, &msg));
+        let Some(listener) = listener else {
+            return Handled(None);
+        };
+        let (done, ended) = oneshot::channel();
+        let sender = Some(Sender {
+            connection: origin.from,
+            id: origin.id,
+            done,
+        });
+        listener.do_send(TopicMessage { msg, sender });
+        Handled(Some(ended))
+    }
+
+    fn subscribe(&mut self, origin: &Origin, subscribe: &Subscribe) -> Result<(), Refusal> {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let held: usize = client.subscriptions.values().map(Vec::len).sum();
+        let topic = subscribe.topic.as_str();
+        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
+        if id.as_ref().is_some_and(|id| id.len() > MAX_NAME) {
+            return Err(Refusal::LongSubscriptionId(MAX_NAME));
+        }
+        let known = client
+            .subscriptions
+            .get(topic)
+            .is_some_and(|all| all.iter().any(|one| one.id == id));
+        if !known && held >= MAX_SUBSCRIPTIONS {
+            return Err(Refusal::TooManySubscriptions);
+        }
+        let (name, first) = self
+            .topics
+            .add(topic, origin.from, client.outlets.deliver.clone());
+        let subscriptions = client.subscriptions.entry(name.clone()).or_default();
+        subscriptions.retain(|one| one.id != id);
+        subscriptions.push(Subscription {
+            id,
+            throttle: subscribe.throttle,
+            queue_length: subscribe.queue_length,
+        });
+        let throttle = Throttle::of(subscriptions);
+        client.outlets.configure.do_send(Configure {
+            topic: name,
+            throttle,
+        });
+        // The status leaves before the first message: the topic's owner hears of the subscriber after it.
+        let msg = format!("subscribed to {topic}");
+        self.send_status(origin.from, Level::Info, &msg, origin.id.as_deref());
+        if first {
+            self.tell_owner(topic, true);
+        }
+        Ok(())
+    }
+
+    fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        let Some((name, _)) = client.subscriptions.get_key_value(topic) else {
+            return;
+        };
+        let name = name.clone();
+        let mut left = client.subscriptions.remove(topic).unwrap_or_default();
+        match &origin.id {
+            None => left.clear(),
+            Some(id) => left.retain(|one| one.id.as_deref() != Some(id.get())),
+        }
+        let throttle = Throttle::of(&left);
+        client.outlets.configure.do_send(Configure {
+            topic: name.clone(),
+            throttle,
+        });
+        if left.is_empty() {
+            self.drop_subscriber(&name, origin.from);
+        } else {
+            client.subscriptions.insert(name, left);
+        }
+    }
+
+    fn advertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
+        if Service::from_name(service).is_some() {
+            return Err(Refusal::RuntimeService(service.to_owned()));
+        }
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains(service) {
+            return Err(Refusal::TooManyProvided);
+        }
+        client.provided.insert(service.into());
+        if let Some(before) = self
+            .services
+            .provider(service)
+            .filter(|&one| one != origin.from)
+            && let Some(before) = self.clients.get_mut(&before)
+        {
+            before.provided.remove(service);
+        }
+        self.services.provide(service, origin.from);
+        let msg = format!("advertised service {service}");
+        self.send_status(origin.from, Level::Info, &msg, origin.id.as_deref());
+        Ok(())
+    }
+
+    fn unadvertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
+        if !self.services.withdraw(service, origin.from) {
+            return Err(Refusal::NotProvider(service.to_owned()));
+        }
+        if let Some(client) = self.clients.get_mut(&origin.from) {
+            client.provided.remove(service);
+        }
+        Ok(())
+    }
+
+    /// Sends a call to the node or the client that serves it; whatever fails is the call's one response.
+    fn call(&mut self, origin: Origin, call: CallService, ctx: &mut Context<Self>) -> Handled {
+        let own = Service::from_name(&call.service);
+        let refusal = if let Some(why) = self.closed {
+            Err(Refusal::Closed(why))
+        } else if let Some(service) = own {
+            match self.nodes.services.get(&service) {
+                Some(node) => {
+                    let name = call.service.into_boxed_str();
+                    let registry = ctx.address().recipient();
+                    let (reply, ended) = Reply::new(
+                        registry,
+                        origin.from,
+                        service,
+                        name,
+                        origin.id,
+                        self.gone(origin.from),
+                    );
+                    node.do_send(ServiceCall {
+                        service,
+                        arguments: call.args,
+                        reply,
+                    });
+                    return Handled(Some(ended));
+                }
+                None => Err(Refusal::NotServed(call.service.clone())),
+            }
+        } else {
+            self.forward(&origin, &call, ctx)
+        };
+        if let Err(why) = refusal {
+            self.send_response(origin.from, &call.service, origin.id.as_deref(), &why);
+        }
+        Handled(None)
+    }
+
+    /// Passes a call on to the client that provides the service.
+    fn forward(
+        &mut self,
+        origin: &Origin,
+        call: &CallService,
+        ctx: &mut Context<Self>,
+    ) -> Result<(), Refusal> {
+        let service = call.service.as_str();
+        let provider = self
+            .services
+            .provider(service)
+            .and_then(|provider| Some((provider, self.clients.get(&provider)?)));
+        let Some((provider, client)) = provider else {
+            return Err(Refusal::NoProvider(service.to_owned()));
+        };
+        if self.services.waiting_for(origin.from) >= MAX_WAITING_CALLS {
+            return Err(Refusal::TooManyWaiting);
+        }
+        if client.backlog() > MAX_BACKLOG {
+            return Err(Refusal::ProviderBusy(service.to_owned()));
+        }
+        let number = self.services.next_call();
+        let frame = messages::call(service, &Services::call_id(number), call.args.raw());
+        client.send(frame, None);
+        let registry = ctx.address();
+        let patience = call.timeout.unwrap_or(DEFAULT_TIMEOUT);
+        let timer = actix_rt::spawn(async move {
+            actix_rt::time::sleep(patience).await;
+            registry.do_send(TimedOut(number));
+        });
+        self.services.remember(
+            number,
+            Forwarded {
+                caller: origin.from,
+                id: origin.id.clone(),
+                provider,
+                service: service.into(),
+                timer: timer.abort_handle(),
+            },
+        );
+        Ok(())
+    }
+
+    /// A provider's answer goes back under the caller's own id.
+    fn complete(
+        &mut self,
+        origin: &Origin,
+        service: &str,
+        encode: impl FnOnce(&str, Option<&RawValue>) -> Bytes,
+    ) -> Result<(), Refusal> {
+        let call = self
+            .services
+            .complete(origin.id.as_deref(), service, origin.from)
+            .ok_or_else(|| Refusal::StaleCall(service.to_owned()))?;
+        let Some(caller) = self.clients.get(&call.caller) else {
+            return Ok(());
+        };
+        if caller.backlog() > MAX_BACKLOG {
+            self.answer_forwarded(&call, &Refusal::CallerBusy(service.to_owned()));
+        } else {
+            caller.send(encode(service, call.id.as_deref()), None);
+            self.note_answered(call.caller);
+        }
+        Ok(())
+    }
+}
+
+/// Topics that the runtime alone publishes are not for clients.
+fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
+    match Topic::from_name(topic) {
+        Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the runtime itself subscribes to the topic.
+fn is_listened_to(topic: Topic) -> bool {
+    topic.direction() == Direction::Subscribed
+}

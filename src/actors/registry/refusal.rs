@@ -1,0 +1,44 @@
+//! Why the registry refuses an op or a call: the sentences that clients read.
+//!
+//! **Invariant:** every sentence begins with the field it is about, or names the service.
+
+use super::{MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS};
+
+/// An op or a call that changed nothing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Refusal {
+    #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
+    RuntimeTopic(String),
+    #[error("topic: a connection advertises at most {MAX_ADVERTISED} topics")]
+    TooManyAdvertised,
+    #[error("topic: a connection holds at most {MAX_SUBSCRIPTIONS} subscriptions")]
+    TooManySubscriptions,
+    #[error("id: a subscription's id has at most {0} bytes")]
+    LongSubscriptionId(usize),
+    #[error("service: {0} is provided by the runtime itself")]
+    RuntimeService(String),
+    #[error("service: a connection provides at most {MAX_PROVIDED} services")]
+    TooManyProvided,
+    #[error("service: this connection does not provide {0}")]
+    NotProvider(String),
+    #[error("id: no call of {0} with this id waits for this connection")]
+    StaleCall(String),
+    #[error("no provider for service {0}")]
+    NoProvider(String),
+    #[error("the provider of {0} is gone")]
+    ProviderGone(String),
+    #[error("timeout: the provider of {0} did not answer in time")]
+    TimedOut(String),
+    #[error("the provider of {0} does not read: more than {MAX_BACKLOG} bytes wait for it")]
+    ProviderBusy(String),
+    #[error(
+        "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
+    )]
+    CallerBusy(String),
+    #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
+    TooManyWaiting,
+    #[error("{0} is not served by this runtime")]
+    NotServed(String),
+    #[error("{0}")]
+    Closed(&'static str),
+}

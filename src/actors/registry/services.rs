@@ -1,0 +1,133 @@
+//! Services that clients provide: who provides what, and the calls that are on their way.
+//!
+//! **Invariant:** a forwarded call is completed by its own provider's connection, or by its end, and only once.
+
+use std::collections::hash_map::Entry;
+use std::collections::{BTreeMap, HashMap};
+
+use serde_json::value::RawValue;
+use tokio::task::AbortHandle;
+
+use crate::actors::ConnectionId;
+
+/// What the runtime's own ids for forwarded calls begin with, so that a provider's log shows where they come from.
+const CALL_ID_PREFIX: &str = "pendularm:";
+
+/// A call that was forwarded to its provider and not answered yet.
+pub(super) struct Forwarded {
+    pub(super) caller: ConnectionId,
+    pub(super) id: Option<Box<RawValue>>,
+    pub(super) provider: ConnectionId,
+    pub(super) service: Box<str>,
+    pub(super) timer: AbortHandle,
+}
+
+/// Providers and outstanding calls.
+#[derive(Default)]
+pub(super) struct Services {
+    providers: HashMap<Box<str>, ConnectionId>,
+    outstanding: BTreeMap<u64, Forwarded>,
+    /// Outstanding calls by caller, so that the limit costs no search.
+    waiting: HashMap<ConnectionId, usize>,
+    calls_made: u64,
+}
+
+impl Services {
+    /// Makes `connection` the provider; the newest registration wins.
+    pub(super) fn provide(&mut self, service: &str, connection: ConnectionId) {
+        self.providers.insert(service.into(), connection);
+    }
+
+    pub(super) fn provider(&self, service: &str) -> Option<ConnectionId> {
+        self.providers.get(service).copied()
+    }
+
+    /// Withdraws the service if `connection` is its provider; true if it was.
+    pub(super) fn withdraw(&mut self, service: &str, connection: ConnectionId) -> bool {
+        let provides = self.provider(service) == Some(connection);
+        if provides {
+            self.providers.remove(service);
+        }
+        provides
+    }
+
+    /// A fresh number for a call that is about to be forwarded.
+    pub(super) fn next_call(&mut self) -> u64 {
+        self.calls_made += 1;
+        self.calls_made
+    }
+
+    /// The id under which call `number` goes to its provider.
+    pub(super) fn call_id(number: u64) -> String {
+        format!("{CALL_ID_PREFIX}{number}")
+    }
+
+    pub(super) fn remember(&mut self, number: u64, call: Forwarded) {
+        *self.waiting.entry(call.caller).or_default() += 1;
+        self.outstanding.insert(number, call);
+    }
+
+    /// Calls of `connection` that wait for a provider's answer.
+    pub(super) fn waiting_for(&self, connection: ConnectionId) -> usize {
+        self.waiting.get(&connection).copied().unwrap_or_default()
+    }
+
+    /// Takes the outstanding call that `provider` answers with `id`, if it is that provider's and of that service.
+    pub(super) fn complete(
+        &mut self,
+        id: Option<&RawValue>,
+        service: &str,
+        provider: ConnectionId,
+    ) -> Option<Forwarded> {
+        let id: String = serde_json::from_str(id?.get()).ok()?;
+        let number: u64 = id.strip_prefix(CALL_ID_PREFIX)?.parse().ok()?;
+        let call = self.outstanding.get(&number)?;
+        if call.provider != provider || &*call.service != service {
+            return None;
+        }
+        self.take(number)
+    }
+
+    /// Takes an outstanding call, whoever provides it, and stops its clock.
+    pub(super) fn take(&mut self, number: u64) -> Option<Forwarded> {
+        let call = self.outstanding.remove(&number)?;
+        call.timer.abort();
+        if let Entry::Occupied(mut waiting) = self.waiting.entry(call.caller) {
+            *waiting.get_mut() -= 1;
+            if *waiting.get() == 0 {
+                waiting.remove();
+            }
+        }
+        Some(call)
+    }
+
+    /// Takes every outstanding call, oldest first.
+    pub(super) fn take_all(&mut self) -> Vec<Forwarded> {
+        self.take_where(|_| true)
+    }
+
+    /// Takes the calls that wait for `provider`, oldest first.
+    pub(super) fn take_provided_by(&mut self, provider: ConnectionId) -> Vec<Forwarded> {
+        self.take_where(|call| call.provider == provider)
+    }
+
+    /// Forgets the calls that `caller` has made.
+    pub(super) fn forget_caller(&mut self, caller: ConnectionId) {
+        if self.waiting_for(caller) > 0 {
+            self.take_where(|call| call.caller == caller);
+        }
+    }
+
+    fn take_where(&mut self, wanted: impl Fn(&Forwarded) -> bool) -> Vec<Forwarded> {
+        let numbers: Vec<u64> = self
+            .outstanding
+            .iter()
+            .filter(|(_, call)| wanted(call))
+            .map(|(number, _)| *number)
+            .collect();
+        numbers
+            .into_iter()
+            .filter_map(|number| self.take(number))
+            .collect()
+    }
+}

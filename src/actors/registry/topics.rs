@@ -1,0 +1,96 @@
+//! Who subscribes to what: the registry's table of topics.
+//!
+//! **Invariant:** a connection stands at most once under a topic, however often it subscribed.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+
+use crate::actors::ConnectionId;
+use crate::actors::connection::Deliver;
+
+/// One `subscribe` of a connection to a topic; `id` tells several of them apart.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Subscription {
+    pub(super) id: Option<Box<str>>,
+    pub(super) throttle: Duration,
+    pub(super) queue_length: usize,
+}
+
+/// What a connection's subscriptions to one topic come to: the smallest of each value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Throttle {
+    /// Least time between two deliveries; zero is no limit.
+    pub interval: Duration,
+    /// How many messages may be held back, newest kept; at least 1.
+    pub queue_length: usize,
+}
+
+impl Throttle {
+    /// The smallest of each over `subscriptions`; `None` for none.
+    pub(super) fn of(subscriptions: &[Subscription]) -> Option<Self> {
+        Some(Self {
+            interval: subscriptions.iter().map(|one| one.throttle).min()?,
+            queue_length: subscriptions
+                .iter()
+                .map(|one| one.queue_length.max(1))
+                .min()?,
+        })
+    }
+}
+
+/// A connection under a topic.
+pub(super) struct Subscriber {
+    pub(super) connection: ConnectionId,
+    pub(super) outlet: Recipient<Deliver>,
+}
+
+/// Every topic that somebody subscribes to.
+#[derive(Default)]
+pub(super) struct Topics {
+    subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
+}
+
+impl Topics {
+    /// Adds a subscriber. Gives the topic's shared name, and whether it is the topic's first.
+    pub(super) fn add(
+        &mut self,
+        topic: &str,
+        connection: ConnectionId,
+        outlet: Recipient<Deliver>,
+    ) -> (Arc<str>, bool) {
+        let name = self
+            .subscribers
+            .get_key_value(topic)
+            .map_or_else(|| Arc::from(topic), |(name, _)| Arc::clone(name));
+        let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
+        let first = subscribers.is_empty();
+        if !subscribers.iter().any(|one| one.connection == connection) {
+            subscribers.push(Subscriber { connection, outlet });
+        }
+        (name, first)
+    }
+
+    /// Removes a subscriber; true if it was the topic's last.
+    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) -> bool {
+        let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
+            return false;
+        };
+        entry.get_mut().retain(|one| one.connection != connection);
+        let last = entry.get().is_empty();
+        if last {
+            entry.remove();
+        }
+        last
+    }
+
+    /// The topic's shared name and its subscribers, if it has any.
+    pub(super) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
+        self.subscribers
+            .get_key_value(topic)
+            .map(|(name, list)| (name, list.as_slice()))
+    }
+}

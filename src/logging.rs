@@ -1,0 +1,211 @@
+//! Log lines to standard error, without ever waiting for whoever reads it.
+//!
+//! A parent that never reads the pipe it gave us must not stop the arm once that pipe is full. So a thread of its own
+//! writes the lines, a bounded queue feeds it, and what does not fit is dropped and counted.
+//!
+//! **Invariant:** logging never blocks, and a broken standard error never fails anything.
+
+use std::io::{self, Write};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread;
+use std::time::Duration;
+
+use tracing::level_filters::LevelFilter;
+
+/// Lines that may wait for the writer: more than any burst of connections logs at the default level.
+const QUEUE_LINES: usize = 1024;
+
+/// Longest line that is kept \[bytes\]: with [`QUEUE_LINES`] it bounds what a reader that stalls can cost to 4 MiB.
+const LINE_BYTES: usize = 4096;
+
+/// How long the end of the program waits for the last lines to be written.
+const FINISH: Duration = Duration::from_millis(100);
+
+enum Entry {
+    Line(Vec<u8>),
+    /// Answered once every line before it is written.
+    Written(SyncSender<()>),
+}
+
+/// The way into the log.
+#[derive(Clone)]
+pub struct Log {
+    entries: SyncSender<Entry>,
+    dropped: Arc<AtomicU64>,
+}
+
+/// Logs what `tracing` reports from now on, down to `level`, to standard error.
+///
+/// # Errors
+/// If the thread that writes cannot be started, or a log has been started already.
+pub fn start(level: LevelFilter) -> io::Result<Log> {
+    let log = Log::to(io::stderr())?;
+    let lines = log.clone();
+    let subscriber = tracing_subscriber::fmt()
+        .with_max_level(level)
+        .with_writer(move || lines.clone())
+        .finish();
+    tracing::subscriber::set_global_default(subscriber).map_err(io::Error::other)?;
+    Ok(log)
+}
+
+impl Log {
+    fn to(sink: impl Write + Send + 'static) -> io::Result<Self> {
+        let (entries, queue) = sync_channel(QUEUE_LINES);
+        let log = Self {
+            entries,
+            dropped: Arc::default(),
+        };
+        let dropped = Arc::clone(&log.dropped);
+        thread::Builder::new()
+            .name("log".into())
+            .spawn(move || write(&queue, &dropped, sink))?;
+        Ok(log)
+    }
+
+    /// Waits until what was logged so far is written, for a moment at most.
+    pub fn finish(&self) {
+        let (written, all) = sync_channel(1);
+        if self.entries.try_send(Entry::Written(written)).is_ok() {
+            // Nobody is left to be told that the last lines were not read in time.
+            let _ = all.recv_timeout(FINISH);
+        }
+    }
+}
+
+/// Takes one line at a time: `tracing-subscriber` formats an event first, then writes it whole.
+impl Write for Log {
+    fn write(&mut self, line: &[u8]) -> io::Result<usize> {
+        let kept = match line.get(..LINE_BYTES) {
+            Some(start) => [start, b"...\n"].concat(),
+            None => line.to_vec(),
+        };
+        if self.entries.try_send(Entry::Line(kept)).is_err() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        Ok(line.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Writes line after line until the last [`Log`] is gone. An error of the sink has nowhere to be told.
+fn write(queue: &Receiver<Entry>, dropped: &AtomicU64, mut sink: impl Write) {
+    for entry in queue {
+        match entry {
+            Entry::Line(line) => {
+                let _ = sink.write_all(&line);
+            }
+            Entry::Written(done) => {
+                let _ = sink.flush();
+                let _ = done.try_send(());
+            }
+        }
+        let lost = dropped.swap(0, Ordering::Relaxed);
+        if lost > 0 {
+            let _ = writeln!(
+                sink,
+                "{lost} log lines were dropped: nobody read them fast enough"
+            );
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::mpsc::{Receiver, Sender, channel};
+    use std::sync::{Condvar, Mutex};
+
+    use super::*;
+
+    /// A sink that can be held shut, and tells each write.
+    #[derive(Clone)]
+    struct Gate {
+        open: Arc<(Mutex<bool>, Condvar)>,
+        writes: Sender<String>,
+    }
+
+    impl Gate {
+        fn new(open: bool) -> (Self, Receiver<String>) {
+            let (writes, seen) = channel();
+            (
+                Self {
+                    open: Arc::new((Mutex::new(open), Condvar::new())),
+                    writes,
+                },
+                seen,
+            )
+        }
+
+        fn open(&self) {
+            *self.open.0.lock().unwrap() = true;
+            self.open.1.notify_all();
+        }
+    }
+
+    impl Write for Gate {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            let _open = self
+                .open
+                .1
+                .wait_while(self.open.0.lock().unwrap(), |open| !*open)
+                .unwrap();
+            let _ = self
+                .writes
+                .send(String::from_utf8_lossy(bytes).into_owned());
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn finishing_waits_for_what_was_logged() {
+        let (gate, seen) = Gate::new(true);
+        let mut log = Log::to(gate).unwrap();
+        log.write_all(b"first\n").unwrap();
+        log.write_all(b"second\n").unwrap();
+        log.finish();
+        assert_eq!(seen.try_iter().collect::<String>(), "first\nsecond\n");
+    }
+
+    #[test]
+    fn a_sink_that_takes_nothing_blocks_nobody_and_the_loss_is_told() {
+        let (gate, seen) = Gate::new(false);
+        let mut log = Log::to(gate.clone()).unwrap();
+        // The writer holds one line at the gate, or none yet; the queue holds the rest.
+        for _ in 0..QUEUE_LINES + 10 {
+            log.write_all(b"line\n").unwrap();
+        }
+        gate.open();
+        drop((log, gate));
+        let text: String = seen.iter().collect();
+        let told = text
+            .lines()
+            .filter_map(|line| line.split_once(" log lines were"));
+        let lost: usize = told.map(|(count, _)| count.parse::<usize>().unwrap()).sum();
+        assert!((9..=10).contains(&lost), "lost {lost}");
+        assert_eq!(
+            text.lines().filter(|line| *line == "line").count(),
+            QUEUE_LINES + 10 - lost
+        );
+    }
+
+    #[test]
+    fn a_line_is_cut_at_its_limit() {
+        let (gate, seen) = Gate::new(true);
+        let mut log = Log::to(gate).unwrap();
+        log.write_all(&[b'x'; 3 * LINE_BYTES]).unwrap();
+        log.finish();
+        assert_eq!(
+            seen.try_iter().collect::<String>().len(),
+            LINE_BYTES + "...\n".len()
+        );
+    }
+}

@@ -1,0 +1,146 @@
+//! Writes an expression as text: one spelling for each program, with no parenthesis that the grammar does not need.
+//!
+//! **Invariant:** the text parses to the very same program.
+
+use std::fmt;
+
+use super::{Arity, Expression, Level, Op};
+
+/// What is still to be written.
+enum Piece {
+    /// The operand that ends at this operation, in parentheses if it binds looser than the level.
+    Operand {
+        root: usize,
+        level: Level,
+    },
+    Text(&'static str),
+}
+
+impl fmt::Display for Expression {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let starts = self.starts();
+        // Operands are written from left to right, which is the order of the literals.
+        let mut literals = self.literals.iter();
+        let mut pieces = Vec::new();
+        if let Some(root) = self.ops.len().checked_sub(1) {
+            pieces.push(Piece::Operand {
+                root,
+                level: Level::Sum,
+            });
+        }
+        while let Some(piece) = pieces.pop() {
+            let (root, level) = match piece {
+                Piece::Operand { root, level } => (root, level),
+                Piece::Text(text) => {
+                    f.write_str(text)?;
+                    continue;
+                }
+            };
+            let Some(&op) = self.ops.get(root) else {
+                continue;
+            };
+            let parenthesised = op.level() < level;
+            if parenthesised {
+                f.write_str("(")?;
+                pieces.push(Piece::Text(")"));
+            }
+            match op.arity() {
+                Arity::Zero => write_atom(f, op, &mut literals)?,
+                Arity::One => {
+                    f.write_str(symbol(op))?;
+                    let operand = root.saturating_sub(1);
+                    if op == Op::Negate {
+                        pieces.push(Piece::Operand {
+                            root: operand,
+                            level: Level::Negation,
+                        });
+                    } else {
+                        f.write_str("(")?;
+                        pieces.push(Piece::Text(")"));
+                        pieces.push(Piece::Operand {
+                            root: operand,
+                            level: Level::Sum,
+                        });
+                    }
+                }
+                Arity::Two => {
+                    let right = root.saturating_sub(1);
+                    let left = starts.get(right).map_or(0, |start| start.saturating_sub(1));
+                    let (left_level, right_level) = operand_levels(op);
+                    pieces.push(Piece::Operand {
+                        root: right,
+                        level: right_level,
+                    });
+                    pieces.push(Piece::Text(symbol(op)));
+                    pieces.push(Piece::Operand {
+                        root: left,
+                        level: left_level,
+                    });
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Expression {
+    /// For each operation, where the part of the program that computes its value starts.
+    fn starts(&self) -> Vec<usize> {
+        let mut starts = Vec::with_capacity(self.ops.len());
+        let mut open = Vec::with_capacity(self.depth);
+        for (index, op) in self.ops.iter().enumerate() {
+            match op.arity() {
+                Arity::Zero => open.push(index),
+                Arity::One => {}
+                Arity::Two => {
+                    open.pop();
+                }
+            }
+            starts.push(open.last().copied().unwrap_or_default());
+        }
+        starts
+    }
+}
+
+/// The loosest that the left and the right operand may be without parentheses.
+fn operand_levels(op: Op) -> (Level, Level) {
+    match op.level() {
+        Level::Sum => (Level::Sum, Level::Product),
+        Level::Product => (Level::Product, Level::Power),
+        _ => (Level::Negation, Level::Power),
+    }
+}
+
+fn symbol(op: Op) -> &'static str {
+    match op {
+        Op::Negate => "-",
+        Op::Add => " + ",
+        Op::Subtract => " - ",
+        Op::Multiply => "*",
+        Op::Divide => "/",
+        Op::Power => "^",
+        _ => Op::FUNCTIONS
+            .into_iter()
+            .find(|(_, function)| *function == op)
+            .map_or("", |(name, _)| name),
+    }
+}
+
+fn write_atom<'a>(
+    f: &mut fmt::Formatter<'_>,
+    op: Op,
+    literals: &mut impl Iterator<Item = &'a f64>,
+) -> fmt::Result {
+    if op == Op::Variable {
+        return f.write_str("t");
+    }
+    let value = literals.next().copied().unwrap_or_default();
+    if value.is_infinite() {
+        // The grammar has no name for infinity; any literal beyond the range of f64 is one.
+        f.write_str("1e999")
+    } else if value == 0.0 || (1e-5..1e16).contains(&value) {
+        write!(f, "{value}")
+    } else {
+        write!(f, "{value:e}")
+    }
+}

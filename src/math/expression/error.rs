@@ -1,0 +1,115 @@
+//! What can be wrong with an expression, told to the person who wrote it.
+//!
+//! **Invariant:** a message is short and printable whatever the text was: what it quotes is escaped and shortened.
+
+use std::fmt;
+
+/// Longest piece of the text that a message repeats, in characters: enough to recognise the place.
+const MAX_QUOTED: usize = 20;
+
+/// Why a text is not an expression. Columns count characters, from 1.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ExpressionError {
+    /// Nothing but white space.
+    #[error("expected an expression in t, found an empty text")]
+    Empty,
+    /// A character that no token has.
+    #[error("unrecognized character {found} at column {column}")]
+    UnrecognizedCharacter {
+        /// Where it stands.
+        column: usize,
+        /// The character.
+        found: Found,
+    },
+    /// A name that is neither the variable nor a function.
+    #[error(
+        "unknown name {found} at column {column}: \
+         the variable is t, the functions are sin, cos, tan, exp, sqrt, ln and abs"
+    )]
+    UnknownName {
+        /// Where it starts.
+        column: usize,
+        /// The name.
+        found: Found,
+    },
+    /// A decimal point without a digit on either side, or an exponent without one.
+    #[error("expected a digit at column {column}, after {found}")]
+    ExpectedDigit {
+        /// Where the digit is missing.
+        column: usize,
+        /// The number as far as it goes.
+        found: Found,
+    },
+    /// Something else where a value must start.
+    #[error("expected a number, t, a function, - or ( at column {column}, found {found}")]
+    ExpectedOperand {
+        /// Where the value is missing.
+        column: usize,
+        /// What is there.
+        found: Found,
+    },
+    /// Something else where only an operator or a closing parenthesis can follow.
+    #[error("expected an operator at column {column}, found {found}")]
+    ExpectedOperator {
+        /// Where the operator is missing.
+        column: usize,
+        /// What is there.
+        found: Found,
+    },
+    /// A function without a parenthesised argument.
+    #[error("expected ( after {function} at column {column}, found {found}")]
+    ExpectedArgument {
+        /// The function.
+        function: &'static str,
+        /// Where the parenthesis is missing.
+        column: usize,
+        /// What is there.
+        found: Found,
+    },
+    /// A closing parenthesis too many.
+    #[error("the ) at column {column} closes nothing")]
+    Unopened {
+        /// Where it stands.
+        column: usize,
+    },
+    /// A closing parenthesis too few.
+    #[error("the ( at column {column} is never closed")]
+    Unclosed {
+        /// Where the innermost open one stands.
+        column: usize,
+    },
+}
+
+/// What stands at a place in the text, fit to be printed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Found {
+    /// A piece of the text, at most 20 characters of it, escaped.
+    Text(String),
+    /// Nothing more.
+    End,
+}
+
+impl Found {
+    /// Quotes `text`.
+    pub(super) fn text(text: &str) -> Self {
+        let mut characters = text.chars();
+        let mut quoted: String = characters
+            .by_ref()
+            .take(MAX_QUOTED)
+            .flat_map(char::escape_debug)
+            .collect();
+        if characters.next().is_some() {
+            quoted.push_str("...");
+        }
+        Self::Text(quoted)
+    }
+}
+
+impl fmt::Display for Found {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Text(text) => write!(f, "'{text}'"),
+            Self::End => f.write_str("the end"),
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Cuts the text of an expression into numbers, names and signs.
+//!
+//! **Invariant:** every byte is looked at a bounded number of times, and tokens borrow from the text.
+
+use super::error::{ExpressionError, Found};
+
+/// What a token is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Kind {
+    /// A literal with its value, which may be infinite.
+    Number(f64),
+    /// Letters, digits and underscores that don't start with a digit.
+    Name,
+    /// One of `+ - * / ^ ( )`.
+    Sign(u8),
+}
+
+/// A token and where it stands.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Token<'a> {
+    pub(super) kind: Kind,
+    pub(super) text: &'a str,
+    /// Offset of its first byte.
+    pub(super) start: usize,
+}
+
+/// Gives the tokens one after another.
+pub(super) struct Lexer<'a> {
+    text: &'a str,
+    /// Offset of what has not been read; always between two characters.
+    at: usize,
+}
+
+impl<'a> Lexer<'a> {
+    pub(super) fn new(text: &'a str) -> Self {
+        Self { text, at: 0 }
+    }
+
+    /// The next token, `None` at the end.
+    pub(super) fn next(&mut self) -> Result<Option<Token<'a>>, ExpressionError> {
+        self.skip(|byte| byte.is_ascii_whitespace());
+        let start = self.at;
+        let Some(first) = self.peek() else {
+            return Ok(None);
+        };
+        let kind = match first {
+            b'0'..=b'9' | b'.' => self.number()?,
+            b'a'..=b'z' | b'A'..=b'Z' | b'_' => {
+                self.skip(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+                Kind::Name
+            }
+            b'+' | b'-' | b'*' | b'/' | b'^' | b'(' | b')' => {
+                self.at += 1;
+                Kind::Sign(first)
+            }
+            _ => return Err(self.unrecognized()),
+        };
+        let text = self.text.get(start..self.at).unwrap_or_default();
+        Ok(Some(Token { kind, text, start }))
+    }
+
+    /// The column just after the last character that is not white space. For a text that has been read to its end.
+    pub(super) fn end_column(&self) -> usize {
+        column(self.text.trim_ascii_end().len())
+    }
+
+    /// Digits with at most one point, at least one digit, then perhaps an exponent.
+    fn number(&mut self) -> Result<Kind, ExpressionError> {
+        let start = self.at;
+        let mut digits = self.skip(|byte| byte.is_ascii_digit());
+        if self.peek() == Some(b'.') {
+            self.at += 1;
+            digits += self.skip(|byte| byte.is_ascii_digit());
+        }
+        if digits == 0 {
+            return Err(self.expected_digit(start));
+        }
+        self.exponent(start)?;
+        // The standard library reads exactly the forms that came this far, correctly rounded, in linear time.
+        let value = self.text.get(start..self.at).map(str::parse);
+        debug_assert!(matches!(value, Some(Ok(_))), "digits make a number");
+        Ok(Kind::Number(value.and_then(Result::ok).unwrap_or(f64::NAN)))
+    }
+
+    /// An `e` right after a number starts its exponent, unless it starts a name (`2exp(t)`): then a name follows a number,
+    /// for which the parser has the better message.
+    fn exponent(&mut self, start: usize) -> Result<(), ExpressionError> {
+        let rest = self.text.as_bytes().get(self.at..).unwrap_or_default();
+        let [b'e' | b'E', after @ ..] = rest else {
+            return Ok(());
+        };
+        if matches!(after, [b'a'..=b'z' | b'A'..=b'Z' | b'_', ..]) {
+            return Ok(());
+        }
+        self.at += if matches!(after, [b'+' | b'-', ..]) {
+            2
+        } else {
+            1
+        };
+        if self.skip(|byte| byte.is_ascii_digit()) == 0 {
+            return Err(self.expected_digit(start));
+        }
+        Ok(())
+    }
+
+    fn expected_digit(&self, start: usize) -> ExpressionError {
+        ExpressionError::ExpectedDigit {
+            column: column(self.at),
+            found: Found::text(self.text.get(start..self.at).unwrap_or_default()),
+        }
+    }
+
+    fn unrecognized(&self) -> ExpressionError {
+        let rest = self.text.get(self.at..).unwrap_or_default();
+        let length = rest.chars().next().map_or(0, char::len_utf8);
+        ExpressionError::UnrecognizedCharacter {
+            column: column(self.at),
+            found: Found::text(rest.get(..length).unwrap_or_default()),
+        }
+    }
+
+    fn peek(&self) -> Option<u8> {
+        self.text.as_bytes().get(self.at).copied()
+    }
+
+    /// Passes over bytes that satisfy the test and says how many they were. They must be ASCII.
+    fn skip(&mut self, test: impl Fn(u8) -> bool) -> usize {
+        let start = self.at;
+        while self.peek().is_some_and(&test) {
+            self.at += 1;
+        }
+        self.at - start
+    }
+}
+
+/// The column, from 1, of the character at a byte offset. What stands before the first mistake, or in a text without
+/// one, is ASCII: every other character is unrecognized. So bytes are characters there.
+pub(super) const fn column(offset: usize) -> usize {
+    offset + 1
+}

@@ -1,0 +1,42 @@
+//! Client text in our own messages: shortened, and with control characters escaped.
+//!
+//! **Invariant:** nothing that a client sent is echoed in a message of ours at a length of its own choosing.
+
+use std::fmt::Write as _;
+
+use serde_json::value::RawValue;
+
+/// Characters of client text that a message of ours repeats: enough to recognise it by, one line on a terminal.
+pub(super) const EXCERPT: usize = 48;
+
+/// At most [`EXCERPT`] characters of `text`, control characters escaped, an ellipsis where something was cut.
+pub(super) fn excerpt(text: &str) -> String {
+    shortened(text, EXCERPT)
+}
+
+/// At most `limit` characters of `text`, control characters escaped, an ellipsis where something was cut.
+pub(super) fn shortened(text: &str, limit: usize) -> String {
+    let mut short = String::with_capacity(text.len().min(limit));
+    for (count, character) in text.chars().enumerate() {
+        if count == limit {
+            short.push('…');
+            break;
+        }
+        if character.is_control() {
+            // A `String` takes whatever is written to it.
+            let _ = write!(short, "{}", character.escape_default());
+        } else {
+            short.push(character);
+        }
+    }
+    short
+}
+
+/// What a JSON value is, in words a sentence can end with: the value itself if it is short, else its kind.
+pub(super) fn found(raw: &RawValue) -> String {
+    match raw.get().as_bytes().first() {
+        Some(b'{') => "an object".to_owned(),
+        Some(b'[') => "an array".to_owned(),
+        _ => excerpt(raw.get()),
+    }
+}

@@ -1,0 +1,289 @@
+//! What an expression may be, what it is worth, how many nodes it has and how it is printed.
+//!
+//! **Invariant:** nothing here is rejected.
+
+use crate::{T, assert_values, parse, value};
+
+#[test]
+fn the_specifications_examples_are_valid() {
+    assert_values(&[
+        ("t", T),
+        ("sin(t)", T.sin()),
+        ("t^2 + 3*t - 1", T.powf(2.0) + 3.0 * T - 1.0),
+        ("-t + 1", -T + 1.0),
+    ]);
+}
+
+#[test]
+fn t_is_the_time_of_the_evaluation() {
+    let expression = parse("t");
+    for t in [0.0, -3.5, 1e300, f64::INFINITY] {
+        assert_eq!(expression.evaluate(t), t);
+    }
+}
+
+#[test]
+fn plus_minus_times_divide_and_power_are_what_they_are() {
+    assert_values(&[
+        ("5+3", 8.0),
+        ("5-3", 2.0),
+        ("5*3", 15.0),
+        ("6/4", 1.5),
+        ("5^3", 125.0),
+    ]);
+}
+
+#[test]
+fn sums_and_products_group_from_the_left() {
+    assert_values(&[
+        ("10-4-3", 3.0),
+        ("10-4+3", 9.0),
+        ("1-2-3-4", -8.0),
+        ("24/4/2", 3.0),
+        ("24/4*2", 12.0),
+        ("64/4/2/2", 4.0),
+        // Rounding tells the groupings apart: (0.1 + 0.2) + 0.3 is one ulp above 0.1 + (0.2 + 0.3).
+        ("0.1+0.2+0.3", 0.600_000_000_000_000_1),
+    ]);
+}
+
+#[test]
+fn powers_group_from_the_right() {
+    assert_values(&[("2^3^2", 512.0), ("2^2^2^2", 65536.0), ("(2^3)^2", 64.0)]);
+}
+
+#[test]
+fn products_bind_tighter_than_sums() {
+    assert_values(&[
+        ("1+2*3", 7.0),
+        ("2*3+1", 7.0),
+        ("7-6/2", 4.0),
+        ("1+2*3-8/4", 5.0),
+    ]);
+}
+
+#[test]
+fn powers_bind_tighter_than_products() {
+    assert_values(&[
+        ("2*3^2", 18.0),
+        ("3^2*2", 18.0),
+        ("36/3^2", 4.0),
+        ("2^3*2^2", 32.0),
+    ]);
+}
+
+#[test]
+fn unary_minus_binds_tighter_than_power() {
+    assert_values(&[
+        ("-2^2", 4.0),
+        ("-t^2", (-T).powf(2.0)),
+        ("2^-1", 0.5),
+        // 2^((-3)^2), and (-2)^(-2).
+        ("2^-3^2", 512.0),
+        ("-2^-2", 0.25),
+        ("-(2^2)", -4.0),
+        ("0-2^2", -4.0),
+    ]);
+}
+
+#[test]
+fn unary_minus_stands_wherever_a_value_does() {
+    assert_values(&[
+        ("-3", -3.0),
+        ("1--1", 2.0),
+        ("1+-1", 0.0),
+        ("2*-3", -6.0),
+        ("6/-3", -2.0),
+        ("-(1+2)", -3.0),
+        ("(-3)", -3.0),
+        ("abs(-3)", 3.0),
+        ("-abs(3)", -3.0),
+        ("-3*-2", 6.0),
+    ]);
+}
+
+#[test]
+fn unary_minus_repeats() {
+    assert_values(&[
+        ("--t", T),
+        ("---t", -T),
+        ("- - t", T),
+        ("2---1", 1.0),
+        ("2^--1", 2.0),
+    ]);
+}
+
+#[test]
+fn parentheses_override_every_precedence() {
+    assert_values(&[
+        ("(1+2)*3", 9.0),
+        ("10-(4-3)", 9.0),
+        ("24/(4/2)", 12.0),
+        ("(2*3)^2", 36.0),
+        ("2^(1+2)", 8.0),
+        ("(((t)))", T),
+        ("((1+2)*(3+4))", 21.0),
+    ]);
+}
+
+#[test]
+fn literals_may_leave_out_either_side_of_the_point() {
+    assert_values(&[
+        ("0", 0.0),
+        ("7", 7.0),
+        ("007", 7.0),
+        ("2.5", 2.5),
+        (".5", 0.5),
+        ("5.", 5.0),
+    ]);
+}
+
+#[test]
+fn literals_may_have_an_exponent() {
+    assert_values(&[
+        ("1e3", 1000.0),
+        ("2.5E-2", 0.025),
+        ("1e+3", 1000.0),
+        (".5e1", 5.0),
+        ("5.e3", 5000.0),
+        ("1e003", 1000.0),
+        // The sign belongs to the exponent, the next one does not.
+        ("1e-1-1", 0.1 - 1.0),
+    ]);
+}
+
+#[test]
+fn literals_are_rounded_to_the_nearest_float() {
+    assert_values(&[
+        ("0.1", 0.1),
+        ("9007199254740993", 9_007_199_254_740_992.0),
+        ("2.2250738585072011e-308", 2.225_073_858_507_201e-308),
+        ("5e-324", f64::from_bits(1)),
+        ("1e-400", 0.0),
+    ]);
+}
+
+#[test]
+fn a_literal_too_large_for_a_float_is_infinity() {
+    assert_values(&[
+        ("1e999", f64::INFINITY),
+        ("-1e999", f64::NEG_INFINITY),
+        ("1e99999999999999999999999999", f64::INFINITY),
+        ("0e99999999999999999999999999", 0.0),
+        ("1e-99999999999999999999999999", 0.0),
+    ]);
+}
+
+#[test]
+fn every_named_function_is_the_standard_one() {
+    assert_values(&[
+        ("sin(t)", T.sin()),
+        ("cos(t)", T.cos()),
+        ("tan(t)", T.tan()),
+        ("exp(t)", T.exp()),
+        ("sqrt(t)", T.sqrt()),
+        ("ln(t)", T.ln()),
+        ("abs(-t)", T),
+    ]);
+}
+
+#[test]
+fn functions_nest_and_combine() {
+    assert_values(&[
+        ("exp(-t)*cos(5*t)", (-T).exp() * (5.0 * T).cos()),
+        ("sqrt(abs(sin(-t)))", (-T).sin().abs().sqrt()),
+        ("2*sin(t)^2", 2.0 * T.sin().powf(2.0)),
+        ("-sin(t)^2", (-T.sin()).powf(2.0)),
+        ("2^sin(t)", 2.0_f64.powf(T.sin())),
+        ("1/(1+t*t)", 1.0 / (1.0 + T * T)),
+    ]);
+}
+
+#[test]
+fn white_space_may_stand_between_any_two_tokens() {
+    let spaced = parse(" \t- t\r\n^ 2 +sin (\tt )* ( 3 ) ");
+    assert_eq!(spaced, parse("-t^2+sin(t)*(3)"));
+}
+
+#[test]
+fn a_domain_error_is_not_a_number_or_infinite() {
+    for text in [
+        "sqrt(-1)",
+        "ln(-1)",
+        "0/0",
+        "(-8)^(1/3)",
+        "sin(1e999)",
+        "1e999-1e999",
+    ] {
+        assert!(value(text).is_nan(), "{text}");
+    }
+    for (text, expected) in [
+        ("1/0", f64::INFINITY),
+        ("-1/0", f64::NEG_INFINITY),
+        ("1/-0", f64::NEG_INFINITY),
+        ("ln(0)", f64::NEG_INFINITY),
+        ("exp(1000)", f64::INFINITY),
+        ("10^400", f64::INFINITY),
+        ("0^-1", f64::INFINITY),
+        ("0^0", 1.0),
+    ] {
+        assert_eq!(value(text), expected, "{text}");
+    }
+}
+
+#[test]
+fn a_stack_serves_any_number_of_evaluations_of_any_expression() {
+    let shallow = parse("t");
+    let deep = parse("1+(t+(2+(t*t)))");
+    let mut stack = shallow.stack();
+    for t in [0.5, 1.5, -2.5] {
+        assert_eq!(deep.evaluate_in(&mut stack, t), deep.evaluate(t));
+        assert_eq!(shallow.evaluate_in(&mut stack, t), t);
+    }
+}
+
+#[test]
+fn nodes_count_literals_variables_operators_and_calls() {
+    for (text, nodes) in [
+        ("t", 1),
+        ("((t))", 1),
+        ("-t", 2),
+        ("--t", 3),
+        ("sin(t)", 2),
+        ("t^2 + 3*t - 1", 9),
+        ("-t + 1", 4),
+        ("exp(-t)*cos(5*t)", 8),
+    ] {
+        assert_eq!(parse(text).nodes(), nodes, "{text}");
+    }
+}
+
+#[test]
+fn printing_leaves_out_the_parentheses_that_change_nothing() {
+    for (text, printed) in [
+        ("(((t)))", "t"),
+        ("(t^2)+((3*t))-1", "t^2 + 3*t - 1"),
+        ("10-(4-3)", "10 - (4 - 3)"),
+        ("(10-4)-3", "10 - 4 - 3"),
+        ("24/(4/2)", "24/(4/2)"),
+        ("24/(4*2)", "24/(4*2)"),
+        ("(2^3)^2", "(2^3)^2"),
+        ("2^(3^2)", "2^3^2"),
+        ("(-2)^2", "-2^2"),
+        ("-(2^2)", "-(2^2)"),
+        ("2^(-3)", "2^-3"),
+        ("-(-t)", "--t"),
+        ("-(t+1)", "-(t + 1)"),
+        ("(1+2)*(t-1)", "(1 + 2)*(t - 1)"),
+        ("sin((t))", "sin(t)"),
+        ("-(sin(t))", "-sin(t)"),
+        (".50", "0.5"),
+        ("5.", "5"),
+        ("0.0", "0"),
+        ("1e300", "1e300"),
+        ("0.00000025", "2.5e-7"),
+        ("1e9999", "1e999"),
+    ] {
+        assert_eq!(parse(text).to_string(), printed, "{text}");
+    }
+}
