@@ -291,9 +291,17 @@ fn the_result_of_a_response_is_true_or_false() {
 fn a_subscription_has_no_throttle_and_holds_one_message_unless_it_says_otherwise() {
     let plain = subscribe("");
     assert_eq!(
-        (plain.throttle, plain.queue_length, plain.type_name),
+        (
+            plain.throttle,
+            plain.queue_length,
+            plain.type_name.as_deref()
+        ),
         (Duration::ZERO, 1, None)
     );
+    for none in ["0", "0.0", "-0"] {
+        let unthrottled = subscribe(&format!(r#","throttle_rate":{none}"#));
+        assert_eq!(unthrottled, plain, "{none}");
+    }
     let full = subscribe(r#","type":"a/B","throttle_rate":250.5,"queue_length":3"#);
     assert_eq!(full.throttle, Duration::from_micros(250_500));
     assert_eq!(

@@ -85,6 +85,10 @@ enum Stage {
 impl Computation for IntegrationStep {
     fn advance(&mut self, deadline: Instant) -> Progress {
         loop {
+            // Looked at first: an answer once given is not followed by another because the caller has left meanwhile.
+            if matches!(self.stage, Stage::Done) {
+                return Progress::Finished;
+            }
             if self.reply.caller_is_gone() {
                 self.refuse("the caller is gone");
             }
@@ -110,9 +114,9 @@ impl Computation for IntegrationStep {
                         Stage::Done
                     }
                 },
-                Stage::Done => return Progress::Finished,
+                Stage::Done => Stage::Done,
             };
-            if Instant::now() >= deadline {
+            if Instant::now() >= deadline && !matches!(self.stage, Stage::Done) {
                 return Progress::Unfinished;
             }
         }
