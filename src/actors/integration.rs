@@ -96,7 +96,7 @@ impl Computation for IntegrationStep {
                 Stage::Unread(arguments) => match read(&arguments) {
                     Ok(particle) => Stage::Stepping(Box::new(particle)),
                     Err(why) => {
-                        self.refuse(&why);
+                        self.reply.refuse(&why);
                         Stage::Done
                     }
                 },
@@ -123,6 +123,10 @@ impl Computation for IntegrationStep {
     }
 
     fn refuse(&mut self, why: &str) {
+        // The pool may end between the answer and the last look at the clock.
+        if matches!(self.stage, Stage::Done) {
+            return;
+        }
         self.reply.refuse(why);
         self.stage = Stage::Done;
     }

@@ -72,7 +72,7 @@ pub struct Reply {
     id: Option<Box<RawValue>>,
     gone: Arc<AtomicBool>,
     answered: bool,
-    _done: oneshot::Sender<()>,
+    done: Option<oneshot::Sender<()>>,
 }
 
 impl Reply {
@@ -96,7 +96,7 @@ impl Reply {
                 id,
                 gone,
                 answered: false,
-                _done: done,
+                done: Some(done),
             },
             ended,
         )
@@ -120,15 +120,18 @@ impl Reply {
         (&self.name, self.id.as_deref())
     }
 
+    /// Answers as [`Reply::answer`] does and ends the call: all its effects have been had.
+    ///
+    /// The news of the end travels with the answer: one thread is woken once, not twice.
+    pub fn conclude(mut self, values: &impl Serialize, status: &str) {
+        let done = self.done.take();
+        let frame = self.encode(values, status);
+        self.send(frame, done);
+    }
+
     /// Answers with `values`; `result` is true if `status` is empty.
     pub fn answer(&mut self, values: &impl Serialize, status: &str) {
-        let frame = messages::response(
-            &self.name,
-            self.id.as_deref(),
-            values,
-            status.is_empty(),
-            status,
-        );
+        let frame = self.encode(values, status);
         self.answer_with(frame);
     }
 
@@ -144,6 +147,20 @@ impl Reply {
 
     /// Answers with a whole `service_response` frame that the caller has encoded itself.
     pub fn answer_with(&mut self, frame: Bytes) {
+        self.send(frame, None);
+    }
+
+    fn encode(&self, values: &impl Serialize, status: &str) -> Bytes {
+        messages::response(
+            &self.name,
+            self.id.as_deref(),
+            values,
+            status.is_empty(),
+            status,
+        )
+    }
+
+    fn send(&mut self, frame: Bytes, done: Option<oneshot::Sender<()>>) {
         if self.answered {
             debug_assert!(false, "{} was answered twice", self.name);
             return;
@@ -153,6 +170,7 @@ impl Reply {
             connection: self.connection,
             frame,
             service: Some(self.service),
+            done,
         });
     }
 }

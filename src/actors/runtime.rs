@@ -12,6 +12,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use tokio::net::TcpListener;
+use tokio::runtime::Builder;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep};
 
@@ -68,7 +69,9 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     let gauges = Arc::new(Gauges::default());
     let registry = Registry::new(Arc::clone(&gauges)).start();
     let workers = WorkerPool::start(WorkerPool::default_threads())?;
-    let arm_thread = Arbiter::new();
+    // The arm has no sockets: without them its thread sleeps on a lock instead of a poll, and wakes sooner.
+    let arm_thread =
+        Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
     let mut nodes = Nodes::default();
     match options.links {
         Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, &mut nodes),

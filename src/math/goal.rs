@@ -1,1 +1,196 @@
-//! (being written: goal)
+//! A goal over time: whether the hand has come near enough and stayed, and when its progress is due to be reported.
+//!
+//! Both values are told the simulation time and the hand's position; whoever steps the arm tells them after every step,
+//! and only while a goal is active.
+//!
+//! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the hand farther than
+//! `epsilon` from the target.
+
+use std::fmt;
+
+use glam::DVec2;
+
+/// `epsilon` where a request gives none \[m\]: 1 % of the reach of the default arm of two links.
+pub const EPSILON: f64 = 0.02;
+
+/// `success_hold` where a request gives none \[s\]: longer than the default arm takes to swing through such an epsilon.
+pub const SUCCESS_HOLD: f64 = 0.5;
+
+/// Feedback messages per second of simulation progress.
+pub const FEEDBACK_RATE: f64 = 60.0;
+
+/// What a difference of two times \[s\] near `time` may be rounded by.
+///
+/// A time is `base + k h`: half a unit in the last place for the product, half for the sum, at both ends, and as much
+/// again because `h` is only the double nearest to, say, 1 ms. All that is less than four times `2⁻⁵² time` (3e-12 s
+/// after an hour). Without it, half a second would take a step more at some times than at others.
+pub(super) fn rounding(time: f64) -> f64 {
+    4.0 * f64::EPSILON * time.abs()
+}
+
+/// When a goal counts as reached.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Criteria {
+    /// Greatest distance between hand and target that counts as there \[m\], greater than 0.
+    pub epsilon: f64,
+    /// Simulation time that the hand must stay there without interruption \[s\]; 0 is content with the first entry.
+    pub success_hold: f64,
+}
+
+impl Default for Criteria {
+    fn default() -> Self {
+        Self {
+            epsilon: EPSILON,
+            success_hold: SUCCESS_HOLD,
+        }
+    }
+}
+
+/// How a goal ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// The hand stayed within `epsilon` for `success_hold`.
+    Reached,
+    /// Cancelled, replaced by another goal, or its setpoint taken away by a reset.
+    Preempted,
+}
+
+impl Outcome {
+    /// The name that messages use.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Reached => "reached",
+            Self::Preempted => "preempted",
+        }
+    }
+}
+
+impl fmt::Display for Outcome {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// An active goal, judged at every physics step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goal {
+    target: DVec2,
+    criteria: Criteria,
+    started: f64,
+    /// Time of the first step of the present stay within epsilon; none while outside.
+    entered: Option<f64>,
+}
+
+impl Goal {
+    /// A goal for the hand to be at `target` \[m\], that starts at simulation time `now` \[s\].
+    #[must_use]
+    pub const fn new(target: DVec2, criteria: Criteria, now: f64) -> Self {
+        Self {
+            target,
+            criteria,
+            started: now,
+            entered: None,
+        }
+    }
+
+    /// Tells the goal where the hand is \[m\] after the step that ended at `time` \[s\]; `true` once it is reached.
+    ///
+    /// Leaving epsilon, even for one step, starts the stay over. So does a clock that runs backwards, and a position
+    /// that is not a number counts as outside.
+    pub fn judge(&mut self, time: f64, hand: DVec2) -> bool {
+        // NaN is not near anything.
+        if self.distance(hand) <= self.criteria.epsilon {
+            let entered = self
+                .entered
+                .filter(|&entered| entered <= time)
+                .unwrap_or(time);
+            self.entered = Some(entered);
+            time - entered + rounding(time) >= self.criteria.success_hold
+        } else {
+            self.entered = None;
+            false
+        }
+    }
+
+    /// Where the hand should be \[m\].
+    #[must_use]
+    pub const fn target(&self) -> DVec2 {
+        self.target
+    }
+
+    /// When it counts as reached.
+    #[must_use]
+    pub const fn criteria(&self) -> Criteria {
+        self.criteria
+    }
+
+    /// The hand's distance from the target \[m\]; orientation has no part in it.
+    #[must_use]
+    pub fn distance(&self, hand: DVec2) -> f64 {
+        let off = hand - self.target;
+        // `DVec2::length` would overflow for a hand that a diverging arm has thrown beyond 1e154 m.
+        off.x.hypot(off.y)
+    }
+
+    /// Simulation time since the goal's start \[s\].
+    #[must_use]
+    pub fn elapsed(&self, time: f64) -> f64 {
+        (time - self.started).max(0.0)
+    }
+}
+
+/// When something that happens at a fixed rate of simulation time is due.
+///
+/// The first question is answered with yes and starts the count, so that even a goal that is over after one step reports
+/// once. After that there is one yes in each period in which the clock moved, never two for one question: steps longer
+/// than a period give one each, and what was missed is not made up. A clock that runs backwards starts afresh.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cadence {
+    /// Per second.
+    rate: f64,
+    count: Option<Count>,
+}
+
+/// Periods are counted from `origin`; the running `period` has been answered for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Count {
+    origin: f64,
+    latest: f64,
+    period: f64,
+}
+
+impl Cadence {
+    /// A cadence of `rate` per second of simulation time, greater than 0.
+    #[must_use]
+    pub const fn new(rate: f64) -> Self {
+        Self { rate, count: None }
+    }
+
+    /// Whether it is due at simulation time `time` \[s\].
+    pub fn due(&mut self, time: f64) -> bool {
+        match &mut self.count {
+            Some(count) if count.latest <= time => {
+                count.latest = time;
+                let period = ((time - count.origin + rounding(time)) * self.rate).floor();
+                let due = period > count.period;
+                count.period = count.period.max(period);
+                due
+            }
+            _ => {
+                self.count = Some(Count {
+                    origin: time,
+                    latest: time,
+                    period: 0.0,
+                });
+                true
+            }
+        }
+    }
+}
+
+impl Default for Cadence {
+    fn default() -> Self {
+        Self::new(FEEDBACK_RATE)
+    }
+}

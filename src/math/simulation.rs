@@ -21,7 +21,7 @@ use std::ops::ControlFlow;
 
 use super::arm::{Arm, State};
 use super::dynamics::forward_dynamics;
-use super::integrator::{Method, increment};
+use super::integrator::{Method, increment, two_sum};
 use super::pid::{Control, Gains, Pid, Setpoint};
 
 /// Timestep until another is set \[s\]. A third of what the default gains are stable to.
@@ -274,19 +274,13 @@ impl<const N: usize> Simulation<N> {
     }
 }
 
-/// `value + carry + increment`, and what rounding left out of it, exactly (Knuth's two-sum: no branch on which of the
-/// two is larger). The carry is what makes many small steps as good as few.
+/// `value + carry + increment`, and the carry that rounding leaves for the next step.
 #[inline(always)]
 fn add<const N: usize>(
     value: &[f64; N],
     carry: &[f64; N],
     increment: &[f64; N],
 ) -> ([f64; N], [f64; N]) {
-    let addend: [f64; N] = std::array::from_fn(|i| increment[i] + carry[i]);
-    let sum: [f64; N] = std::array::from_fn(|i| value[i] + addend[i]);
-    let left_out = std::array::from_fn(|i| {
-        let part = sum[i] - value[i];
-        (value[i] - (sum[i] - part)) + (addend[i] - part)
-    });
-    (sum, left_out)
+    let sums: [(f64, f64); N] = std::array::from_fn(|i| two_sum(value[i], increment[i] + carry[i]));
+    (sums.map(|sum| sum.0), sums.map(|sum| sum.1))
 }

@@ -6,6 +6,8 @@
 //! **Invariant:** every byte is looked at once, and no more is kept than one unfinished frame and what was last pushed.
 
 use super::json;
+use super::nesting::{Event, Nesting};
+pub use super::opening::{Foreign, Opening, opening};
 use super::text;
 
 /// Longest frame, in bytes without the newline: a 3-link trajectory has under 1 KiB, an expression of 1 MB has to pass.
@@ -118,6 +120,12 @@ impl FrameReader {
         self.buffer.extend_from_slice(bytes);
     }
 
+    /// How much memory the reader holds, in bytes.
+    #[must_use]
+    pub const fn buffered(&self) -> usize {
+        self.buffer.capacity()
+    }
+
     /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {
@@ -129,7 +137,7 @@ impl FrameReader {
         error
     }
 
-    /// Moves what is unfinished to the front of the buffer, at most as often as it has been outgrown by what is done with.
+    /// Moves what is unfinished to the front of the buffer, once what is done with has outgrown it: constant time per byte.
     fn compact(&mut self) {
         let rest = self.buffer.len() - self.start;
         if self.start < rest {
@@ -139,8 +147,15 @@ impl FrameReader {
         self.buffer.truncate(rest);
         self.at -= self.start;
         self.start = 0;
-        if rest <= KEPT_BUFFER && self.buffer.capacity() > 2 * KEPT_BUFFER {
+    }
+
+    /// Gives back the memory of a long frame once nothing of it is left.
+    fn give_back(&mut self) {
+        if self.start == self.buffer.len() {
+            self.buffer.clear();
             self.buffer.shrink_to(KEPT_BUFFER);
+            self.start = 0;
+            self.at = 0;
         }
     }
 
@@ -148,8 +163,8 @@ impl FrameReader {
         self.buffer.get(self.at..).unwrap_or_default()
     }
 
-    /// Skips white space; `false` if there is nothing else.
-    fn skip_space(&mut self) -> bool {
+    /// Skips white space up to the first byte of something.
+    fn skip_space(&mut self) {
         let rest = self.rest();
         let space = rest
             .iter()
@@ -165,7 +180,6 @@ impl FrameReader {
             Some(_) => self.state = State::Line,
             None => {}
         }
-        first.is_some()
     }
 
     /// Goes on in a line that is no object. `None` if it has not ended yet or has been reported.
@@ -210,26 +224,25 @@ impl FrameReader {
         if !kept {
             self.start = self.at;
         }
-        // A newline is left for the white space after the frame, so that it counts for no frame's length.
+        // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
         let too_long = self.at - self.start > MAX_FRAME;
-        let error = match event {
+        let (state, error) = match event {
             None if !too_long => return None,
+            None => (State::SkippedObject, FrameError::TooLong),
             Some(Event::Balanced) if kept && !too_long => return Some(self.take_frame()),
-            None => {
-                self.state = State::SkippedObject;
-                FrameError::TooLong
+            Some(Event::Balanced) => (State::Between, FrameError::TooLong),
+            Some(Event::Newline { in_string: true }) => {
+                (State::Between, FrameError::LineEndedInString)
             }
-            Some(event) => {
-                self.state = event.next_state();
-                if too_long {
-                    FrameError::TooLong
-                } else {
-                    event.error()
-                }
+            Some(Event::Newline { in_string: false }) => (State::Between, FrameError::LineEnded),
+            Some(Event::Mismatch { opener, found }) => {
+                (State::SkippedLine, FrameError::Mismatch { opener, found })
             }
+            Some(Event::TooDeep) => (State::SkippedObject, FrameError::TooDeep),
         };
+        self.state = state;
         self.start = self.at;
-        kept.then_some(Err(error))
+        kept.then_some(Err(if too_long { FrameError::TooLong } else { error }))
     }
 
     /// The frame that has just balanced.
@@ -266,9 +279,7 @@ impl Iterator for FrameReader {
         loop {
             let found = match self.state {
                 State::Between => {
-                    if !self.skip_space() {
-                        return None;
-                    }
+                    self.skip_space();
                     None
                 }
                 State::Object | State::SkippedObject => self.scan_object(),
@@ -278,227 +289,9 @@ impl Iterator for FrameReader {
                 return found;
             }
             if self.at == self.buffer.len() {
+                self.give_back();
                 return None;
             }
         }
     }
-}
-
-/// What a scan of an object came upon.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Event {
-    Balanced,
-    Newline { in_string: bool },
-    Mismatch { opener: char, found: char },
-    TooDeep,
-}
-
-impl Event {
-    const fn next_state(self) -> State {
-        match self {
-            Self::Balanced | Self::Newline { .. } => State::Between,
-            Self::Mismatch { .. } => State::SkippedLine,
-            Self::TooDeep => State::SkippedObject,
-        }
-    }
-
-    const fn error(self) -> FrameError {
-        match self {
-            Self::Newline { in_string: true } => FrameError::LineEndedInString,
-            Self::Balanced | Self::Newline { in_string: false } => FrameError::LineEnded,
-            Self::Mismatch { opener, found } => FrameError::Mismatch { opener, found },
-            Self::TooDeep => FrameError::TooDeep,
-        }
-    }
-}
-
-/// Where in an object the scan is: the brackets that are open, and whether it is inside a string.
-#[derive(Debug, Clone, Copy)]
-struct Nesting {
-    depth: usize,
-    /// One bit per open level, the innermost last: 1 for a bracket, 0 for a brace. Holds [`MAX_NESTING`] levels.
-    brackets: u128,
-    in_string: bool,
-    escaped: bool,
-    /// Whether an `N` or an `I` stood outside strings: only then can there be a `NaN` or an `Infinity`.
-    names: bool,
-}
-
-impl Nesting {
-    const fn new() -> Self {
-        Self {
-            depth: 0,
-            brackets: 0,
-            in_string: false,
-            escaped: false,
-            names: false,
-        }
-    }
-
-    /// Goes on with `bytes`: how many were scanned, and what stopped the scan. A newline stops it before, all else behind.
-    fn scan(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
-        let mut at = 0;
-        while let Some(&byte) = bytes.get(at) {
-            if self.in_string {
-                if self.escaped {
-                    self.escaped = false;
-                    if byte != b'\n' {
-                        at += 1;
-                        continue;
-                    }
-                }
-                at += plain_in_string(bytes.get(at..).unwrap_or_default());
-                match bytes.get(at) {
-                    None => break,
-                    Some(b'\n') => return (at, Some(Event::Newline { in_string: true })),
-                    Some(b'\\') => self.escaped = true,
-                    Some(_) => self.in_string = false,
-                }
-                at += 1;
-                continue;
-            }
-            if byte == b'\n' {
-                return (at, Some(Event::Newline { in_string: false }));
-            }
-            at += 1;
-            if let Some(event) = self.structural(byte) {
-                return (at, Some(event));
-            }
-        }
-        (bytes.len(), None)
-    }
-
-    #[inline]
-    fn structural(&mut self, byte: u8) -> Option<Event> {
-        match byte {
-            b'"' => self.in_string = true,
-            b'{' => return self.open(0),
-            b'[' => return self.open(1),
-            b'}' => return self.close(0),
-            b']' => return self.close(1),
-            b'N' | b'I' => self.names = true,
-            _ => {}
-        }
-        None
-    }
-
-    fn open(&mut self, bracket: u128) -> Option<Event> {
-        self.depth += 1;
-        if self.depth <= MAX_NESTING {
-            self.brackets = (self.brackets << 1) | bracket;
-        }
-        (self.depth == MAX_NESTING + 1).then_some(Event::TooDeep)
-    }
-
-    fn close(&mut self, bracket: u128) -> Option<Event> {
-        if self.depth <= MAX_NESTING {
-            if self.brackets & 1 != bracket {
-                let (opener, found) = if bracket == 1 { ('{', ']') } else { ('[', '}') };
-                return Some(Event::Mismatch { opener, found });
-            }
-            self.brackets >>= 1;
-        }
-        self.depth -= 1;
-        (self.depth == 0).then_some(Event::Balanced)
-    }
-}
-
-/// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
-fn plain_in_string(bytes: &[u8]) -> usize {
-    /// A block that the compiler can compare with a few vector instructions.
-    const BLOCK: usize = 32;
-    let special = |byte: &u8| matches!(byte, b'"' | b'\\' | b'\n');
-    let blocks = bytes
-        .chunks_exact(BLOCK)
-        .take_while(|block| !block.iter().fold(false, |any, byte| any | special(byte)))
-        .count();
-    let plain = blocks * BLOCK;
-    let rest = bytes.get(plain..).unwrap_or_default();
-    plain + rest.iter().position(special).unwrap_or(rest.len())
-}
-
-/// What a connection's first bytes say about it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Opening {
-    /// Could still become anything: wait for more bytes (at most eight are ever needed).
-    Undecided,
-    /// Ours to read.
-    Json,
-    /// Another protocol: answer one line, close, parse nothing.
-    Foreign(Foreign),
-}
-
-/// Protocols that must never be read as JSON: a web page could otherwise drive the arm by posting at the port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Foreign {
-    /// An HTTP request line.
-    Http,
-    /// A TLS hello.
-    Tls,
-    /// BSON, as some C++ rosbridge clients send.
-    Bson,
-}
-
-impl Foreign {
-    /// One line for the status: what was recognised, and what this port speaks.
-    #[must_use]
-    pub const fn explanation(self) -> &'static str {
-        match self {
-            Self::Http => {
-                "this is an HTTP request, and this port speaks rosbridge JSON over plain TCP, one object per line"
-            }
-            Self::Tls => {
-                "this is a TLS hello, and this port speaks rosbridge JSON over plain TCP, one object per line"
-            }
-            Self::Bson => {
-                "this is BSON, and this port speaks rosbridge JSON over plain TCP, one object per line"
-            }
-        }
-    }
-}
-
-/// How HTTP requests open.
-const METHODS: [&[u8]; 10] = [
-    b"GET ",
-    b"HEAD ",
-    b"POST ",
-    b"PUT ",
-    b"DELETE ",
-    b"CONNECT ",
-    b"OPTIONS ",
-    b"TRACE ",
-    b"PATCH ",
-    b"PRI ",
-];
-/// How a TLS record with a hello opens.
-const TLS_HELLO: &[u8] = &[0x16, 0x03];
-/// A BSON document opens with its length in four bytes, little-endian: below 16 MiB one of them is 0.
-const BSON_LENGTH: usize = 4;
-
-/// Judges a connection by all the bytes that it has sent so far.
-///
-/// At the end of the stream what is undecided is to be read as JSON.
-#[must_use]
-pub fn opening(first: &[u8]) -> Opening {
-    if first.starts_with(TLS_HELLO) {
-        return Opening::Foreign(Foreign::Tls);
-    }
-    if first.iter().take(BSON_LENGTH).any(|&byte| byte == 0) {
-        return Opening::Foreign(Foreign::Bson);
-    }
-    if METHODS.iter().any(|method| first.starts_with(method)) {
-        return Opening::Foreign(Foreign::Http);
-    }
-    let method_may_follow = METHODS.iter().any(|method| method.starts_with(first));
-    let nul_may_follow = first.len() < BSON_LENGTH && !holds_a_line(first);
-    if method_may_follow || nul_may_follow {
-        Opening::Undecided
-    } else {
-        Opening::Json
-    }
-}
-
-/// Whether a line with text in it is complete: such a line is answered, not kept waiting for a fourth byte.
-fn holds_a_line(bytes: &[u8]) -> bool {
-    bytes.trim_ascii_start().contains(&b'\n')
 }

@@ -182,7 +182,7 @@ pub struct KeyValue<'a> {
 /// A message on a topic.
 #[must_use]
 pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
-    Frame::op("publish")
+    Line::op("publish")
         .text("topic", topic)
         .value("msg", msg)
         .end()
@@ -191,7 +191,7 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
 /// A message that a client sent, which only passes through; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
-    Frame::op("publish")
+    Line::op("publish")
         .text("topic", topic)
         .raw("msg", msg)
         .end()
@@ -206,7 +206,7 @@ pub fn response(
     result: bool,
     status: &str,
 ) -> Bytes {
-    Frame::op("service_response")
+    Line::op("service_response")
         .text("service", service)
         .optional_raw("id", id)
         .value("values", values)
@@ -224,7 +224,7 @@ pub fn response_raw(
     result: bool,
     status: &str,
 ) -> Bytes {
-    Frame::op("service_response")
+    Line::op("service_response")
         .text("service", service)
         .optional_raw("id", id)
         .raw("values", values)
@@ -242,7 +242,7 @@ pub fn failure(service: &str, id: Option<&RawValue>, status: &str) -> Bytes {
 /// A status.
 #[must_use]
 pub fn status(level: Level, msg: &str, id: Option<&RawValue>) -> Bytes {
-    Frame::op("status")
+    Line::op("status")
         .text("level", level.name())
         .text("msg", msg)
         .optional_raw("id", id)
@@ -252,7 +252,7 @@ pub fn status(level: Level, msg: &str, id: Option<&RawValue>) -> Bytes {
 /// A call that goes on to an external provider under an id of the runtime's own; `args` only pass through.
 #[must_use]
 pub fn call(service: &str, id: &str, args: &RawValue) -> Bytes {
-    Frame::op("call_service")
+    Line::op("call_service")
         .text("service", service)
         .text("id", id)
         .raw("args", args)
@@ -264,11 +264,11 @@ pub fn call(service: &str, id: &str, args: &RawValue) -> Bytes {
 pub struct Empty {}
 
 /// A frame under construction; members come in the order in which they are written.
-struct Frame {
+struct Line {
     text: Vec<u8>,
 }
 
-impl Frame {
+impl Line {
     fn op(op: &str) -> Self {
         let mut text = Vec::with_capacity(USUAL_FRAME);
         text.extend_from_slice(b"{\"op\":\"");

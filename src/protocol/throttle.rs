@@ -95,6 +95,7 @@ impl Throttles {
             }
         }
         self.schedule(topic);
+        self.tidy();
         VecDeque::new()
     }
 
@@ -144,11 +145,10 @@ impl Throttles {
         self.bytes += frame.len();
         throttle.held.push_back((number, frame));
         let first = throttle.held.len() == 1;
-        if throttle.held.len() > throttle.queue_length {
-            if let Some((_, replaced)) = throttle.held.pop_front() {
-                self.count -= 1;
-                self.bytes -= replaced.len();
-            }
+        let full = throttle.held.len() > throttle.queue_length;
+        if let Some((_, replaced)) = full.then(|| throttle.held.pop_front()).flatten() {
+            self.count -= 1;
+            self.bytes -= replaced.len();
         }
         self.ages.push_back((number, Arc::clone(topic)));
         if first {
@@ -256,5 +256,47 @@ impl Throttles {
             });
             self.releases.extend(due);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// One message is held back for a year, in front of all that comes after it in both indexes.
+    #[test]
+    fn the_indexes_stay_small_though_what_is_oldest_stays_for_long() {
+        let mut throttles = Throttles::default();
+        let (slow, fast) = (Arc::<str>::from("/slow"), Arc::<str>::from("/fast"));
+        let mut now = Instant::now();
+        let mut number = 0;
+        let mut offer = |throttles: &mut Throttles, topic, now| {
+            number += 1;
+            throttles.offer(topic, number, Bytes::from_static(b"x"), now)
+        };
+        throttles.set(&slow, Some((Duration::from_secs(365 * 24 * 3600), 1)));
+        throttles.set(&fast, Some((Duration::from_millis(1), 1)));
+        for _ in 0..2 {
+            offer(&mut throttles, &slow, now);
+        }
+        for round in 0..10_000 {
+            offer(&mut throttles, &fast, now);
+            offer(&mut throttles, &fast, now);
+            match round % 4 {
+                0 => throttles.discard(&fast),
+                1 => drop(throttles.set(&fast, Some((Duration::from_millis(1), 1)))),
+                2 => now += Duration::from_millis(2),
+                _ => {}
+            }
+            let _ = throttles.release(now);
+            assert!(
+                throttles.ages.len() <= 2 * 3 + SLACK + 1,
+                "{} ages",
+                throttles.ages.len()
+            );
+            let releases = throttles.releases.len();
+            assert!(releases <= 2 * 2 + SLACK + 1, "{releases} releases");
+        }
+        assert_eq!(throttles.oldest(), Some(2));
     }
 }

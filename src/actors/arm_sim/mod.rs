@@ -159,6 +159,7 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
                         connection: sender.connection,
                         frame,
                         service: None,
+                        done: Some(sender.done),
                     });
                 }
             }

@@ -12,6 +12,7 @@ use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 use crate::protocol::catalog::Service;
 use crate::protocol::fields::{Bound, Fields, Rejection};
+use crate::protocol::messages::Empty;
 use crate::protocol::op::Arguments;
 
 #[derive(Serialize)]
@@ -51,23 +52,23 @@ impl<const N: usize> ArmSim<N> {
         let ServiceCall {
             service,
             arguments,
-            mut reply,
+            reply,
         } = call;
         let nothing = Arguments::none();
         let mut fields = match read(&arguments, &nothing, service) {
             Ok(fields) => fields,
-            Err(rejection) => return reply.refuse(&rejection.to_string()),
+            Err(rejection) => return reply.conclude(&Empty {}, &rejection.to_string()),
         };
         match service {
             Service::SetIntegrator => {
                 let values = self.set_integrator(&mut fields);
-                reply.answer(&values, &fields.status());
+                reply.conclude(&values, &fields.status());
             }
             Service::SetParams => {
                 self.set_params(&mut fields);
                 let arm = self.simulation.arm();
                 let (gravity, masses, lengths) = (arm.gravity(), arm.masses(), arm.lengths());
-                reply.answer(
+                reply.conclude(
                     &Parameters {
                         gravity,
                         masses,
@@ -78,7 +79,7 @@ impl<const N: usize> ArmSim<N> {
             }
             Service::Pause => {
                 let data = self.pause(&mut fields);
-                reply.answer(&Switch { data }, &fields.status());
+                reply.conclude(&Switch { data }, &fields.status());
             }
             Service::Reset => {
                 // A reset has no fields: what is rejected here is `args` itself.
@@ -90,20 +91,20 @@ impl<const N: usize> ArmSim<N> {
                     position: &state.position,
                     velocity: &state.velocity,
                 };
-                reply.answer(&pose, &fields.status());
+                reply.conclude(&pose, &fields.status());
             }
             Service::Enable => {
                 let data = self.enable(&mut fields);
-                reply.answer(&Switch { data }, &fields.status());
+                reply.conclude(&Switch { data }, &fields.status());
             }
             Service::SetGains => {
                 self.set_gains(&mut fields);
                 let Gains { kp, ki, kd } = self.simulation.pid().gains();
-                reply.answer(&GainsOf { kp, ki, kd }, &fields.status());
+                reply.conclude(&GainsOf { kp, ki, kd }, &fields.status());
             }
             other => {
                 debug_assert!(false, "{} is not the arm's", other.name());
-                reply.refuse("the arm does not serve this");
+                reply.conclude(&Empty {}, "the arm does not serve this");
             }
         }
     }
@@ -178,7 +179,7 @@ impl<const N: usize> ArmSim<N> {
     }
 
     fn set_gains(&mut self, fields: &mut Fields) {
-        let mut gains = self.simulation.pid().gains().clone();
+        let mut gains = *self.simulation.pid().gains();
         for (name, values) in [
             ("kp", &mut gains.kp),
             ("ki", &mut gains.ki),

@@ -1,0 +1,46 @@
+//! Angles that differ by whole turns: which one is meant.
+//!
+//! Whole turns are taken away by the sine and cosine, whose argument the platform reduces by all the digits of π;
+//! subtracting a rounded 2π a million times would cost nine digits of a joint that has wound up.
+//!
+//! **Invariant:** an angle that is in range already comes back bit for bit.
+
+use std::f64::consts::PI;
+
+/// `angle` \[rad\] in (-π, π].
+#[must_use]
+pub fn wrap(angle: f64) -> f64 {
+    if -PI < angle && angle <= PI {
+        return angle;
+    }
+    let (sin, cos) = angle.sin_cos();
+    let wrapped = sin.atan2(cos);
+    if wrapped > -PI { wrapped } else { PI }
+}
+
+/// The shortest rotation \[rad\] that brings heading `from` to heading `to`, in [-π, π].
+#[must_use]
+pub fn turn(from: f64, to: f64) -> f64 {
+    let difference = to - from;
+    if difference.abs() <= PI {
+        return difference;
+    }
+    let (sin_from, cos_from) = from.sin_cos();
+    let (sin_to, cos_to) = to.sin_cos();
+    (sin_to * cos_from - cos_to * sin_from).atan2(cos_to * cos_from + sin_to * sin_from)
+}
+
+/// `solution` \[rad\] with each joint shifted by whole turns to within π of `present`, so that a wound-up arm does not
+/// unwind.
+///
+/// A `present` that is not finite leaves its joint as it is.
+#[must_use]
+pub fn nearest_turn<const N: usize>(solution: &[f64; N], present: &[f64; N]) -> [f64; N] {
+    let mut shifted = *solution;
+    for (joint, &present) in shifted.iter_mut().zip(present) {
+        if present.is_finite() && (*joint - present).abs() > PI {
+            *joint = present + turn(present, *joint);
+        }
+    }
+    shifted
+}

@@ -1,0 +1,289 @@
+//! Inverse kinematics of 2 and 3 links in closed form.
+//!
+//! With the wrist (the hand itself for 2 links) at distance `r` and bearing `β` from the base, the Law of Cosines closes
+//! the triangle `l₁, l₂, r`, and the last link is decoupled from it:
+//!
+//! ```text
+//! wrist = target - l₃ (cos φ, sin φ)      q₂ = ±(π - ∠(l₁, l₂))      q₁ = β ∓ ∠(l₁, r)      q₃ = φ - q₁ - q₂
+//! ```
+//!
+//! No angle is taken from a cosine: near the edges of reach half of its digits would be gone. Half-angle forms of the
+//! same law, factored so that only differences of given lengths occur, keep them all (W. Kahan, *Miscalculating Area and
+//! Angles of a Needle-like Triangle*).
+//!
+//! A 3-link arm that may choose its orientation has the wrist at distance `w`, `w² = r² + l₃² - 2 r l₃ cos θ`, with
+//! `θ = φ - β` and the target at distance `r`. That grows with `|θ|`, so `|l₁ - l₂| ≤ w ≤ l₁ + l₂` admits
+//! `θ₀ ≤ |θ| ≤ θ₁`, whose ends are angles of two more triangles.
+//!
+//! **Invariant:** what lies up to [`BOUNDARY`] outside the reach is solved as the boundary itself, and nothing else is
+//! ever moved.
+
+use glam::DVec2;
+
+use super::{Reach, Target, Unreachable, heading, turn, wrap};
+
+/// How far outside the reach a target still counts as on its edge, as a share of the sum of the lengths: far above what
+/// rounding can do to a boundary computed elsewhere (1e-13), far below what anybody could mean (1 nm per metre).
+pub const BOUNDARY: f64 = 1e-9;
+
+/// Rounding of a wrist's distance, as a share of the sum of the lengths: a difference of two vectors of that size, each
+/// good to a few units in the last place.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// Rounding of one joint angle \[rad\]: four units in the last place of π. Poses that differ by less are as near.
+const ANGLE_ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// Joint angles \[rad\], each in (-π, π], that put the hand of an arm with these `lengths` \[m\] on `target`.
+///
+/// `present` \[rad\] decides what the target leaves open. Of the two elbows the one with the smaller sum of squared
+/// wrapped differences from it is given, and `q₂ ≥ 0` where they are equally near. Three links without an orientation
+/// keep the present one if it is admissible and take the nearest admissible one otherwise, the counter-clockwise one of
+/// two that are equally near. Where the wrist is to be on the base itself, the first joint stays as it is.
+///
+/// `lengths` are finite and greater than 0, as an arm's are; a `present` that is not finite counts as 0.
+///
+/// # Errors
+///
+/// [`Unreachable`] says which limit is exceeded, and by which numbers.
+pub fn solve<const N: usize>(
+    lengths: &[f64; N],
+    present: &[f64; N],
+    target: &Target,
+) -> Result<[f64; N], Unreachable> {
+    debug_assert!(
+        lengths
+            .iter()
+            .all(|length| length.is_finite() && *length > 0.0),
+        "an arm's lengths are checked where they come in"
+    );
+    let present = present.map(|q| if q.is_finite() { q } else { 0.0 });
+    if !target.position.x.is_finite() {
+        return Err(Unreachable::NotFinite("x"));
+    }
+    if !target.position.y.is_finite() {
+        return Err(Unreachable::NotFinite("y"));
+    }
+    match *lengths.as_slice() {
+        [l1, l2] => {
+            let arm = Links::new(l1, l2, 0.0);
+            let hand = target.position / arm.unit;
+            let hand = arm.checked(arm.wrist_reach(), hand, target)?;
+            Ok(arm.nearest_elbow(hand, 0.0, &present))
+        }
+        [l1, l2, l3] => {
+            let arm = Links::new(l1, l2, l3);
+            let hand = target.position / arm.unit;
+            let (wrist, phi) = match target.orientation {
+                Some(phi) => arm.wrist_for(phi, hand, target)?,
+                None => arm.nearest_wrist(hand, &present, target)?,
+            };
+            Ok(arm.nearest_elbow(wrist, phi, &present))
+        }
+        _ => Err(Unreachable::Links(N)),
+    }
+}
+
+/// Lengths in multiples of a power of two near the longest, so that no square or sum of them overflows or vanishes.
+struct Links {
+    /// The power of two \[m\]; dividing by it is exact.
+    unit: f64,
+    l1: f64,
+    l2: f64,
+    /// 0 for an arm of two links, whose wrist is its hand.
+    l3: f64,
+}
+
+/// On which side of a reach a distance lies.
+enum Outside {
+    Beyond,
+    TooClose,
+}
+
+impl Links {
+    fn new(l1: f64, l2: f64, l3: f64) -> Self {
+        const EXPONENT: u64 = 0x7ff << 52;
+        let longest = l1.max(l2).max(l3);
+        let unit = f64::from_bits(longest.to_bits() & EXPONENT).max(f64::MIN_POSITIVE);
+        Self {
+            unit,
+            l1: l1 / unit,
+            l2: l2 / unit,
+            l3: l3 / unit,
+        }
+    }
+
+    /// Distances that links 1 and 2 give the wrist.
+    fn wrist_reach(&self) -> Reach {
+        Reach::of(&[self.l1, self.l2])
+    }
+
+    /// Whether a `distance` counts as in `reach`.
+    fn judged(&self, reach: Reach, distance: f64) -> Result<(), Outside> {
+        let slack = BOUNDARY * (self.l1 + self.l2 + self.l3);
+        if distance - reach.outer > slack {
+            Err(Outside::Beyond)
+        } else if reach.inner - distance > slack {
+            Err(Outside::TooClose)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// The hand, brought onto the boundary of the whole arm's `reach` where it lies just outside.
+    fn checked(&self, reach: Reach, hand: DVec2, target: &Target) -> Result<DVec2, Unreachable> {
+        let distance = hand.x.hypot(hand.y);
+        let DVec2 { x, y } = target.position;
+        match self.judged(reach, distance) {
+            Ok(()) if distance > reach.outer => Ok(hand * (reach.outer / distance)),
+            Ok(()) if 0.0 < distance && distance < reach.inner => {
+                Ok(reach.inner * DVec2::from_angle(hand.y.atan2(hand.x)))
+            }
+            Ok(()) => Ok(hand),
+            Err(Outside::Beyond) => Err(Unreachable::Beyond {
+                x,
+                y,
+                distance: x.hypot(y),
+                limit: reach.outer * self.unit,
+            }),
+            Err(Outside::TooClose) => Err(Unreachable::TooClose {
+                x,
+                y,
+                distance: x.hypot(y),
+                limit: reach.inner * self.unit,
+            }),
+        }
+    }
+
+    /// Where the wrist must be for the hand to point along `phi`, and `phi`.
+    fn wrist_for(
+        &self,
+        phi: f64,
+        hand: DVec2,
+        target: &Target,
+    ) -> Result<(DVec2, f64), Unreachable> {
+        if !phi.is_finite() {
+            return Err(Unreachable::NotFinite("phi"));
+        }
+        let wrist = hand - self.l3 * DVec2::from_angle(phi);
+        let distance = wrist.x.hypot(wrist.y);
+        let reach = self.wrist_reach();
+        let Err(side) = self.judged(reach, distance) else {
+            return Ok((wrist, wrap(phi)));
+        };
+        // Where no orientation would help, that is what the sender should hear.
+        self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
+        let distance = distance * self.unit;
+        Err(match side {
+            Outside::Beyond => Unreachable::WristBeyond {
+                phi,
+                distance,
+                limit: reach.outer * self.unit,
+            },
+            Outside::TooClose => Unreachable::WristTooClose {
+                phi,
+                distance,
+                limit: reach.inner * self.unit,
+            },
+        })
+    }
+
+    /// Where the wrist must be for the admissible orientation nearest to the present one, and that orientation.
+    fn nearest_wrist<const N: usize>(
+        &self,
+        hand: DVec2,
+        present: &[f64; N],
+        target: &Target,
+    ) -> Result<(DVec2, f64), Unreachable> {
+        let hand = self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
+        let present = heading(present);
+        let present_phi = present.y.atan2(present.x);
+
+        // Asked first, so that a present orientation is kept bit for bit, on the very edge of what is admissible too. On
+        // the base itself all orientations are admissible or none.
+        let reach = self.wrist_reach();
+        let wrist = hand - self.l3 * present;
+        let rounding = ROUNDING * (self.l1 + self.l2 + self.l3);
+        let present_distance = wrist.x.hypot(wrist.y);
+        let admissible = reach.inner - rounding..=reach.outer + rounding;
+        if admissible.contains(&present_distance) || hand == DVec2::ZERO {
+            return Ok((wrist, present_phi));
+        }
+
+        let distance = hand.x.hypot(hand.y);
+        let bearing = hand.y.atan2(hand.x);
+        let (sin, cos) = half_angle(distance, self.l3, reach.inner);
+        let least = 2.0 * sin.atan2(cos);
+        let (sin, cos) = half_angle(distance, self.l3, reach.outer);
+        let greatest = 2.0 * sin.atan2(cos);
+        let offset = wrap(turn(bearing, present_phi));
+        let nearest = offset.abs().max(least).min(greatest);
+        let phi = wrap(bearing + if offset < 0.0 { -nearest } else { nearest });
+        Ok((hand - self.l3 * DVec2::from_angle(phi), phi))
+    }
+
+    /// The joints that put the wrist there and turn the last link along `phi`, with the elbow nearer to `present`.
+    fn nearest_elbow<const N: usize>(
+        &self,
+        wrist: DVec2,
+        phi: f64,
+        present: &[f64; N],
+    ) -> [f64; N] {
+        let reach = self.wrist_reach();
+        let r = wrist.x.hypot(wrist.y).max(reach.inner).min(reach.outer);
+        let (sin, cos) = half_angle(self.l1, self.l2, r);
+        let bend = 2.0 * cos.atan2(sin);
+        let (sin, cos) = half_angle(self.l1, r, self.l2);
+        let lead = 2.0 * sin.atan2(cos);
+        let pose = |side: f64| -> [f64; N] {
+            // On the base itself the wrist has no bearing, and any first joint will do.
+            let q1 = if wrist == DVec2::ZERO {
+                present.first().copied().map_or(0.0, wrap)
+            } else {
+                wrap(wrist.y.atan2(wrist.x) - side * lead)
+            };
+            let q2 = wrap(side * bend);
+            std::array::from_fn(|i| match i {
+                0 => q1,
+                1 => q2,
+                _ => wrap(phi - q1 - q2),
+            })
+        };
+        nearer(pose(1.0), pose(-1.0), present)
+    }
+}
+
+/// The pose with the smaller sum of squared wrapped differences from `present`; `first` where they are equally near.
+fn nearer<const N: usize>(first: [f64; N], second: [f64; N], present: &[f64; N]) -> [f64; N] {
+    // Sums of the squares and of the sizes of the differences: the latter tell how far the former are rounded.
+    let measured = |pose: &[f64; N]| {
+        pose.iter()
+            .zip(present)
+            .fold((0.0, 0.0), |(squares, sizes), (&q, &present)| {
+                let difference = turn(present, q);
+                (squares + difference * difference, sizes + difference.abs())
+            })
+    };
+    let (first_squares, first_sizes) = measured(&first);
+    let (second_squares, second_sizes) = measured(&second);
+    let rounding = ANGLE_ROUNDING * (first_sizes + second_sizes);
+    if second_squares < first_squares - rounding {
+        second
+    } else {
+        first
+    }
+}
+
+/// Sine and cosine of half the angle between sides `p` and `q` of a triangle whose third side is `w`, both up to one
+/// common factor. Sides that do not close a triangle give the flat one nearest to it.
+fn half_angle(p: f64, q: f64, w: f64) -> (f64, f64) {
+    let (long, short) = if p >= q { (p, q) } else { (q, p) };
+    // Each difference is taken between the two sides that are nearest in size, where it is exact.
+    let excess = if short >= w {
+        w - (long - short)
+    } else {
+        short - (long - w)
+    };
+    let sin = excess.max(0.0).sqrt() * (w + (long - short)).sqrt();
+    let cos = ((long - w) + short).max(0.0).sqrt() * (long + short + w).sqrt();
+    (sin, cos)
+}

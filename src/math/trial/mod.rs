@@ -1,0 +1,384 @@
+//! A timed trial: one random target after another, counted as the arm reaches them.
+//!
+//! A [`Trial`] is told what happens and says what to do about it, as a list of [`Action`]s; the actor around it only
+//! carries messages. It knows no arm: targets come from a closure (usually around [`sample`]), goals are somebody
+//! else's and known by their ids, and the time is the simulation time that [`Trial::tick`] is told, before anything else
+//! that happened at that time.
+//!
+//! ```text
+//!                    start                       accepted                    concluded: reached
+//! no pursuit ──────────────────────▶ asked ──────────────────▶ in flight ───────────────────────▶ asked (the next)
+//!     ▲      start, skip               │ refused too often         │ concluded: preempted by somebody else
+//!     └────────────────────────────────┴───────────────────────────┘ stop, or the duration is over
+//! ```
+//!
+//! **Invariant:** only the result of the goal in flight counts: whatever arrives about any older goal changes nothing.
+
+mod sampling;
+mod terms;
+
+use super::goal::{Outcome, rounding};
+use super::kinematics::Target;
+
+pub use sampling::sample;
+pub use terms::{Action, ActionStatus, Changes, Conclusion, DURATION, Rejection, Settings, Status};
+
+/// How often a target that was refused is replaced before the trial waits. A sampled target is refused only when the
+/// lengths change between sampling and solving, so that a second refusal in a row is rare already.
+pub const ATTEMPTS: u32 = 8;
+
+/// Results kept that came before the answer which says whether they are ours; more than two never wait in order.
+const EARLY_RESULTS: usize = 4;
+
+/// Simulation time since a start, added up over resets of the simulation clock.
+#[derive(Debug, Clone, Copy)]
+struct Clock {
+    /// Time before the clock was last set back \[s\].
+    carried: f64,
+    origin: f64,
+    latest: f64,
+}
+
+impl Clock {
+    const fn started(now: f64) -> Self {
+        Self {
+            carried: 0.0,
+            origin: now,
+            latest: now,
+        }
+    }
+
+    /// A difference, not a running sum: what rounding there is does not grow with the number of questions.
+    fn elapsed(&self) -> f64 {
+        self.carried + (self.latest - self.origin)
+    }
+
+    fn tell(&mut self, now: f64) {
+        if now < self.latest {
+            self.carried = self.elapsed();
+            self.origin = now;
+        }
+        self.latest = now;
+    }
+}
+
+/// What the trial is after.
+#[derive(Debug, Clone, PartialEq)]
+enum Pursuit {
+    Nothing,
+    /// A goal has been sent, and its id is not known yet.
+    Asked {
+        ticket: u64,
+        target: Target,
+        attempt: u32,
+        /// Results heard since; one may be this goal's.
+        early: Vec<Conclusion>,
+    },
+    InFlight {
+        goal_id: String,
+    },
+}
+
+/// The part of the status that belongs to one goal.
+#[derive(Debug, Clone, PartialEq)]
+struct View {
+    target: Option<Target>,
+    error: Option<f64>,
+    desired_positions: Option<Vec<f64>>,
+    action_status: ActionStatus,
+}
+
+impl View {
+    const fn of(target: Option<Target>, action_status: ActionStatus) -> Self {
+        Self {
+            target,
+            error: None,
+            desired_positions: None,
+            action_status,
+        }
+    }
+}
+
+/// A trial harness: at most one trial at a time, none before the first start.
+#[derive(Debug, Clone)]
+pub struct Trial {
+    settings: Settings,
+    /// None before the first start.
+    clock: Option<Clock>,
+    running: bool,
+    targets_reached: u64,
+    pursuit: Pursuit,
+    view: View,
+    /// Goals sent so far; never starts over, so that an answer to an older start is known as such.
+    tickets: u64,
+}
+
+impl Default for Trial {
+    fn default() -> Self {
+        Self {
+            settings: Settings::default(),
+            clock: None,
+            running: false,
+            targets_reached: 0,
+            pursuit: Pursuit::Nothing,
+            view: View::of(None, ActionStatus::Idle),
+            tickets: 0,
+        }
+    }
+}
+
+impl Trial {
+    /// What the status shows; none before the first start.
+    #[must_use]
+    pub fn status(&self) -> Option<Status> {
+        let clock = self.clock?;
+        let View {
+            target,
+            error,
+            desired_positions,
+            action_status,
+        } = self.view.clone();
+        Some(Status {
+            running: self.running,
+            elapsed: clock.elapsed().min(self.settings.duration),
+            duration: self.settings.duration,
+            targets_reached: self.targets_reached,
+            target,
+            error,
+            desired_positions,
+            action_status,
+        })
+    }
+
+    /// The settings in force.
+    #[must_use]
+    pub const fn settings(&self) -> Settings {
+        self.settings
+    }
+
+    /// Whether a trial runs.
+    #[must_use]
+    pub const fn running(&self) -> bool {
+        self.running
+    }
+
+    /// Simulation time that a running trial has left \[s\]; none when no trial runs.
+    #[must_use]
+    pub fn remaining(&self) -> Option<f64> {
+        let clock = self.clock.filter(|_| self.running)?;
+        Some((self.settings.duration - clock.elapsed()).max(0.0))
+    }
+
+    /// Tells the simulation time \[s\]; ends the trial when its duration is over.
+    ///
+    /// A time before the last one told means that the simulation clock was reset: it adds nothing.
+    #[must_use]
+    pub fn tick(&mut self, now: f64) -> Vec<Action> {
+        let Some(clock) = self.clock.as_mut().filter(|_| self.running) else {
+            return Vec::new();
+        };
+        clock.tell(now);
+        if clock.elapsed() + rounding(now) >= self.settings.duration {
+            self.end()
+        } else {
+            Vec::new()
+        }
+    }
+
+    /// Starts a trial at simulation time `now` \[s\], in place of one that may be running.
+    ///
+    /// # Errors
+    ///
+    /// [`Rejection::NoTarget`] if `sample` has none; settings and running trial are as before.
+    pub fn start(
+        &mut self,
+        now: f64,
+        changes: Changes,
+        sample: impl FnOnce() -> Option<Target>,
+    ) -> Result<Vec<Action>, Rejection> {
+        let target = sample().ok_or(Rejection::NoTarget)?;
+        self.settings = changes.to(self.settings);
+        self.clock = Some(Clock::started(now));
+        self.running = true;
+        self.targets_reached = 0;
+        Ok(self.replace(target))
+    }
+
+    /// Abandons the target in flight, uncounted, for a new one.
+    ///
+    /// # Errors
+    ///
+    /// [`Rejection::NotRunning`] when no trial runs, [`Rejection::NoTarget`] if `sample` has none.
+    pub fn skip(
+        &mut self,
+        sample: impl FnOnce() -> Option<Target>,
+    ) -> Result<Vec<Action>, Rejection> {
+        if !self.running {
+            return Err(Rejection::NotRunning);
+        }
+        let target = sample().ok_or(Rejection::NoTarget)?;
+        Ok(self.replace(target))
+    }
+
+    /// Ends the trial early.
+    ///
+    /// # Errors
+    ///
+    /// [`Rejection::NotRunning`] when no trial runs.
+    pub fn stop(&mut self) -> Result<Vec<Action>, Rejection> {
+        if self.running {
+            Ok(self.end())
+        } else {
+            Err(Rejection::NotRunning)
+        }
+    }
+
+    /// The goal sent under `ticket` has been accepted under `goal_id`.
+    #[must_use]
+    pub fn accepted(
+        &mut self,
+        ticket: u64,
+        goal_id: &str,
+        sample: impl FnOnce() -> Option<Target>,
+    ) -> Vec<Action> {
+        match std::mem::replace(&mut self.pursuit, Pursuit::Nothing) {
+            Pursuit::Asked {
+                ticket: asked,
+                target,
+                early,
+                ..
+            } if asked == ticket => {
+                self.pursuit = Pursuit::InFlight {
+                    goal_id: goal_id.to_owned(),
+                };
+                self.view = View::of(Some(target), ActionStatus::Active);
+                let mut actions = vec![Action::PublishStatus];
+                if let Some(early) = early.into_iter().find(|early| early.goal_id == goal_id) {
+                    actions.extend(self.concluded(early, sample));
+                }
+                actions
+            }
+            other => {
+                // Nobody wants this goal any more, and the arm must not go on pursuing it.
+                self.pursuit = other;
+                vec![Action::CancelGoal {
+                    goal_id: goal_id.to_owned(),
+                }]
+            }
+        }
+    }
+
+    /// The goal sent under `ticket` has been rejected; another target is tried, [`ATTEMPTS`] in all.
+    #[must_use]
+    pub fn refused(&mut self, ticket: u64, sample: impl FnOnce() -> Option<Target>) -> Vec<Action> {
+        let attempt = match &self.pursuit {
+            Pursuit::Asked {
+                ticket: asked,
+                attempt,
+                ..
+            } if *asked == ticket => attempt + 1,
+            _ => return Vec::new(),
+        };
+        if attempt <= ATTEMPTS
+            && let Some(target) = sample()
+        {
+            let send = self.ask(target, attempt);
+            self.view = View::of(Some(target), ActionStatus::Idle);
+            return vec![send, Action::PublishStatus];
+        }
+        self.pursuit = Pursuit::Nothing;
+        self.view = View::of(None, ActionStatus::Idle);
+        vec![Action::PublishStatus]
+    }
+
+    /// Feedback on a goal, anybody's: the hand's `distance` from its target \[m\], and the `positions` it commands
+    /// \[rad\].
+    pub fn feedback(&mut self, goal_id: &str, distance: f64, positions: &[f64]) {
+        if self.is_in_flight(goal_id) {
+            self.view.error = Some(distance);
+            let desired = self.view.desired_positions.get_or_insert_default();
+            desired.clear();
+            desired.extend_from_slice(positions);
+        }
+    }
+
+    /// A goal, anybody's, has ended. The one in flight is counted if it was reached, and the next target wanted.
+    #[must_use]
+    pub fn concluded(
+        &mut self,
+        conclusion: Conclusion,
+        sample: impl FnOnce() -> Option<Target>,
+    ) -> Vec<Action> {
+        if let Pursuit::Asked { early, .. } = &mut self.pursuit {
+            if early.len() == EARLY_RESULTS {
+                early.remove(0);
+            }
+            early.push(conclusion);
+            return Vec::new();
+        }
+        if !self.is_in_flight(&conclusion.goal_id) {
+            return Vec::new();
+        }
+        self.pursuit = Pursuit::Nothing;
+        match conclusion.outcome {
+            Outcome::Reached => {
+                self.targets_reached += 1;
+                // Shown until the next goal is accepted, so that it is seen at all.
+                self.view.action_status = ActionStatus::Reached;
+                self.view.error = Some(conclusion.final_distance);
+                let next = sample().map(|target| self.ask(target, 1));
+                std::iter::once(Action::PublishStatus).chain(next).collect()
+            }
+            Outcome::Preempted => {
+                self.view = View::of(self.view.target, ActionStatus::Preempted);
+                vec![Action::PublishStatus]
+            }
+        }
+    }
+
+    fn is_in_flight(&self, goal_id: &str) -> bool {
+        matches!(&self.pursuit, Pursuit::InFlight { goal_id: ours } if ours == goal_id)
+    }
+
+    /// Drops whatever is pursued and goes for `target`.
+    fn replace(&mut self, target: Target) -> Vec<Action> {
+        // The new goal would preempt the old one, but not if it is refused.
+        let mut actions = self.abandon();
+        actions.push(self.ask(target, 1));
+        self.view = View::of(Some(target), ActionStatus::Idle);
+        actions.push(Action::PublishStatus);
+        actions
+    }
+
+    fn end(&mut self) -> Vec<Action> {
+        let mut actions = self.abandon();
+        self.running = false;
+        self.view = View::of(None, ActionStatus::Idle);
+        actions.push(Action::PublishStatus);
+        actions
+    }
+
+    fn abandon(&mut self) -> Vec<Action> {
+        match std::mem::replace(&mut self.pursuit, Pursuit::Nothing) {
+            Pursuit::InFlight { goal_id } => vec![Action::CancelGoal { goal_id }],
+            // A goal without an id is cancelled when it gets one.
+            Pursuit::Asked { .. } | Pursuit::Nothing => Vec::new(),
+        }
+    }
+
+    fn ask(&mut self, target: Target, attempt: u32) -> Action {
+        self.tickets += 1;
+        let ticket = self.tickets;
+        self.pursuit = Pursuit::Asked {
+            ticket,
+            target,
+            attempt,
+            early: Vec::new(),
+        };
+        Action::SendGoal {
+            ticket,
+            target,
+            criteria: self.settings.criteria,
+        }
+    }
+}

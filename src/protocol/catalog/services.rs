@@ -1,0 +1,268 @@
+//! The services: one entry each.
+//!
+//! **Invariant:** a service without an entry does not compile.
+
+use super::{Field, Node, optional, required};
+
+/// A service of the runtime's own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Service {
+    /// Integrates a particle of one degree of freedom, apart from the arm.
+    IntegrationStep,
+    /// Method and timestep of the live arm.
+    SetIntegrator,
+    /// Gravity, masses and lengths.
+    SetParams,
+    /// Freezes and resumes simulation time.
+    Pause,
+    /// Back to the starting pose at time 0.
+    Reset,
+    /// The controller on or off.
+    Enable,
+    /// The controller's gains.
+    SetGains,
+    /// Joint positions for a tip position.
+    Solve,
+    /// Drives the arm to a tip position.
+    SendGoal,
+    /// Preempts the active goal.
+    CancelGoal,
+    /// Starts a timed trial afresh.
+    TrialStart,
+    /// Abandons the trial's present target for a new one.
+    TrialSkip,
+    /// Ends the trial.
+    TrialStop,
+}
+
+impl Service {
+    /// All services, in the order in which they are documented.
+    pub const ALL: [Self; 13] = [
+        Self::IntegrationStep,
+        Self::SetIntegrator,
+        Self::SetParams,
+        Self::Pause,
+        Self::Reset,
+        Self::Enable,
+        Self::SetGains,
+        Self::Solve,
+        Self::SendGoal,
+        Self::CancelGoal,
+        Self::TrialStart,
+        Self::TrialSkip,
+        Self::TrialStop,
+    ];
+
+    const fn entry(self) -> &'static ServiceEntry {
+        match self {
+            Self::IntegrationStep => &INTEGRATION_STEP,
+            Self::SetIntegrator => &SET_INTEGRATOR,
+            Self::SetParams => &SET_PARAMS,
+            Self::Pause => &PAUSE,
+            Self::Reset => &RESET,
+            Self::Enable => &ENABLE,
+            Self::SetGains => &SET_GAINS,
+            Self::Solve => &SOLVE,
+            Self::SendGoal => &SEND_GOAL,
+            Self::CancelGoal => &CANCEL_GOAL,
+            Self::TrialStart => &TRIAL_START,
+            Self::TrialSkip => &TRIAL_SKIP,
+            Self::TrialStop => &TRIAL_STOP,
+        }
+    }
+
+    /// The service's name on the wire.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// The service of that name, if it is the runtime's own.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|service| service.name() == name)
+    }
+
+    /// The service type, as ROS writes it.
+    #[must_use]
+    pub const fn type_name(self) -> &'static str {
+        self.entry().type_name
+    }
+
+    /// The node that provides the service.
+    #[must_use]
+    pub const fn owner(self) -> Node {
+        self.entry().owner
+    }
+
+    /// Whether it is a pure computation: answered when it is done, perhaps out of order, from a queue of its own.
+    #[must_use]
+    pub const fn is_computation(self) -> bool {
+        matches!(self, Self::IntegrationStep)
+    }
+
+    /// Whether one bad field rejects the whole request. There, `null` in an optional field means absent.
+    #[must_use]
+    pub const fn all_or_nothing(self) -> bool {
+        matches!(
+            self,
+            Self::IntegrationStep | Self::Solve | Self::SendGoal | Self::TrialStart
+        )
+    }
+
+    /// The fields of a request, in the order of a positional `args` array.
+    #[must_use]
+    pub const fn fields(self) -> &'static [Field] {
+        self.entry().request
+    }
+
+    /// The fields of the `values` of a response that reports success, in the order in which they are written.
+    #[must_use]
+    pub const fn response_fields(self) -> &'static [Field] {
+        self.entry().response
+    }
+}
+
+struct ServiceEntry {
+    name: &'static str,
+    type_name: &'static str,
+    owner: Node,
+    request: &'static [Field],
+    response: &'static [Field],
+}
+
+const INTEGRATION_STEP: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/integration_step",
+    type_name: "pendularm_interfaces/srv/IntegrationStep",
+    owner: Node::ArmSim,
+    request: &[
+        required("function", "string", "m/s^2, of t in s"),
+        required("x0", "float64", "m"),
+        optional("xdot0", "float64", "m/s"),
+        required("dt", "float64", "s"),
+        required("steps", "uint64", ""),
+        required("integrator", "string", ""),
+    ],
+    response: &[
+        required("times", "float64[]", "s"),
+        required("positions", "float64[]", "m"),
+        required("velocities", "float64[]", "m/s"),
+    ],
+};
+const SET_INTEGRATOR: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/set_integrator",
+    type_name: "pendularm_interfaces/srv/SetIntegrator",
+    owner: Node::ArmSim,
+    request: &METHOD,
+    response: &METHOD,
+};
+const METHOD: [Field; 2] = [
+    optional("method", "string", ""),
+    optional("timestep", "float64", "s"),
+];
+const SET_PARAMS: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/set_params",
+    type_name: "pendularm_interfaces/srv/SetParams",
+    owner: Node::ArmSim,
+    request: &PARAMS,
+    response: &PARAMS,
+};
+const PARAMS: [Field; 3] = [
+    optional("gravity", "float64", "m/s^2"),
+    optional("masses", "float64[]", "kg"),
+    optional("lengths", "float64[]", "m"),
+];
+const PAUSE: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/pause",
+    type_name: "pendularm_interfaces/srv/Pause",
+    owner: Node::ArmSim,
+    request: &SWITCH,
+    response: &SWITCH,
+};
+const ENABLE: ServiceEntry = ServiceEntry {
+    name: "/pid_controller/enable",
+    type_name: "pendularm_interfaces/srv/Enable",
+    owner: Node::ArmSim,
+    request: &SWITCH,
+    response: &SWITCH,
+};
+const SWITCH: [Field; 1] = [optional("data", "bool", "")];
+const RESET: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/reset",
+    type_name: "pendularm_interfaces/srv/Reset",
+    owner: Node::ArmSim,
+    request: &[],
+    response: &[
+        required("position", "float64[]", "rad"),
+        required("velocity", "float64[]", "rad/s"),
+    ],
+};
+const SET_GAINS: ServiceEntry = ServiceEntry {
+    name: "/pid_controller/set_gains",
+    type_name: "pendularm_interfaces/srv/SetGains",
+    owner: Node::ArmSim,
+    request: &GAINS,
+    response: &GAINS,
+};
+const GAINS: [Field; 3] = [
+    optional("kp", "float64[]", "N m/rad"),
+    optional("ki", "float64[]", "N m/(rad s)"),
+    optional("kd", "float64[]", "N m s/rad"),
+];
+const SOLVE: ServiceEntry = ServiceEntry {
+    name: "/ik/solve",
+    type_name: "pendularm_interfaces/srv/Solve",
+    owner: Node::Ik,
+    request: &[
+        required("x", "float64", "m"),
+        required("y", "float64", "m"),
+        optional("phi", "float64", "rad"),
+    ],
+    response: &[required("positions", "float64[]", "rad")],
+};
+const SEND_GOAL: ServiceEntry = ServiceEntry {
+    name: "/ik_action/send_goal",
+    type_name: "pendularm_interfaces/srv/SendGoal",
+    owner: Node::IkAction,
+    request: &[
+        required("x", "float64", "m"),
+        required("y", "float64", "m"),
+        optional("phi", "float64", "rad"),
+        optional("epsilon", "float64", "m"),
+        optional("success_hold", "float64", "s"),
+    ],
+    response: &[required("goal_id", "string", "")],
+};
+const CANCEL_GOAL: ServiceEntry = ServiceEntry {
+    name: "/ik_action/cancel_goal",
+    type_name: "pendularm_interfaces/srv/CancelGoal",
+    owner: Node::IkAction,
+    request: &[optional("goal_id", "string", "")],
+    response: &[],
+};
+const TRIAL_START: ServiceEntry = ServiceEntry {
+    name: "/ik_trial/start",
+    type_name: "pendularm_interfaces/srv/TrialStart",
+    owner: Node::IkTrial,
+    request: &TRIAL,
+    response: &TRIAL,
+};
+const TRIAL: [Field; 3] = [
+    optional("duration", "float64", "s"),
+    optional("epsilon", "float64", "m"),
+    optional("success_hold", "float64", "s"),
+];
+const TRIAL_SKIP: ServiceEntry = ServiceEntry {
+    name: "/ik_trial/skip",
+    type_name: "pendularm_interfaces/srv/TrialSkip",
+    owner: Node::IkTrial,
+    request: &[],
+    response: &[],
+};
+const TRIAL_STOP: ServiceEntry = ServiceEntry {
+    name: "/ik_trial/stop",
+    type_name: "pendularm_interfaces/srv/TrialStop",
+    owner: Node::IkTrial,
+    request: &[],
+    response: &[],
+};

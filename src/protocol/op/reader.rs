@@ -1,0 +1,262 @@
+//! Reads an operation from a frame.
+//!
+//! **Invariant:** a member is looked at only for the operations that have it; of every other its syntax alone counts.
+
+use std::borrow::Cow;
+use std::time::Duration;
+
+use serde_json::value::RawValue;
+
+use super::{
+    Arguments, CallService, Incoming, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
+    OpError, Problem, Subscribe,
+};
+use crate::protocol::{json, text};
+
+/// Characters of the JSON parser's complaint that go into a message: it may quote the client.
+const MAX_COMPLAINT: usize = 160;
+
+/// The members of a frame that mean something to us.
+const KEYS: [&str; 13] = [
+    "op",
+    "id",
+    "topic",
+    "type",
+    "msg",
+    "throttle_rate",
+    "queue_length",
+    "service",
+    "args",
+    "timeout",
+    "values",
+    "result",
+    "status",
+];
+
+/// The operations that we know.
+const OPS: [&str; 9] = [
+    "advertise",
+    "unadvertise",
+    "publish",
+    "subscribe",
+    "unsubscribe",
+    "advertise_service",
+    "unadvertise_service",
+    "call_service",
+    "service_response",
+];
+
+/// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
+#[must_use]
+pub fn read(frame: &str) -> Incoming {
+    let members = match json::members(frame, &KEYS) {
+        Ok(members) => members,
+        Err(error) => {
+            let complaint = text::shortened(&error.to_string(), MAX_COMPLAINT);
+            return Incoming {
+                id: None,
+                op: Err(OpError::Status(Problem::NotJson(complaint))),
+            };
+        }
+    };
+    let reader = Reader { op: "", members };
+    let id = reader.get("id").map(ToOwned::to_owned);
+    let op = match reader.known_op() {
+        Ok(op @ "call_service") => Reader { op, ..reader }.call(),
+        Ok(op) => Reader { op, ..reader }.other().map_err(OpError::Status),
+        Err(problem) => Err(OpError::Status(problem)),
+    };
+    Incoming { id, op }
+}
+
+/// Reads the members of one frame.
+struct Reader<'a> {
+    op: &'static str,
+    members: [Option<&'a RawValue>; KEYS.len()],
+}
+
+impl<'a> Reader<'a> {
+    fn known_op(&self) -> Result<&'static str, Problem> {
+        let raw = self.get("op").ok_or(Problem::NoOp)?;
+        let op = json::text(raw).ok_or_else(|| Problem::OpNotText(text::found(raw)))?;
+        OPS.into_iter()
+            .find(|known| *known == op)
+            .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
+    }
+
+    /// A call. As soon as its service is known it can be answered as a call, whatever else is wrong.
+    fn call(&self) -> Result<Op, OpError> {
+        let service = self.name("service").map_err(OpError::Status)?;
+        let rest = self.args().and_then(|args| Ok((args, self.timeout()?)));
+        match rest {
+            Ok((args, timeout)) => Ok(Op::CallService(CallService {
+                service,
+                args,
+                timeout,
+            })),
+            Err(problem) => Err(OpError::Call { service, problem }),
+        }
+    }
+
+    /// Any other operation.
+    fn other(&self) -> Result<Op, Problem> {
+        Ok(match self.op {
+            "advertise" => Op::Advertise {
+                topic: self.name("topic")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise" => Op::Unadvertise {
+                topic: self.name("topic")?,
+            },
+            "publish" => Op::Publish {
+                topic: self.name("topic")?,
+                msg: self.message()?,
+            },
+            "subscribe" => Op::Subscribe(self.subscription()?),
+            "unsubscribe" => Op::Unsubscribe {
+                topic: self.name("topic")?,
+            },
+            "advertise_service" => Op::AdvertiseService {
+                service: self.name("service")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_service" => Op::UnadvertiseService {
+                service: self.name("service")?,
+            },
+            _ => self.response()?,
+        })
+    }
+
+    fn subscription(&self) -> Result<Subscribe, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        Ok(Subscribe {
+            topic: self.name("topic")?,
+            type_name: self.optional_text("type")?,
+            throttle: self.throttle()?,
+            queue_length: self.queue_length()?,
+        })
+    }
+
+    fn response(&self) -> Result<Op, Problem> {
+        self.required("id")?;
+        Ok(Op::ServiceResponse {
+            service: self.name("service")?,
+            values: self.required("values")?.to_owned(),
+            result: self.boolean("result")?,
+            status: self.get("status").and_then(json::text).map(Cow::into_owned),
+        })
+    }
+
+    /// The member of that name; it is one of [`KEYS`].
+    fn get(&self, field: &'static str) -> Option<&'a RawValue> {
+        let index = KEYS.iter().position(|key| *key == field)?;
+        self.members.get(index).copied().flatten()
+    }
+
+    fn required(&self, field: &'static str) -> Result<&'a RawValue, Problem> {
+        self.get(field)
+            .ok_or(Problem::Missing { op: self.op, field })
+    }
+
+    fn mistyped(&self, field: &'static str, expected: &'static str, raw: &RawValue) -> Problem {
+        Problem::Mistyped {
+            op: self.op,
+            field,
+            expected,
+            found: text::found(raw),
+        }
+    }
+
+    /// A topic or service name.
+    fn name(&self, field: &'static str) -> Result<String, Problem> {
+        let raw = self.required(field)?;
+        let name = json::text(raw).filter(|name| !name.is_empty());
+        let name = name.ok_or_else(|| self.mistyped(field, "a non-empty string", raw))?;
+        self.short(field, &name)?;
+        Ok(name.into_owned())
+    }
+
+    fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
+        if text.len() <= MAX_NAME {
+            return Ok(());
+        }
+        Err(Problem::TooLong {
+            op: self.op,
+            field,
+            length: text.len(),
+        })
+    }
+
+    fn optional_text(&self, field: &'static str) -> Result<Option<String>, Problem> {
+        let Some(raw) = self.get(field) else {
+            return Ok(None);
+        };
+        let text = json::text(raw).ok_or_else(|| self.mistyped(field, "a string", raw))?;
+        self.short(field, &text)?;
+        Ok(Some(text.into_owned()))
+    }
+
+    fn boolean(&self, field: &'static str) -> Result<bool, Problem> {
+        let raw = self.required(field)?;
+        json::boolean(raw).ok_or_else(|| self.mistyped(field, "true or false", raw))
+    }
+
+    /// A ROS message is an object.
+    fn message(&self) -> Result<Box<RawValue>, Problem> {
+        let raw = self.required("msg")?;
+        if raw.get().starts_with('{') {
+            return Ok(raw.to_owned());
+        }
+        Err(self.mistyped("msg", "an object", raw))
+    }
+
+    fn throttle(&self) -> Result<Duration, Problem> {
+        let Some(raw) = self.get("throttle_rate") else {
+            return Ok(Duration::ZERO);
+        };
+        let throttle_ms = json::number(raw)
+            .filter(|rate| rate.is_finite() && *rate >= 0.0)
+            .ok_or_else(|| self.mistyped("throttle_rate", "a number of ms, at least 0", raw))?;
+        Ok(duration(throttle_ms / 1000.0, MAX_THROTTLE))
+    }
+
+    fn queue_length(&self) -> Result<usize, Problem> {
+        let Some(raw) = self.get("queue_length") else {
+            return Ok(1);
+        };
+        let length = json::integer(raw)
+            .ok_or_else(|| self.mistyped("queue_length", "an integer, at least 0", raw))?;
+        Ok(usize::try_from(length)
+            .unwrap_or(MAX_QUEUE_LENGTH)
+            .clamp(1, MAX_QUEUE_LENGTH))
+    }
+
+    fn args(&self) -> Result<Arguments, Problem> {
+        let Some(raw) = self.get("args") else {
+            return Ok(Arguments::none());
+        };
+        match raw.get().as_bytes().first() {
+            Some(b'{') => Ok(Arguments::Object(raw.to_owned())),
+            Some(b'[') => Ok(Arguments::Positional(raw.to_owned())),
+            Some(b'n') => Ok(Arguments::none()),
+            _ => Err(self.mistyped("args", "an object or an array", raw)),
+        }
+    }
+
+    fn timeout(&self) -> Result<Option<Duration>, Problem> {
+        let Some(raw) = self.get("timeout") else {
+            return Ok(None);
+        };
+        let timeout = json::number(raw)
+            .filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+            .ok_or_else(|| self.mistyped("timeout", "a number of seconds greater than 0", raw))?;
+        Ok(Some(duration(timeout, MAX_TIMEOUT)))
+    }
+}
+
+/// A finite number of seconds, 0 or more, as a duration of at most `longest`.
+fn duration(seconds: f64, longest: Duration) -> Duration {
+    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
+}
