@@ -124,8 +124,8 @@ pub struct GoalJudged<const N: usize> {
 impl<const N: usize> Handler<ArmPose<N>> for ArmSim<N> {
     type Result = Pose<N>;
 
-    fn handle(&mut self, _: ArmPose<N>, _: &mut Context<Self>) -> Pose<N> {
-        self.advance_to_now();
+    fn handle(&mut self, _: ArmPose<N>, ctx: &mut Context<Self>) -> Pose<N> {
+        self.advance_to_now(ctx);
         pose(&self.simulation, self.goals.before_reset)
     }
 }
@@ -133,8 +133,8 @@ impl<const N: usize> Handler<ArmPose<N>> for ArmSim<N> {
 impl<const N: usize> Handler<TrackGoal<N>> for ArmSim<N> {
     type Result = Tracking<N>;
 
-    fn handle(&mut self, message: TrackGoal<N>, _: &mut Context<Self>) -> Tracking<N> {
-        self.advance_to_now();
+    fn handle(&mut self, message: TrackGoal<N>, ctx: &mut Context<Self>) -> Tracking<N> {
+        self.advance_to_now(ctx);
         self.goals.preempt(&self.simulation);
         let before = self.goals.latest;
         self.goals.tracked = Some(Tracked {
@@ -154,8 +154,8 @@ impl<const N: usize> Handler<TrackGoal<N>> for ArmSim<N> {
 impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
     type Result = Option<GoalJudged<N>>;
 
-    fn handle(&mut self, EndGoal { number }: EndGoal<N>, _: &mut Context<Self>) -> Self::Result {
-        self.advance_to_now();
+    fn handle(&mut self, EndGoal { number }: EndGoal<N>, ctx: &mut Context<Self>) -> Self::Result {
+        self.advance_to_now(ctx);
         if self.goals.is_tracked(number) {
             self.goals.preempt(&self.simulation);
         }
@@ -167,7 +167,7 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     /// Takes up to `steps` steps; fewer where a goal is reached on the way, or the simulation diverges.
-    pub(super) fn take_steps(&mut self, steps: u64) -> u64 {
+    pub(super) fn advance(&mut self, steps: u64) -> u64 {
         let before_reset = self.goals.before_reset;
         let tracked = self.goals.tracked.as_mut();
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {

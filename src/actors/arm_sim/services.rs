@@ -12,8 +12,9 @@ use crate::math::arm::{Arm, ArmError};
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 use crate::protocol::catalog::Service;
-use crate::protocol::fields::{Bound, Fields};
+use crate::protocol::fields::{Bound, Fields, Rejection};
 use crate::protocol::messages::Empty;
+use crate::protocol::op::Arguments;
 
 #[derive(Serialize)]
 struct Integrator {
@@ -54,7 +55,8 @@ impl<const N: usize> ArmSim<N> {
             arguments,
             reply,
         } = call;
-        let mut fields = match Fields::read(&arguments, service) {
+        let nothing = Arguments::none();
+        let mut fields = match read(&arguments, &nothing, service) {
             Ok(fields) => fields,
             Err(rejection) => return reply.conclude(&Empty {}, &rejection.to_string()),
         };
@@ -81,8 +83,13 @@ impl<const N: usize> ArmSim<N> {
                 reply.conclude(&Switch { data }, &fields.status());
             }
             Service::Reset => {
-                let ended = self.reset();
-                self.answer_reset(reply, ended, ctx);
+                // A reset has no fields: what is rejected here is `args` itself.
+                let ended = if fields.accepted() {
+                    self.reset()
+                } else {
+                    None
+                };
+                self.answer_reset(reply, fields.status(), ended, ctx);
             }
             Service::Enable => {
                 let data = self.enable(&mut fields);
@@ -166,6 +173,7 @@ impl<const N: usize> ArmSim<N> {
     fn answer_reset(
         &self,
         reply: Reply,
+        status: String,
         ended: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
         ctx: &mut Context<Self>,
     ) {
@@ -175,7 +183,7 @@ impl<const N: usize> ArmSim<N> {
                 position: &state.position,
                 velocity: &state.velocity,
             };
-            reply.conclude(&pose, "");
+            reply.conclude(&pose, &status);
         };
         match ended {
             None => answer(),
@@ -209,6 +217,20 @@ impl<const N: usize> ArmSim<N> {
         }
         self.simulation.set_gains(gains);
     }
+}
+
+/// The fields of a request. Arguments that are rejected as a whole count as `nothing`, so that the answer to them, too, echoes
+/// the values as they are.
+fn read<'a>(
+    arguments: &'a Arguments,
+    nothing: &'a Arguments,
+    service: Service,
+) -> Result<Fields<'a>, Rejection> {
+    Fields::read(arguments, service).or_else(|rejection| {
+        let mut fields = Fields::read(nothing, service)?;
+        fields.refuse(&rejection.field, &rejection.reason);
+        Ok(fields)
+    })
 }
 
 /// The values as an array; the reader has checked how many they are.
