@@ -1,5 +1,13 @@
 //! The arm's actor in virtual time: exact step counts, what it says and when, and that it is the offline simulation.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use std::cell::RefCell;
 use std::future::Future;
 use std::rc::Rc;

@@ -1,5 +1,14 @@
 //! `/clock` and `/diagnostics` from outside.
 
+#![allow(
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does; what is compared exactly is exact"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;

@@ -1,5 +1,13 @@
 //! Goals of the running program, as any client meets them: envelopes, acceptance and rejection, and one that is reached.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use common::{Client, Runtime};

@@ -1,5 +1,13 @@
 //! `/joint_trajectory` from outside: the last point is the setpoint.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;

@@ -1,5 +1,13 @@
 //! How the program starts, refuses to start, and ends.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::io::{BufRead, BufReader, Read};

@@ -1,5 +1,13 @@
 //! `/arm_sim/pause` and `/arm_sim/reset` from outside.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;

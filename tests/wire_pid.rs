@@ -1,5 +1,13 @@
 //! The controller from outside: off at first, on and off again, the integral, the offset, and the gravity load.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;

@@ -4,6 +4,15 @@
 //! Many of these tests let the arm float: without gravity, and with the controller off, it stays at q = 0, the hand of
 //! two links of 1 m at exactly (2, 0). A goal there has been reached on time if it has been reached to the step.
 
+#![allow(
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does; what is compared exactly is exact"
+)]
+
 mod accepting;
 mod ending;
 mod feedback;

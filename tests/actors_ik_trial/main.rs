@@ -3,6 +3,14 @@
 //! Where the arm floats, at rest and weightless, and epsilon is as large as the world, every target is reached at once:
 //! after one step that finds the hand there, and `success_hold` more. Then counts and times can be told beforehand.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod duration;
 mod others;
 #[path = "../stage/mod.rs"]
