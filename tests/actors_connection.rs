@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod virtual_time;
 
 use std::time::Duration;

@@ -3,6 +3,14 @@
 //! **Invariant:** nothing here is told by a clock: the fast client goes in lockstep, the slow one is shown by counts and
 //! by the program's peak memory.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::io::Write;

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** a call is answered once, by its provider or with the reason why not, and under its caller's own id.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::time::{Duration, Instant};

@@ -3,6 +3,14 @@
 //!
 //! **Invariant:** a race that is possible is given hundreds of chances.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use common::{Client, Runtime};

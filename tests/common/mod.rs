@@ -7,6 +7,17 @@
     unreachable_pub,
     reason = "a module of several test programs, each of which uses its own part"
 )]
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "`json!` literals are handed over as they are written"
+)]
 
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
