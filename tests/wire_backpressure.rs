@@ -245,3 +245,21 @@ fn ids_of_four_mebibytes_are_echoed_again_and_again() {
     }
     assert!(peak_memory(&runtime) < BASE + 32 * MIB);
 }
+
+/// A message of a few bytes must not cost a subscriber that never reads many times its size.
+#[test]
+fn an_outbox_full_of_the_smallest_messages_is_bounded_too() {
+    let runtime = Runtime::start();
+    let mut deaf = runtime.connect();
+    deaf.subscribe("/t");
+    let mut client = runtime.connect();
+    client.send(&json!({"op": "advertise", "topic": "/t"}));
+    // 12 MB: three times what the outbox holds.
+    let frames = "{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{}}\n".repeat(10_000);
+    for _ in 0..30 {
+        client.send_bytes(frames.as_bytes());
+        client.settle();
+    }
+    let peak = peak_memory(&runtime);
+    assert!(peak < BASE, "{peak} bytes");
+}

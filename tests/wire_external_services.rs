@@ -9,6 +9,10 @@
     clippy::unwrap_used,
     reason = "a helper of a test fails by panicking, as a test does"
 )]
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "`json!` literals are handed over as they are written"
+)]
 
 mod common;
 
