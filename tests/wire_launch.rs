@@ -288,6 +288,18 @@ fn a_client_that_never_reads_does_not_hold_up_the_end() {
 }
 
 #[test]
+fn an_arm_that_lags_does_not_hold_up_the_end() {
+    let mut serving = Serving::start(&["--bind", "127.0.0.1:0"], &[]);
+    let mut client = serving.connect();
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e-12}));
+    std::thread::sleep(Duration::from_millis(500));
+    let since = serving.signal("TERM");
+    let (status, took) = serving.end(since);
+    assert_eq!(status, Some(0));
+    assert!(took < Duration::from_secs(2), "{took:?}");
+}
+
+#[test]
 fn every_pending_call_is_told_that_the_runtime_shuts_down() {
     let mut serving = Serving::start(&["--bind", "127.0.0.1:0"], &[]);
     // One that waits for a client to answer, and as many computations as a connection may have.
