@@ -1,5 +1,17 @@
 //! How the program starts, refuses to start, and ends.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 mod common;
 
 use std::io::{BufRead, BufReader, Read};
@@ -150,7 +162,12 @@ fn the_address_comes_from_the_environment_too() {
 
 #[test]
 fn bad_usage_is_told_in_one_line_with_status_2() {
-    let cases: [(&[&str], &[(&str, &str)], &str); 14] = [
+    type Case = (
+        &'static [&'static str],
+        &'static [(&'static str, &'static str)],
+        &'static str,
+    );
+    let cases: [Case; 14] = [
         (&[], &[("ARM_SIM_LINKS", "1")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "4")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "two")], "ARM_SIM_LINKS"),
