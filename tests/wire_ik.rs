@@ -2,10 +2,10 @@
 
 #![allow(
     clippy::expect_used,
+    clippy::float_cmp,
     clippy::indexing_slicing,
-    clippy::panic,
     clippy::unwrap_used,
-    reason = "a helper of a test fails by panicking, as a test does"
+    reason = "exact values are meant, and a helper of a test fails by panicking, as a test does"
 )]
 
 mod common;

@@ -134,13 +134,12 @@ impl<const N: usize> Handler<ServiceCall> for IkTrial<N> {
 
     fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
         let mut reply = call.reply;
-        let occasion = match call.service {
-            Service::TrialStart => match read_changes(&call.arguments) {
-                Ok(changes) => Occasion::Start(changes, reply),
-                Err(why) => return reply.answer(&self.values(), &why),
-            },
-            Service::TrialSkip => Occasion::Skip(reply),
-            _ => Occasion::Stop(reply),
+        let occasion = match (call.service, read_changes(&call.arguments, call.service)) {
+            (Service::TrialStart, Ok(changes)) => Occasion::Start(changes, reply),
+            (Service::TrialStart, Err(why)) => return reply.answer(&self.values(), &why),
+            (_, Err(why)) => return reply.refuse(&why),
+            (Service::TrialSkip, Ok(_)) => Occasion::Skip(reply),
+            (_, Ok(_)) => Occasion::Stop(reply),
         };
         self.ask(occasion, ctx);
     }
@@ -428,9 +427,13 @@ async fn carry_out<const N: usize>(
     answers
 }
 
-/// Reads what a start changes; all or nothing, and every field that is wrong is named.
-fn read_changes(arguments: &Arguments) -> Result<Changes, String> {
-    let mut fields = Fields::read(arguments, Service::TrialStart).map_err(|why| why.to_string())?;
+/// Reads what a start changes; all or nothing, and every field that is wrong is named. The other services have no
+/// fields, and nothing but `args` itself can be wrong.
+fn read_changes(arguments: &Arguments, service: Service) -> Result<Changes, String> {
+    let mut fields = Fields::read(arguments, service).map_err(|why| why.to_string())?;
+    if service != Service::TrialStart {
+        return Ok(Changes::default());
+    }
     let changes = Changes {
         duration: fields.number("duration", Bound::Positive),
         epsilon: fields.number("epsilon", Bound::Positive),

@@ -8,6 +8,13 @@
     unreachable_pub,
     reason = "each test file uses its own part of this"
 )]
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
 
 use std::future::Future;
 use std::sync::Arc;

@@ -167,7 +167,7 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     /// Takes up to `steps` steps; fewer where a goal is reached on the way, or the simulation diverges.
-    pub(super) fn take_judged_steps(&mut self, steps: u64) -> u64 {
+    pub(super) fn advance(&mut self, steps: u64) -> u64 {
         let before_reset = self.goals.before_reset;
         let tracked = self.goals.tracked.as_mut();
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {

@@ -251,9 +251,7 @@ impl<const N: usize> ArmSim<N> {
         let started = std::time::Instant::now();
         let mut taken = 0;
         while taken < due && started.elapsed() < WAKE_UP_BUDGET {
-            let batch = BATCH.min(due - taken);
-            // Fewer where a goal is reached on the way: the rest goes on without it.
-            taken += self.take_judged_steps(batch);
+            taken += self.advance(BATCH.min(due - taken));
             if self.simulation.divergence().is_some() {
                 break;
             }
