@@ -224,3 +224,23 @@ fn extreme_parameters_leave_the_runtime_answering_in_valid_json() {
         state(&mut client);
     }
 }
+
+#[test]
+fn arguments_that_are_no_object_are_refused_by_name_and_the_values_echoed() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for bad in [
+        json!(5),
+        json!("x"),
+        json!(true),
+        json!([1.0, [1.0, 1.0], [1.0, 1.0], 4]),
+    ] {
+        let response = client.call("/arm_sim/set_params", bad.clone());
+        assert_eq!(response["result"], false, "{bad}");
+        assert!(
+            response["status"].as_str().unwrap().starts_with("args "),
+            "{response}"
+        );
+        assert_eq!(response["values"]["lengths"], json!([1.0, 1.0]), "{bad}");
+    }
+}

@@ -12,18 +12,6 @@
     clippy::unwrap_used,
     reason = "each test file uses its own part of this, and a helper of a test fails by panicking"
 )]
-#![allow(
-    clippy::expect_used,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used,
-    reason = "a helper of a test fails by panicking, as a test does"
-)]
-#![allow(
-    clippy::needless_pass_by_value,
-    reason = "`json!` literals are handed over as they are written"
-)]
-
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
