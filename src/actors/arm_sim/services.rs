@@ -84,7 +84,11 @@ impl<const N: usize> ArmSim<N> {
             }
             Service::Reset => {
                 // A reset has no fields: what is rejected here is `args` itself.
-                let ended = if fields.accepted() { self.reset() } else { None };
+                let ended = if fields.accepted() {
+                    self.reset()
+                } else {
+                    None
+                };
                 self.answer_reset(reply, fields.status(), ended, ctx);
             }
             Service::Enable => {
