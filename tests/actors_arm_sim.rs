@@ -1,5 +1,17 @@
 //! The arm's actor in virtual time: exact step counts, what it says and when, and that it is the offline simulation.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 use std::cell::RefCell;
 use std::future::Future;
 use std::rc::Rc;
@@ -619,7 +631,7 @@ fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
 fn a_bad_trajectory_is_answered_to_its_sender_alone_with_the_frames_id() {
     in_virtual_time(|| async {
         let bench = Bench::<2>::new(Arm::default());
-        let held = bench.snapshot().await.pid().setpoint().clone();
+        let held = *bench.snapshot().await.pid().setpoint();
         let id = json!({"my": [1, "id"]});
         bench
             .trajectory(json!({"points": []}), Some(id.clone()))

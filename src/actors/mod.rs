@@ -12,6 +12,7 @@
 //! | message | from | to | meaning |
 //! | --- | --- | --- | --- |
 //! | [`registry::Connect`] / [`registry::Disconnect`] | connection | registry | a client is there, is gone |
+//! | [`registry::Retire`] | connection | registry | the client has stopped sending: its registrations go, its answers still come |
 //! | [`registry::Request`] | connection | registry | one rosbridge op of that client |
 //! | [`node::ServiceCall`] | registry | the node that serves it | answered exactly once, through its [`node::Reply`] |
 //! | [`node::TopicMessage`] | registry | the node that subscribes | a message on a topic the runtime listens to |
