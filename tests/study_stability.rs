@@ -109,7 +109,12 @@ fn the_step_matrix_of_an_oscillator_is_the_stored_one() {
             for row in 0..2 {
                 for column in 0..2 {
                     let error = (matrix[(row, column)] - sample.matrix[row][column]).abs();
-                    assert!(error < 4e-16 * scale, "{method} z {} h {}", case.z, sample.h);
+                    assert!(
+                        error < 4e-16 * scale,
+                        "{method} z {} h {}",
+                        case.z,
+                        sample.h
+                    );
                 }
             }
             // A double eigenvalue keeps half of the digits.
@@ -146,7 +151,12 @@ fn check_arm<const N: usize>(case: &ArmCase, worst: &mut f64) {
     let rest = equilibrium(&arm, &gains, &setpoint);
     for i in 0..N {
         let error = (rest.position[i] - case.equilibrium[i]).abs();
-        assert!(error < 1e-14, "{} {}: {error:e}", case.configuration, case.gains);
+        assert!(
+            error < 1e-14,
+            "{} {}: {error:e}",
+            case.configuration,
+            case.gains
+        );
     }
     let linear = Linear::at(&arm, &gains, &rest.position, &rest.integrating);
     for expected in &case.methods {
@@ -190,15 +200,50 @@ fn tmp_limits() {
     let t = std::time::Instant::now();
     for m in Method::ALL {
         let t = std::time::Instant::now();
-        println!("{m} {:?} {:?}", limits(&Arm::<2>::default(), &Gains::default(), &Setpoint::default(), m), t.elapsed());
+        println!(
+            "{m} {:?} {:?}",
+            limits(
+                &Arm::<2>::default(),
+                &Gains::default(),
+                &Setpoint::default(),
+                m
+            ),
+            t.elapsed()
+        );
         let t = std::time::Instant::now();
-        println!("{m} {:?} {:?}", limits(&Arm::<3>::default(), &Gains::default(), &Setpoint::default(), m), t.elapsed());
+        println!(
+            "{m} {:?} {:?}",
+            limits(
+                &Arm::<3>::default(),
+                &Gains::default(),
+                &Setpoint::default(),
+                m
+            ),
+            t.elapsed()
+        );
         let t = std::time::Instant::now();
-        println!("{m} {:?} {:?}", limit_held(&Arm::<3>::default(), &Gains::default(), &Setpoint::default(), m), t.elapsed());
+        println!(
+            "{m} {:?} {:?}",
+            limit_held(
+                &Arm::<3>::default(),
+                &Gains::default(),
+                &Setpoint::default(),
+                m
+            ),
+            t.elapsed()
+        );
         let free = pendularm::study::linear::no_control();
-        println!("{m} {:?} {:?}", limits(&Arm::<3>::default(), &free, &Setpoint::default(), m), t.elapsed());
-        let none = Arm::new([1.0;3],[1.0;3],0.0).unwrap();
-        println!("{m} {:?} {:?}", limits(&none, &free, &Setpoint::default(), m), t.elapsed());
+        println!(
+            "{m} {:?} {:?}",
+            limits(&Arm::<3>::default(), &free, &Setpoint::default(), m),
+            t.elapsed()
+        );
+        let none = Arm::new([1.0; 3], [1.0; 3], 0.0).unwrap();
+        println!(
+            "{m} {:?} {:?}",
+            limits(&none, &free, &Setpoint::default(), m),
+            t.elapsed()
+        );
     }
     println!("{:?}", t.elapsed());
 }
@@ -216,8 +261,15 @@ fn measure_all<const N: usize>(pose: [f64; N]) -> f64 {
     for (kind, kp, ki, kd) in KINDS {
         let setting = |method, sampling| Setting {
             arm: Arm::default(),
-            gains: Gains { kp: [kp; N], ki: [ki; N], kd: [kd; N] },
-            setpoint: Setpoint { position: pose, velocity: [0.0; N] },
+            gains: Gains {
+                kp: [kp; N],
+                ki: [ki; N],
+                kd: [kd; N],
+            },
+            setpoint: Setpoint {
+                position: pose,
+                velocity: [0.0; N],
+            },
             method,
             sampling,
         };
@@ -228,7 +280,10 @@ fn measure_all<const N: usize>(pose: [f64; N]) -> f64 {
                 let predicted = largest_timestep(&linear, method, sampling).unwrap();
                 let measured = setting.measured_limit(0.9 * predicted).unwrap();
                 let error = (measured / predicted - 1.0).abs();
-                println!("{N} {kind} {method} {}: {measured:.5e} measured, {predicted:.5e} predicted, {error:.1e}", sampling.name());
+                println!(
+                    "{N} {kind} {method} {}: {measured:.5e} measured, {predicted:.5e} predicted, {error:.1e}",
+                    sampling.name()
+                );
                 worst = worst.max(error);
             }
         }

@@ -207,8 +207,7 @@ impl Matrix {
         }
         let (mut a, mut x) = (self.clone(), b.to_vec());
         for k in 0..n {
-            let pivot =
-                (k..n).max_by(|&i, &j| a[(i, k)].abs().total_cmp(&a[(j, k)].abs()))?;
+            let pivot = (k..n).max_by(|&i, &j| a[(i, k)].abs().total_cmp(&a[(j, k)].abs()))?;
             if a[(pivot, k)] == 0.0 || !a[(pivot, k)].is_finite() {
                 return None;
             }

@@ -149,9 +149,7 @@ impl<const N: usize> Setting<N> {
                 }
             }
             // NaN has escaped too.
-            x.iter()
-                .all(|x| x.abs() <= ESCAPED)
-                .then_some(energy.abs())
+            x.iter().all(|x| x.abs() <= ESCAPED).then_some(energy.abs())
         }
     }
 

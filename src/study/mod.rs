@@ -5,15 +5,18 @@
 //! | [`stability`] | the largest stable timestep, predicted from the linearised loop ([`linear`], [`matrix`]) |
 //! | [`measure`] | the same, measured on the arm itself |
 //! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
-//! | [`rollout`] | an offline run with its error against a reference |
+//! | [`rollout`] | an offline run with its error against a reference ([`extrapolation`]) |
 //! | [`error_estimate`] | the local error of the step about to be taken |
 //!
 //! Everything steps through [`crate::math`], the live arm's own code.
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
+pub mod error_estimate;
+pub mod extrapolation;
 pub mod linear;
 pub mod matrix;
 pub mod measure;
 mod poses;
+pub mod rollout;
 pub mod stability;

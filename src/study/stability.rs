@@ -194,7 +194,8 @@ impl<'a> Stepping<'a> {
         let rate = self.rate();
         let grows = |growth: f64| !(growth <= 0.1 * NEUTRAL * rate);
         self.modes.iter().any(|mode| {
-            grows(mode.re) || (mode.modulus() < 1e-6 * rate && grows(-mode.re.abs() + 0.2 * NEUTRAL * rate))
+            grows(mode.re)
+                || (mode.modulus() < 1e-6 * rate && grows(-mode.re.abs() + 0.2 * NEUTRAL * rate))
         })
     }
 
