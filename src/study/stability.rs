@@ -134,7 +134,7 @@ fn at_rest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>, rest: &Equilibrium<N>
 #[must_use]
 pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> Option<f64> {
     let stepping = Stepping::new(linear, method, sampling);
-    stepping.search(stepping.rate())
+    stepping.search(&Modes::of(linear))
 }
 
 /// As [`largest_timestep`] with the effort held over `substeps` steps of the method: the limit of the control period.
@@ -144,7 +144,7 @@ pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<
         substeps: substeps.max(1),
         ..Stepping::new(linear, method, Sampling::Held)
     };
-    stepping.search(stepping.rate())
+    stepping.search(&Modes::of(linear))
 }
 
 /// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
@@ -152,6 +152,34 @@ pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<
 pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) -> Matrix {
     let stepping = Stepping::new(linear, method, sampling);
     stepping.generator(h).shifted_identity(h)
+}
+
+/// The loop as it would be in continuous time.
+pub(super) struct Modes {
+    eigenvalues: Vec<Complex>,
+    /// The fastest rate \[1/s\].
+    rate: f64,
+}
+
+impl Modes {
+    pub(super) fn of(linear: &Linear) -> Self {
+        let eigenvalues = linear.flow().eigenvalues();
+        Self {
+            rate: largest(eigenvalues.iter().map(|mode| mode.modulus())),
+            eigenvalues,
+        }
+    }
+
+    /// Whether there is a mode that no timestep can help: one that grows, or one so near to drifting that rounding
+    /// decides on which side it is (a double zero is good to the root of the rounding error).
+    pub(super) fn run_away(&self) -> bool {
+        let noise = 0.1 * NEUTRAL * self.rate;
+        self.eigenvalues.iter().any(|mode| {
+            let drifts = mode.modulus() < 1e-6 * self.rate;
+            // NaN counts as growing.
+            !(mode.re <= if drifts { -noise } else { noise })
+        })
+    }
 }
 
 /// A linear loop, and how it is stepped.
@@ -163,40 +191,20 @@ pub(super) struct Stepping<'a> {
     substeps: u32,
     /// What the method steps: the loop, or the arm with constant efforts.
     stepped: Matrix,
-    /// Eigenvalues of the loop as it would be in continuous time.
-    modes: Vec<Complex>,
 }
 
 impl<'a> Stepping<'a> {
     pub(super) fn new(linear: &'a Linear, method: Method, sampling: Sampling) -> Self {
-        let flow = linear.flow();
         Self {
             linear,
             method,
             sampling,
             substeps: 1,
-            modes: flow.eigenvalues(),
             stepped: match sampling {
-                Sampling::Continuous => flow,
+                Sampling::Continuous => linear.flow(),
                 Sampling::Held => linear.plant(),
             },
         }
-    }
-
-    /// The fastest rate of the loop in continuous time \[1/s\].
-    pub(super) fn rate(&self) -> f64 {
-        largest(self.modes.iter().map(|mode| mode.modulus()))
-    }
-
-    /// Whether the loop has a mode that no timestep can help: one that grows in continuous time, or one so near to
-    /// drifting that rounding decides on which side it is (a double zero is good to the root of the rounding error).
-    pub(super) fn runs_away(&self) -> bool {
-        let rate = self.rate();
-        let grows = |growth: f64| !(growth <= 0.1 * NEUTRAL * rate);
-        self.modes.iter().any(|mode| {
-            grows(mode.re)
-                || (mode.modulus() < 1e-6 * rate && grows(-mode.re.abs() + 0.2 * NEUTRAL * rate))
-        })
     }
 
     /// `E` of `x ↦ (I + T E) x` over the period `T` \[s\].
@@ -295,7 +303,8 @@ impl<'a> Stepping<'a> {
     }
 
     /// Upward from far below the fastest time constant to the first unstable period, then bisection.
-    pub(super) fn search(&self, rate: f64) -> Option<f64> {
+    pub(super) fn search(&self, modes: &Modes) -> Option<f64> {
+        let rate = modes.rate;
         if rate == 0.0 {
             return None;
         }
