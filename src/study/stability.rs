@@ -147,6 +147,18 @@ pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<
     stepping.search(&Modes::of(linear))
 }
 
+/// As [`largest_period`] with every effort acting one period late, as a bus or a slow controller would have it. There is no
+/// integral in it.
+#[must_use]
+pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
+    let stepping = Stepping {
+        substeps: substeps.max(1),
+        delayed: true,
+        ..Stepping::new(linear, method, Sampling::Held)
+    };
+    stepping.search(&Modes::of(linear))
+}
+
 /// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
 #[must_use]
 pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) -> Matrix {
@@ -189,6 +201,8 @@ pub(super) struct Stepping<'a> {
     sampling: Sampling,
     /// Steps of the method in one control period.
     substeps: u32,
+    /// Whether an effort acts one period late.
+    delayed: bool,
     /// What the method steps: the loop, or the arm with constant efforts.
     stepped: Matrix,
 }
@@ -200,6 +214,7 @@ impl<'a> Stepping<'a> {
             method,
             sampling,
             substeps: 1,
+            delayed: false,
             stepped: match sampling {
                 Sampling::Continuous => linear.flow(),
                 Sampling::Held => linear.plant(),
@@ -217,6 +232,7 @@ impl<'a> Stepping<'a> {
         };
         match self.sampling {
             Sampling::Continuous => free,
+            Sampling::Held if self.delayed => self.close_late(self.repeated(free, h), period),
             Sampling::Held => self.close(&self.repeated(free, h), period),
         }
     }
@@ -276,6 +292,17 @@ impl<'a> Stepping<'a> {
             closed[(2 * n + k, joint)] = -1.0;
         }
         closed
+    }
+
+    /// The law, once a period, for the period after: efforts are states, `u ↦ -kp x - kd v`.
+    fn close_late(&self, mut arm: Matrix, period: f64) -> Matrix {
+        let n = self.linear.joints();
+        for j in 0..n {
+            arm[(2 * n + j, j)] = -self.linear.kp[j] / period;
+            arm[(2 * n + j, n + j)] = -self.linear.kd[j] / period;
+            arm[(2 * n + j, 2 * n + j)] = -1.0 / period;
+        }
+        arm
     }
 
     /// Fastest growth of any mode, `max (2 Re μ + h |μ|²)`, relative to the largest `|μ|`; NaN if not finite.
