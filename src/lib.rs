@@ -8,3 +8,4 @@ pub mod logging;
 pub mod math;
 pub mod options;
 pub mod protocol;
+pub mod study;
