@@ -2,6 +2,8 @@
 //!
 //! **Invariant:** everything that comes from a section is escaped, but for the panels, which are SVG of our own making.
 
+use std::fmt::{self, Write};
+
 use super::machine::Machine;
 use super::section::{Block, Cell, Figure, Section, Table};
 use super::svg::{STYLE, escape};
@@ -36,16 +38,22 @@ pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
 
 fn header(out: &mut String, sections: &[Section], machine: &Machine) {
     out.push_str("<header><h1>Which method, at which timestep, for which error, at what cost</h1>");
-    append(out, format_args!(
-        "<p>The arm of pendularm under its four integrators. Commit {}.</p><nav>",
-        escape(&machine.commit)
-    ));
+    append(
+        out,
+        format_args!(
+            "<p>The arm of pendularm under its four integrators. Commit {}.</p><nav>",
+            escape(&machine.commit)
+        ),
+    );
     for section in sections {
-        append(out, format_args!(
-            "<a href=\"#{}\">{}</a>",
-            escape(&section.name),
-            escape(&section.title)
-        ));
+        append(
+            out,
+            format_args!(
+                "<a href=\"#{}\">{}</a>",
+                escape(&section.name),
+                escape(&section.title)
+            ),
+        );
     }
     out.push_str("<a href=\"#making\">How this was made</a></nav></header>");
 }
@@ -65,7 +73,10 @@ fn verdicts(out: &mut String, sections: &[Section]) {
     let heading = if short == 0 {
         format!("Verdicts: all {count} hold")
     } else {
-        format!("Verdicts: {} of {count} hold, {short} fall short", count - short)
+        format!(
+            "Verdicts: {} of {count} hold, {short} fall short",
+            count - short
+        )
     };
     let mut table = Table::new("verdicts", heading, "", &["Claim", "Seen in this run", ""]);
     for verdict in all() {
@@ -81,14 +92,17 @@ fn verdicts(out: &mut String, sections: &[Section]) {
 }
 
 fn body(out: &mut String, section: &Section) {
-    append(out, format_args!(
-        "<section id=\"{}\"><h2>{}</h2>",
-        escape(&section.name),
-        escape(&section.title)
-    ));
+    append(
+        out,
+        format_args!(
+            "<section id=\"{}\"><h2>{}</h2>",
+            escape(&section.name),
+            escape(&section.title)
+        ),
+    );
     for block in &section.blocks {
         match block {
-            Block::Text(text) => out.push_str(&format!("<p>{}</p>", emphasised(text))),
+            Block::Text(text) => append(out, format_args!("<p>{}</p>", emphasised(text))),
             Block::Figure(figure) => self::figure(out, figure),
             Block::Table(table) => self::table(out, table, "h3"),
         }
@@ -97,11 +111,14 @@ fn body(out: &mut String, section: &Section) {
 }
 
 fn figure(out: &mut String, figure: &Figure) {
-    append(out, format_args!(
-        "<figure id=\"{}\"><h3>{}</h3><p class=\"legend\">",
-        escape(&figure.name),
-        escape(&figure.title)
-    ));
+    append(
+        out,
+        format_args!(
+            "<figure id=\"{}\"><h3>{}</h3><p class=\"legend\">",
+            escape(&figure.name),
+            escape(&figure.title)
+        ),
+    );
     for (swatch, label) in &figure.legend {
         append(out, format_args!("<span>{swatch} {}</span>", escape(label)));
     }
@@ -110,17 +127,26 @@ fn figure(out: &mut String, figure: &Figure) {
     for panel in &figure.panels {
         out.push_str(panel);
     }
-    append(out, format_args!(
-        "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
-        escape(&figure.caption),
-        name = escape(&figure.name)
-    ));
+    append(
+        out,
+        format_args!(
+            "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
+            escape(&figure.caption),
+            name = escape(&figure.name)
+        ),
+    );
 }
 
 fn table(out: &mut String, table: &Table, heading: &str) {
-    append(out, format_args!("<{heading}>{}</{heading}>", escape(&table.title)));
+    append(
+        out,
+        format_args!("<{heading}>{}</{heading}>", escape(&table.title)),
+    );
     if !table.caption.is_empty() {
-        append(out, format_args!("<p class=\"caption\">{}</p>", escape(&table.caption)));
+        append(
+            out,
+            format_args!("<p class=\"caption\">{}</p>", escape(&table.caption)),
+        );
     }
     out.push_str("<div class=\"scroll\"><table><thead><tr>");
     for head in &table.head {
@@ -149,7 +175,10 @@ fn table(out: &mut String, table: &Table, heading: &str) {
 fn making(out: &mut String, sections: &[Section], machine: &Machine) {
     out.push_str("<section id=\"making\"><h2>How this was made</h2><dl>");
     for (name, value) in &machine.facts {
-        append(out, format_args!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)));
+        append(
+            out,
+            format_args!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)),
+        );
     }
     out.push_str("</dl><p>Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
          quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of the same \
@@ -158,12 +187,15 @@ fn making(out: &mut String, sections: &[Section], machine: &Machine) {
          method.</p><ul class=\"sections\">");
     for section in sections {
         let quick = if section.quick { ", quick" } else { "" };
-        append(out, format_args!(
-            "<li>{}: {:.0} s at {}{quick}</li>",
-            escape(&section.name),
-            section.seconds,
-            escape(&section.commit)
-        ));
+        append(
+            out,
+            format_args!(
+                "<li>{}: {:.0} s at {}{quick}</li>",
+                escape(&section.name),
+                section.seconds,
+                escape(&section.commit)
+            ),
+        );
     }
     out.push_str("</ul></section>");
 }
@@ -174,10 +206,15 @@ fn emphasised(text: &str) -> String {
     let mut out = String::new();
     for (index, part) in escaped.split("**").enumerate() {
         if index % 2 == 1 {
-            append(out, format_args!("<strong>{part}</strong>"));
+            append(&mut out, format_args!("<strong>{part}</strong>"));
         } else {
             out.push_str(part);
         }
     }
     out
+}
+
+fn append(out: &mut String, text: fmt::Arguments<'_>) {
+    // Writing to a string cannot fail.
+    let _ = out.write_fmt(text);
 }

@@ -25,7 +25,10 @@ impl Machine {
             "release build (optimised, link-time optimisation, one codegen unit)"
         };
         let facts = vec![
-            fact("Version", format!("pendularm {}", env!("CARGO_PKG_VERSION"))),
+            fact(
+                "Version",
+                format!("pendularm {}", env!("CARGO_PKG_VERSION")),
+            ),
             fact("Commit", commit.clone()),
             fact("Build", build.to_owned()),
             fact(

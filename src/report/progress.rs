@@ -85,7 +85,11 @@ impl Progress {
         let percent = 100.0 * fraction;
         let _ = if self.terminal {
             let bar = bar(fraction);
-            write!(io::stderr(), "\r\x1b[K{bar} {percent:3.0} %  {left}  {}", self.section)
+            write!(
+                io::stderr(),
+                "\r\x1b[K{bar} {percent:3.0} %  {left}  {}",
+                self.section
+            )
         } else {
             writeln!(io::stderr(), "{percent:3.0} %, {left}: {}", self.section)
         };
@@ -100,13 +104,21 @@ impl Progress {
 )]
 fn bar(fraction: f64) -> String {
     let full = (fraction * CELLS as f64).round() as usize;
-    format!("[{}{}]", "#".repeat(full), ".".repeat(CELLS.saturating_sub(full)))
+    format!(
+        "[{}{}]",
+        "#".repeat(full),
+        ".".repeat(CELLS.saturating_sub(full))
+    )
 }
 
 fn minutes(seconds: f64) -> String {
     if seconds < 60.0 {
         format!("{seconds:.0} s")
     } else {
-        format!("{:.0} min {:02.0} s", (seconds / 60.0).floor(), seconds % 60.0)
+        format!(
+            "{:.0} min {:02.0} s",
+            (seconds / 60.0).floor(),
+            seconds % 60.0
+        )
     }
 }

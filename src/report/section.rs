@@ -78,7 +78,10 @@ impl Figure {
             sheet: sheet(&title, legend, &panels, 3),
             title,
             caption: caption.into(),
-            legend: legend.iter().map(|key| (key.swatch(), key.label.clone())).collect(),
+            legend: legend
+                .iter()
+                .map(|key| (key.swatch(), key.label.clone()))
+                .collect(),
             panels,
         }
     }

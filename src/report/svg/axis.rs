@@ -35,7 +35,8 @@ impl Axis {
         unit: Unit,
         values: impl IntoIterator<Item = f64>,
     ) -> Self {
-        let (min, max) = bounds(values.into_iter().filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
+        let (min, max) =
+            bounds(values.into_iter().filter(|value| *value > 0.0)).unwrap_or((1.0, 10.0));
         let (min, max) = (min.log10().floor(), max.log10().ceil());
         let max = if max > min { max } else { min + 1.0 };
         Self {
@@ -173,7 +174,11 @@ fn superscript(digit: char) -> char {
 /// A number as people write it: as many digits as it has, at most 3 that count.
 pub(crate) fn number(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
-        return if value == 0.0 { "0".to_owned() } else { format!("{value}") };
+        return if value == 0.0 {
+            "0".to_owned()
+        } else {
+            format!("{value}")
+        };
     }
     let size = value.abs().log10();
     if !(-3.0..6.0).contains(&size) {
@@ -248,8 +253,14 @@ mod tests {
         let wide = Axis::log("", Unit::Number, [3e-16, 2.0]);
         assert_eq!(labels(&wide, 5.0), ["10⁻¹⁶", "10⁻¹²", "10⁻⁸", "10⁻⁴", "1"]);
         let times = Axis::log("", Unit::Seconds, [2e-6, 0.03]);
-        assert_eq!(labels(&times, 9.0), ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms"]);
+        assert_eq!(
+            labels(&times, 9.0),
+            ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms"]
+        );
         let linear = Axis::linear("", 0.0, 30.0);
-        assert_eq!(labels(&linear, 6.0), ["0", "5", "10", "15", "20", "25", "30"]);
+        assert_eq!(
+            labels(&linear, 6.0),
+            ["0", "5", "10", "15", "20", "25", "30"]
+        );
     }
 }

@@ -30,7 +30,11 @@ impl Heat {
             let (top, bottom) = (down(*high), down(*low));
             let mut column = 0;
             while let Some(level) = row.get(column) {
-                let run = row.iter().skip(column).take_while(|next| *next == level).count();
+                let run = row
+                    .iter()
+                    .skip(column)
+                    .take_while(|next| *next == level)
+                    .count();
                 if let (Some(from), Some(to)) = (self.x.get(column), self.x.get(column + run)) {
                     let (from, to) = (across(*from), across(*to));
                     write!(

@@ -8,7 +8,7 @@
 mod axis;
 mod heat;
 
-pub(crate) use axis::{Axis, Scale, Unit, bounds, number, scientific, seconds};
+pub(crate) use axis::{Axis, Unit, number, scientific, seconds};
 pub(crate) use heat::Heat;
 
 use std::fmt::Write;
@@ -114,7 +114,10 @@ impl Series {
             marker: Marker::None,
             line: true,
             dashed: false,
-            points: points.into_iter().map(|(x, y)| Point::new(x, y, "")).collect(),
+            points: points
+                .into_iter()
+                .map(|(x, y)| Point::new(x, y, ""))
+                .collect(),
         }
     }
 }
@@ -156,6 +159,8 @@ pub(crate) struct Plot {
     pub(crate) title: String,
     pub(crate) x: Axis,
     pub(crate) y: Axis,
+    /// A second scale above: `self / x`, as a label and the number divided.
+    pub(crate) above: Option<(&'static str, f64)>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
     pub(crate) series: Vec<Series>,
@@ -167,6 +172,7 @@ impl Plot {
             title: title.into(),
             x,
             y,
+            above: None,
             heat: None,
             marks: Vec::new(),
             series: Vec::new(),
@@ -232,6 +238,7 @@ impl Plot {
                 y + 4.0
             )?;
         }
+        self.above(out)?;
         let (middle_x, middle_y) = (f64::midpoint(LEFT, right), f64::midpoint(TOP, bottom));
         write!(
             out,
@@ -242,6 +249,28 @@ impl Plot {
             self.x.label,
             self.y.label
         )
+    }
+
+    fn above(&self, out: &mut String) -> std::fmt::Result {
+        let Some((label, factor)) = self.above else {
+            return Ok(());
+        };
+        let other = Axis::log_between(
+            label,
+            Unit::Number,
+            factor / self.x.max,
+            factor / self.x.min,
+        );
+        for (value, label) in other.ticks(5.0) {
+            let x = self.across(factor / value);
+            write!(
+                out,
+                "<path class=\"frame\" d=\"M{x:.1} {TOP}v4\"/>\
+                 <text class=\"note\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}×</text>",
+                TOP + 15.0
+            )?;
+        }
+        Ok(())
     }
 
     fn mark(&self, out: &mut String, mark: &Mark) -> std::fmt::Result {
@@ -357,7 +386,10 @@ impl Plot {
         let y = self.down(point.y);
         if let Some((from, to)) = point.spread {
             let (from, to) = (self.across(from), self.across(to));
-            write!(out, "<path class=\"spread\" d=\"M{from:.1} {y:.1}H{to:.1}\"/>")?;
+            write!(
+                out,
+                "<path class=\"spread\" d=\"M{from:.1} {y:.1}H{to:.1}\"/>"
+            )?;
         }
         if marker == Marker::None {
             return Ok(());
