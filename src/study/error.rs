@@ -68,6 +68,8 @@ pub trait Scene {
     fn replay(&self, method: Method, steps: u64) -> f64;
     /// What [`Scene::replay`] must come back with, taken from the run that is judged.
     fn judged_end(&self, method: Method, steps: u64) -> f64;
+    /// The largest stable timestep \[s\] as predicted for the scene's control at its setpoint, if it has one.
+    fn predicted_limit(&self, method: Method) -> Option<f64>;
     /// Most steps of one run.
     fn most_steps(&self) -> u64 {
         u64::MAX

@@ -18,6 +18,7 @@ pub use steps::exact_steps;
 
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use lagrangian::Lagrangian;
 use taylor::{Drive, Exact, Setting, Taylor};
 
 /// The setting whose motion is kept.
@@ -131,6 +132,17 @@ impl<const N: usize> Reference<N> {
         let (exact, _) = self.samples.get(index)?;
         Some(largest_difference(exact, position))
     }
+}
+
+/// Joint accelerations \[rad/s²\] under the efforts `tau` \[N m\], from the Lagrangian with 106 bits.
+#[must_use]
+pub fn exact_acceleration<const N: usize>(
+    arm: &Arm<N>,
+    state: &State<N>,
+    tau: &[f64; N],
+) -> [DoubleDouble; N] {
+    let real = |values: &[f64; N]| values.map(DoubleDouble::from);
+    Lagrangian::new(arm).acceleration(&real(&state.position), &real(&state.velocity), &real(tau))
 }
 
 /// `max |exact - value|`, the difference rounded only once it is taken; NaN if a value is.

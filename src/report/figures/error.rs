@@ -5,7 +5,9 @@
 use super::super::Desk;
 use super::super::csv::{Csv, Field};
 use super::super::section::{Block, Cell, Figure, Section, Table, Verdict};
-use super::super::svg::{Axis, Key, Mark, Plot, Point, Series, Unit, number, scientific, seconds};
+use super::super::svg::{
+    Axis, Key, Mark, Plot, Point, Series, Unit, number, power, scientific, seconds,
+};
 use super::super::timing::{Effort, Timing, time};
 use super::slope;
 use crate::math::integrator::Method;
@@ -26,6 +28,9 @@ struct Run {
 
 /// Errors between which a slope is fitted \[rad\]: above, higher orders still show; below, rounding does.
 const ASYMPTOTIC: std::ops::Range<f64> = 1e-11..1e-3;
+
+/// How many runs a slope is fitted to.
+const FITTED: usize = 4;
 
 const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
@@ -115,11 +120,13 @@ impl Data {
     }
 
     fn order(&self, method: Method) -> Option<f64> {
-        slope(
-            self.of(method)
-                .filter(|run| ASYMPTOTIC.contains(&run.outcome.error))
-                .map(|run| (run.outcome.timestep, run.outcome.error)),
-        )
+        let inside: Vec<(f64, f64)> = self
+            .of(method)
+            .filter(|run| ASYMPTOTIC.contains(&run.outcome.error))
+            .map(|run| (run.outcome.timestep, run.outcome.error))
+            .collect();
+        // The finest of them: near the stability edge an error falls faster than its order.
+        slope(inside.into_iter().rev().take(FITTED))
     }
 
     fn unit(&self) -> &'static str {
@@ -225,6 +232,9 @@ fn panels(data: &[Data], x: Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
     data.iter()
         .map(|data| {
             let mut plot = Plot::new(data.scene.title(), x.clone(), error_axis());
+            if data.scene.links() == 0 {
+                plot.y.label = "largest error [m]";
+            }
             for method in Method::ALL {
                 let points = data.of(method).map(|run| {
                     // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
@@ -309,7 +319,16 @@ fn against_timestep(data: &[Data]) -> Figure {
         all.map(|run| run.outcome.timestep),
     );
     let mut plots = panels(data, x.clone(), |run| run.outcome.timestep);
-    for plot in &mut plots {
+    for (plot, data) in plots.iter_mut().zip(data) {
+        for method in Method::ALL {
+            if let Some(limit) = data.scene.predicted_limit(method) {
+                plot.marks.push(Mark::Vertical {
+                    x: limit,
+                    class: method.name(),
+                    told: format!("{method}: predicted stability limit {}", seconds(limit)),
+                });
+            }
+        }
         plot.marks.push(Mark::Slopes {
             x: x.max / 60.0,
             y: 1e-14,
@@ -321,7 +340,7 @@ fn against_timestep(data: &[Data]) -> Figure {
     Figure::new(
         "convergence",
         headline_timestep(data),
-        "The slope is the order, until rounding ends it. Fitted slopes are in the table below.",
+        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep at the setpoint, one per method.",
         &Key::methods(),
         &plots,
     )
@@ -383,7 +402,7 @@ fn best(data: &Data, target: f64) -> Option<(Method, Cost, Option<(Method, Cost)
 
 fn cheapest(data: &[Data]) -> Table {
     let mut head = vec!["Scene".to_owned()];
-    head.extend(TARGETS.map(|target| format!("{} rad", scientific(target).replace("1.0·", ""))));
+    head.extend(TARGETS.map(|target| format!("{} rad", power(target.log10().round()))));
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let mut table = Table::new(
         "cheapest",
@@ -421,7 +440,7 @@ fn orders(data: &[Data]) -> Table {
     let mut table = Table::new(
         "orders",
         "Fitted orders",
-        "Slope of error against timestep between 10⁻¹¹ and 10⁻³ rad; under it the smallest error that any timestep gave.",
+        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the smallest error that any timestep gave.",
         &["Scene", "euler", "midpoint", "verlet", "rk4"],
     );
     for data in data {

@@ -261,7 +261,14 @@ fn verdict(swing: &Swing) -> Verdict {
         .into_iter()
         .map(|method| swing.horizon(method, SHOWN).unwrap_or(f64::INFINITY))
         .collect();
-    let text: Vec<String> = horizons.iter().map(|at| number(*at)).collect();
+    let told = |at: &f64| {
+        if at.is_finite() {
+            format!("{} s", number(*at))
+        } else {
+            format!("after {} s", number(swing.known_until()))
+        }
+    };
+    let text: Vec<String> = horizons.iter().map(told).collect();
     let holds = match horizons.as_slice() {
         &[euler, midpoint, verlet, rk4] => {
             euler < midpoint.min(verlet) && midpoint.max(verlet) < rk4
@@ -274,7 +281,7 @@ fn verdict(swing: &Swing) -> Verdict {
             swing.links,
             seconds(timestep(SHOWN))
         ),
-        seen: format!("{} s", text.join(", ")),
+        seen: text.join(", "),
         holds,
     }
 }

@@ -3,9 +3,11 @@
 //! **Invariant:** a section depends on no other section's results.
 
 mod budget;
+mod conditioning;
 mod drift;
 mod error;
 mod horizon;
+mod stability;
 
 use super::Desk;
 use super::section::Section;
@@ -21,12 +23,18 @@ pub(crate) struct Maker {
 }
 
 /// All sections in the order in which they are made and shown.
-pub(crate) const SECTIONS: [Maker; 4] = [
+pub(crate) const SECTIONS: [Maker; 6] = [
     Maker {
         name: "error",
         title: "Error against cost",
         weight: 80.0,
         make: error::make,
+    },
+    Maker {
+        name: "stability",
+        title: "Where it goes unstable",
+        weight: 40.0,
+        make: stability::make,
     },
     Maker {
         name: "budget",
@@ -45,6 +53,12 @@ pub(crate) const SECTIONS: [Maker; 4] = [
         title: "How far a chaotic swing can be followed",
         weight: 20.0,
         make: horizon::make,
+    },
+    Maker {
+        name: "conditioning",
+        title: "Uneven arms",
+        weight: 2.0,
+        make: conditioning::make,
     },
 ];
 

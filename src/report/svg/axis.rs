@@ -144,7 +144,7 @@ pub(crate) fn bounds(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)
 }
 
 /// A power of ten: `10⁻⁶`, and 1 for `10⁰`.
-fn power(exponent: f64) -> String {
+pub(crate) fn power(exponent: f64) -> String {
     match exponent {
         e if e.abs() < 0.5 => "1".to_owned(),
         e if (e - 1.0).abs() < 0.5 => "10".to_owned(),
@@ -182,7 +182,7 @@ pub(crate) fn number(value: f64) -> String {
     }
     let size = value.abs().log10();
     if !(-3.0..6.0).contains(&size) {
-        return scientific(value);
+        return mantissa_and_power(value);
     }
     let decimals = (2.0 - size.floor()).clamp(0.0, 9.0);
     let text = match decimals {
@@ -200,8 +200,15 @@ pub(crate) fn number(value: f64) -> String {
     }
 }
 
-/// `2.3·10⁻⁹`.
+/// A size that may be anything: `2.3·10⁻⁹`, or plain where that is short.
 pub(crate) fn scientific(value: f64) -> String {
+    if (0.01..1e4).contains(&value.abs()) {
+        return number(value);
+    }
+    mantissa_and_power(value)
+}
+
+fn mantissa_and_power(value: f64) -> String {
     let text = format!("{value:.1e}");
     match text.split_once('e') {
         Some((mantissa, exponent)) => {

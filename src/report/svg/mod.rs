@@ -8,7 +8,7 @@
 mod axis;
 mod heat;
 
-pub(crate) use axis::{Axis, Unit, number, scientific, seconds};
+pub(crate) use axis::{Axis, Unit, number, power, scientific, seconds};
 pub(crate) use heat::Heat;
 
 use std::fmt::Write;
@@ -20,10 +20,10 @@ pub(crate) const STYLE: &str = include_str!("style.css");
 
 /// Paper of one panel.
 pub(crate) const WIDTH: f64 = 420.0;
-pub(crate) const HEIGHT: f64 = 330.0;
+pub(crate) const HEIGHT: f64 = 336.0;
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 14.0;
-const TOP: f64 = 34.0;
+const TOP: f64 = 42.0;
 const BOTTOM: f64 = 46.0;
 
 /// Shapes, so that colour is never alone in telling methods apart.
@@ -200,7 +200,7 @@ impl Plot {
         write!(
             out,
             "<svg class=\"plot\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\
-             <text class=\"title\" x=\"{LEFT}\" y=\"20\">{title}</text>"
+             <text class=\"title\" x=\"{LEFT}\" y=\"17\">{title}</text>"
         )?;
         if let Some(heat) = &self.heat {
             heat.write(out, |x| self.across(x), |y| self.down(y))?;
@@ -221,10 +221,17 @@ impl Plot {
         let grid = if self.heat.is_some() { "tick" } else { "grid" };
         for (value, label) in self.x.ticks(6.0) {
             let x = self.across(value);
+            // A label at the very end would leave the paper.
+            let anchor = if x > right - 12.0 { "end" } else { "middle" };
+            let shown = if x > right - 12.0 {
+                right + RIGHT - 3.0
+            } else {
+                x
+            };
             write!(
                 out,
                 "<path class=\"{grid}\" d=\"M{x:.1} {bottom}V{TOP}\"/>\
-                 <text class=\"label\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}</text>",
+                 <text class=\"label\" x=\"{shown:.1}\" y=\"{:.1}\" text-anchor=\"{anchor}\">{label}</text>",
                 bottom + 15.0
             )?;
         }
@@ -265,9 +272,9 @@ impl Plot {
             let x = self.across(factor / value);
             write!(
                 out,
-                "<path class=\"frame\" d=\"M{x:.1} {TOP}v4\"/>\
+                "<path class=\"frame\" d=\"M{x:.1} {TOP}v-4\"/>\
                  <text class=\"note\" x=\"{x:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{label}×</text>",
-                TOP + 15.0
+                TOP - 7.0
             )?;
         }
         Ok(())

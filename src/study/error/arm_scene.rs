@@ -10,7 +10,9 @@ use crate::math::integrator::{Method, increment, two_sum};
 use crate::math::kinematics::forward;
 use crate::math::pid::{Gains, Pid, Setpoint};
 use crate::math::simulation::Simulation;
+use crate::study::linear::Linear;
 use crate::study::reference::{DoubleDouble, Law, Reference, largest_difference};
+use crate::study::stability::{Sampling, largest_timestep};
 
 /// How the effort of an arm's scene is found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -236,6 +238,16 @@ impl<const N: usize> Scene for ArmScene<N> {
         let mut simulation = self.simulation(method, steps);
         simulation.advance(steps);
         simulation.state().position.iter().sum()
+    }
+
+    fn predicted_limit(&self, method: Method) -> Option<f64> {
+        let (gains, setpoint, sampling) = match &self.drive {
+            Drive::Free => return None,
+            Drive::Continuous(gains, setpoint) => (gains, setpoint, Sampling::Continuous),
+            Drive::Held(gains, setpoint) => (gains, setpoint, Sampling::Held),
+        };
+        let linear = Linear::at_setpoint(&self.arm, gains, setpoint);
+        largest_timestep(&linear, method, sampling)
     }
 
     fn judged_end(&self, method: Method, steps: u64) -> f64 {

@@ -106,6 +106,10 @@ impl Scene for ParticleScene {
         end
     }
 
+    fn predicted_limit(&self, _: Method) -> Option<f64> {
+        None
+    }
+
     fn most_steps(&self) -> u64 {
         MAX_STEPS
     }
