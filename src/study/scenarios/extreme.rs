@@ -5,7 +5,7 @@
     reason = "indices name the joints of arrays of that length"
 )]
 
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::support::{apart, at_rest, free, setting, verdict};
 use super::{Scenario, Verdict};
@@ -16,6 +16,7 @@ use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
 use crate::study::linear::{Linear, no_control};
 use crate::study::matrix::largest;
+use crate::study::reference::DoubleDouble;
 use crate::study::rollout::{Plan, Rollout};
 use crate::study::stability::{Sampling, largest_timestep};
 
@@ -215,14 +216,14 @@ fn huge_steps() -> Verdict {
     verdict(holds, observed.join(", "))
 }
 
-/// `2π` times 15 915 494 is 1e8 less 3.5; what is left of the wound angle is exact to 1e-16 with `2π` in two parts.
+/// The first joint at 1e8 rad, and at what is left of that without its whole turns.
 fn wound() -> Verdict {
-    const TURNS: f64 = 15_915_494.0;
-    const TWO_PI_LOW: f64 = 2.449_293_598_294_706_4e-16;
+    /// What 2π is short of in a double.
+    const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;
     let angle = 1e8;
-    // 2π = 6.28125 + rest: the first product is exact, the second is small.
-    let rest = std::f64::consts::TAU - 6.28125;
-    let unwound = ((angle - TURNS * 6.28125) - TURNS * rest) - TURNS * TWO_PI_LOW;
+    let turn = DoubleDouble::from(TAU) + DoubleDouble::from(TAU_LOW);
+    let turns = DoubleDouble::from((angle / TAU).round());
+    let unwound = (DoubleDouble::from(angle) - turns * turn).to_f64();
     let arm = Arm::<2>::default();
     let start = State {
         position: [unwound, 0.7],
