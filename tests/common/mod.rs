@@ -2,8 +2,16 @@
 //!
 //! Every wait has a limit, generous because machines are noisy, and fails with what was awaited.
 
-#![allow(dead_code, reason = "each test file uses its own part of this")]
-
+#![allow(
+    dead_code,
+    unreachable_pub,
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "each test file uses its own part of this, and a helper of a test fails by panicking"
+)]
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
