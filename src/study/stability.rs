@@ -91,7 +91,7 @@ pub struct Limits {
     pub advised: Option<f64>,
 }
 
-/// All limits of a loop. Some 5 ms of one core for two links, 50 to 100 ms for three (optimised build).
+/// All limits of a loop. Some 5 ms of one core for two links, 0.1 s for three (optimised build).
 #[must_use]
 pub fn limits<const N: usize>(
     arm: &Arm<N>,
@@ -114,8 +114,8 @@ pub fn limits<const N: usize>(
     }
 }
 
-/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Some 0.2 ms of one core for two links, 0.7 ms
-/// for three (optimised build).
+/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Half a millisecond of one core for two
+/// links, one for three (optimised build).
 #[must_use]
 pub fn limit_held<const N: usize>(
     arm: &Arm<N>,
