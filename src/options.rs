@@ -10,11 +10,14 @@
 use std::ffi::OsString;
 use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+use std::path::PathBuf;
 
 use clap::builder::{OsStringValueParser, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Arg, ArgMatches, Command};
+use clap::{Arg, ArgAction, ArgMatches, Command};
 use tracing::level_filters::LevelFilter;
+
+use crate::report::{self, ReportOptions};
 
 /// Where the runtime listens unless told otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
@@ -29,6 +32,9 @@ const LEVELS: [(&str, LevelFilter); 6] = [
     ("debug", LevelFilter::DEBUG),
     ("trace", LevelFilter::TRACE),
 ];
+
+/// The subcommand that makes the study's report, and the directory that it writes to unless told otherwise.
+const REPORT: &str = "report";
 
 const AFTER_HELP: &str = "\
 An option wins over its environment variable; an empty variable counts as unset.
@@ -132,6 +138,8 @@ impl Default for Options {
 pub enum Parsed {
     /// To serve clients, with these options.
     Serve(Options),
+    /// To make the study's report.
+    Report(ReportOptions),
     /// To show this text on standard output, and no more: the help or the version.
     Show(String),
 }
@@ -249,6 +257,9 @@ impl Options {
             Ok(matches) => matches,
             Err(error) => return told(&error),
         };
+        if let Some(report) = matches.subcommand_matches(REPORT) {
+            return Ok(Parsed::Report(read_report(report)));
+        }
         let given = |setting| given(setting, &matches, &environment);
         let bind = given(&BIND)
             .map(read_bind)
@@ -293,6 +304,55 @@ fn command() -> Command {
         .about(env!("CARGO_PKG_DESCRIPTION"))
         .after_help(AFTER_HELP)
         .args(options)
+        .args_conflicts_with_subcommands(true)
+        .disable_help_subcommand(true)
+        .subcommand(report_command())
+}
+
+fn report_command() -> Command {
+    let option = |name: &'static str, value: &'static str, about: String| {
+        Arg::new(name).long(name).value_name(value).help(about)
+    };
+    Command::new(REPORT)
+        .about("Measure error against run time and stability, and write a page about it")
+        .arg(
+            option(
+                "out",
+                "DIRECTORY",
+                "Where to write it [default: report]".to_owned(),
+            )
+            .value_parser(OsStringValueParser::new()),
+        )
+        .arg(
+            option(
+                "only",
+                "NAMES",
+                format!(
+                    "Make these sections anew, keep the others: {}",
+                    report::names()
+                ),
+            )
+            .value_delimiter(','),
+        )
+        .arg(
+            Arg::new("quick")
+                .long("quick")
+                .action(ArgAction::SetTrue)
+                .help("Coarser and shorter: a look in seconds"),
+        )
+}
+
+fn read_report(matches: &ArgMatches) -> ReportOptions {
+    ReportOptions {
+        out: matches
+            .get_one::<OsString>("out")
+            .map_or_else(|| PathBuf::from(REPORT), PathBuf::from),
+        only: matches
+            .get_many::<String>("only")
+            .map(|names| names.cloned().collect())
+            .unwrap_or_default(),
+        quick: matches.get_flag("quick"),
+    }
 }
 
 /// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
@@ -302,12 +362,17 @@ fn told(error: &clap::Error) -> Result<Parsed, UsageError> {
         _ => String::new(),
     };
     // The argument as the user gave it, and the option as the help shows it, share this place.
-    let argument = context(ContextKind::InvalidArg);
+    let argument = match error.kind() {
+        ErrorKind::InvalidSubcommand => context(ContextKind::InvalidSubcommand),
+        _ => context(ContextKind::InvalidArg),
+    };
     Err(match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
             return Ok(Parsed::Show(error.to_string()));
         }
-        ErrorKind::UnknownArgument => UsageError::UnknownArgument { argument },
+        ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand => {
+            UsageError::UnknownArgument { argument }
+        }
         ErrorKind::InvalidValue => UsageError::MissingValue { option: argument },
         ErrorKind::ArgumentConflict => UsageError::Repeated { option: argument },
         ErrorKind::TooManyValues => UsageError::UnexpectedValue {
