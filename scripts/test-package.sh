@@ -50,9 +50,15 @@ for _ in $(seq 100); do
     sleep 0.1
 done
 grep '^listening on 127\.0\.0\.1:[1-9]' "$work/out" || fail "no listening line within 10 s: $(cat "$work/out" "$work/err")"
+port=$(sed -n 's/^listening on .*://p' "$work/out")
+exec 3<>"/dev/tcp/127.0.0.1/$port"
+echo '{"op":"call_service","service":"/arm_sim/set_params","id":1}' >&3
+IFS= read -r -t 10 reply <&3 || fail "no response within 10 s: $(cat "$work/err")"
+echo "$reply"
+[[ $reply == *'"lengths":['*,*,*']'*'"result":true'* ]] || fail "not the parameters of a 3-link arm"
 kill -TERM "$server"
 status=0
 wait "$server" || status=$?
 server=
 [ "$status" -eq 0 ] || fail "exit status $status after SIGTERM: $(cat "$work/err")"
-say "ok: $archive builds offline, starts, and ends with status 0"
+say "ok: $archive builds offline, starts, answers, and ends with status 0"

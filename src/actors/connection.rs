@@ -15,7 +15,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -38,8 +38,12 @@ pub const MAX_RESPONSES_WAITING: usize = 32 * 1024 * 1024;
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;
 /// A client that takes no byte for so long while responses wait is disconnected.
 pub const STALL_LIMIT: Duration = Duration::from_secs(20);
-/// How long a connection whose client has stopped sending may still take to send what it owes.
+/// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
+/// end of the stream itself may take.
 pub const LINGER: Duration = Duration::from_secs(5);
+/// How long a client that has stopped sending is owed the answers that are not ready yet: longer than other clients
+/// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
+pub const ANSWERS_OWED: Duration = Duration::from_secs(15);
 
 /// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
 const ARM_STATE: [&str; 3] = [
@@ -73,6 +77,10 @@ struct Shared {
     finishing: Cell<bool>,
     /// The client speaks something else, or is one too many: it is told so, and its input swallowed.
     refusing: Cell<bool>,
+    /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
+    unbatched: Cell<bool>,
+    /// Bytes of responses in the outbox, for the registry to look at.
+    backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
 }
 
@@ -95,6 +103,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             room: Notify::new(),
             finishing: Cell::new(false),
             refusing: Cell::new(false),
+            unbatched: Cell::new(false),
+            backlog: Arc::default(),
             gauges,
         });
         Self {
@@ -161,6 +171,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             configure: address.clone().recipient(),
             finish: address.recipient(),
             gone: Arc::new(AtomicBool::new(false)),
+            backlog: Arc::clone(&self.shared.backlog),
         };
         // Nothing is read before the registry knows the client.
         self.registry
@@ -295,6 +306,8 @@ impl Shared {
             self.responses_since.set(Some(Instant::now()));
         }
         outbox.push_response(frame, topics);
+        self.backlog
+            .store(outbox.response_bytes(), Ordering::Relaxed);
         self.outgoing.notify_one();
     }
 
@@ -312,6 +325,8 @@ impl Shared {
     fn written(&self, bytes: usize, registry: &Addr<Registry>) {
         let mut outbox = self.outbox.borrow_mut();
         outbox.written(bytes);
+        self.backlog
+            .store(outbox.response_bytes(), Ordering::Relaxed);
         if outbox.response_bytes() == 0 {
             self.responses_since.set(None);
         }
@@ -342,6 +357,11 @@ impl Shared {
     fn is_computing(&self) -> bool {
         let computations = self.computations.borrow();
         computations.running || !computations.waiting.is_empty()
+    }
+
+    /// Nobody waits for the computations any more.
+    fn abandon_computations(&self) {
+        *self.computations.borrow_mut() = Computations::default();
     }
 
     /// Nothing more is read; what is owed is sent.

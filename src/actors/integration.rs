@@ -85,6 +85,10 @@ enum Stage {
 impl Computation for IntegrationStep {
     fn advance(&mut self, deadline: Instant) -> Progress {
         loop {
+            // Looked at first: an answer once given is not followed by another because the caller has left meanwhile.
+            if matches!(self.stage, Stage::Done) {
+                return Progress::Finished;
+            }
             if self.reply.caller_is_gone() {
                 self.refuse("the caller is gone");
             }
@@ -92,7 +96,7 @@ impl Computation for IntegrationStep {
                 Stage::Unread(arguments) => match read(&arguments) {
                     Ok(particle) => Stage::Stepping(Box::new(particle)),
                     Err(why) => {
-                        self.refuse(&why);
+                        self.reply.refuse(&why);
                         Stage::Done
                     }
                 },
@@ -110,15 +114,19 @@ impl Computation for IntegrationStep {
                         Stage::Done
                     }
                 },
-                Stage::Done => return Progress::Finished,
+                Stage::Done => Stage::Done,
             };
-            if Instant::now() >= deadline {
+            if Instant::now() >= deadline && !matches!(self.stage, Stage::Done) {
                 return Progress::Unfinished;
             }
         }
     }
 
     fn refuse(&mut self, why: &str) {
+        // The pool may end between the answer and the last look at the clock.
+        if matches!(self.stage, Stage::Done) {
+            return;
+        }
         self.reply.refuse(why);
         self.stage = Stage::Done;
     }

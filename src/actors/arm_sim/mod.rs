@@ -4,7 +4,8 @@
 //! step by `math::simulation`, requests are read in [`services`], messages written in [`telemetry`].
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
-//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`].
+//! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up after
+//! [`BREATHER`].
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
@@ -33,6 +34,9 @@ use crate::protocol::trajectory::joint_trajectory;
 pub const PUBLISH_RATE: u32 = 60;
 /// Time that one wake-up may spend on steps: what a message to the arm may have to wait for.
 pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
+/// Between two wake-ups while steps are owed. So the arm takes what it needs of its core, not a share that is fixed by the rate
+/// of publishing; and a timestep that no machine can follow leaves the others some of it.
+pub const BREATHER: Duration = Duration::from_millis(1);
 /// Steps between two looks at the clock: some 10 microseconds of work.
 const BATCH: u64 = 64;
 
@@ -46,6 +50,8 @@ pub struct ArmSim<const N: usize> {
     simulation: Simulation<N>,
     pacer: Pacer,
     paused: bool,
+    /// A wake-up after a [`BREATHER`] is on its way.
+    catching_up: bool,
     /// The moment from which the pacer and the ticks count.
     epoch: Instant,
     publish: Recipient<Publish>,
@@ -70,6 +76,7 @@ impl<const N: usize> ArmSim<N> {
             telemetry: Telemetry::new(gauges, &simulation),
             simulation,
             paused: false,
+            catching_up: false,
             epoch: Instant::now(),
             publish,
             respond,
@@ -123,8 +130,8 @@ impl<const N: usize> Actor for ArmSim<N> {
 impl<const N: usize> Handler<ServiceCall> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, call: ServiceCall, _: &mut Context<Self>) {
-        self.advance_to_now();
+    fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
+        self.advance_to_now(ctx);
         self.serve(call);
     }
 }
@@ -133,8 +140,8 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
     type Result = ();
 
     /// A trajectory: its last point is the setpoint, from the next step on.
-    fn handle(&mut self, message: TopicMessage, _: &mut Context<Self>) {
-        self.advance_to_now();
+    fn handle(&mut self, message: TopicMessage, ctx: &mut Context<Self>) {
+        self.advance_to_now(ctx);
         match joint_trajectory(&message.msg, &self.joint_names) {
             Ok(request) => {
                 if let (Ok(position), Ok(velocity)) =
@@ -171,8 +178,8 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
 impl<const N: usize> Handler<TakeSnapshot<N>> for ArmSim<N> {
     type Result = Snapshot<N>;
 
-    fn handle(&mut self, _: TakeSnapshot<N>, _: &mut Context<Self>) -> Snapshot<N> {
-        self.advance_to_now();
+    fn handle(&mut self, _: TakeSnapshot<N>, ctx: &mut Context<Self>) -> Snapshot<N> {
+        self.advance_to_now(ctx);
         Snapshot(Box::new(self.simulation.clone()))
     }
 }
@@ -186,48 +193,64 @@ impl<const N: usize> ArmSim<N> {
         let since_tick = self.epoch.elapsed().as_nanos() % tick.as_nanos();
         let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap_or(0));
         ctx.run_later(wait, |arm, ctx| {
-            arm.tick();
+            arm.advance_to_now(ctx);
+            arm.publish_state();
             arm.schedule_tick(ctx);
         });
     }
 
-    fn tick(&mut self) {
-        self.advance_to_now();
-        self.publish_state();
-    }
-
-    /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed.
-    fn advance_to_now(&mut self) {
+    /// Takes the steps that are due, as far as one wake-up's budget goes; the rest stays owed until soon after.
+    fn advance_to_now(&mut self, ctx: &mut Context<Self>) {
         if self.paused || self.simulation.divergence().is_some() {
             return;
         }
-        let mut due = self.pacer.due(self.epoch.elapsed());
+        let due = self.pacer.due(self.epoch.elapsed());
         if due == 0 {
             return;
         }
+        let taken = self.take_steps(due);
+        self.pacer.took(taken);
+        if let Some(divergence) = self.simulation.divergence() {
+            self.telemetry.owes(0, 0.0);
+            tracing::warn!(
+                step = divergence.step,
+                time = divergence.time,
+                "the simulation has diverged"
+            );
+            self.publish_diagnostics();
+            return;
+        }
+        self.telemetry.owes(due - taken, self.simulation.timestep());
+        if taken < due && !self.catching_up {
+            self.catching_up = true;
+            ctx.run_later(BREATHER, |arm, ctx| {
+                arm.catching_up = false;
+                arm.advance_to_now(ctx);
+            });
+        }
+    }
+
+    /// Takes up to `due` steps, and no longer than the budget; answers how many.
+    fn take_steps(&mut self, due: u64) -> u64 {
         // The budget is about the processor's time, so it is measured on the real clock, also where tests have another.
         let started = std::time::Instant::now();
-        let mut steps = 0;
-        while due > 0 && started.elapsed() < WAKE_UP_BUDGET {
-            let batch = due.min(BATCH);
-            let taken = self.simulation.advance(batch);
-            steps += taken;
-            due -= taken;
-            if taken < batch {
+        let mut taken = 0;
+        while taken < due && started.elapsed() < WAKE_UP_BUDGET {
+            let batch = BATCH.min(due - taken);
+            let advanced = self.simulation.advance(batch);
+            taken += advanced;
+            if advanced < batch {
                 break;
             }
         }
-        self.pacer.took(steps);
         self.telemetry
-            .stepped(steps, started.elapsed(), self.simulation.timestep());
-        if self.simulation.divergence().is_some() {
-            tracing::warn!(time = self.simulation.time(), "the simulation has diverged");
-            self.publish_diagnostics();
-        }
+            .stepped(taken, started.elapsed(), self.simulation.timestep());
+        taken
     }
 
     /// Time counts from here: what was owed of an unfinished step is gone.
     fn restart_pacer(&mut self) {
+        self.telemetry.owes(0, 0.0);
         self.pacer
             .restart(self.epoch.elapsed(), self.simulation.timestep());
     }

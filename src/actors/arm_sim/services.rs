@@ -11,8 +11,9 @@ use crate::math::arm::{Arm, ArmError};
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 use crate::protocol::catalog::Service;
-use crate::protocol::fields::{Bound, Fields};
+use crate::protocol::fields::{Bound, Fields, Rejection};
 use crate::protocol::messages::Empty;
+use crate::protocol::op::Arguments;
 
 #[derive(Serialize)]
 struct Integrator {
@@ -53,7 +54,8 @@ impl<const N: usize> ArmSim<N> {
             arguments,
             reply,
         } = call;
-        let mut fields = match Fields::read(&arguments, service) {
+        let nothing = Arguments::none();
+        let mut fields = match read(&arguments, &nothing, service) {
             Ok(fields) => fields,
             Err(rejection) => return reply.conclude(&Empty {}, &rejection.to_string()),
         };
@@ -80,7 +82,10 @@ impl<const N: usize> ArmSim<N> {
                 reply.conclude(&Switch { data }, &fields.status());
             }
             Service::Reset => {
-                self.reset();
+                // A reset has no fields: what is rejected here is `args` itself.
+                if fields.accepted() {
+                    self.reset();
+                }
                 let state = self.simulation.state();
                 let pose = Pose {
                     position: &state.position,
@@ -186,6 +191,20 @@ impl<const N: usize> ArmSim<N> {
         }
         self.simulation.set_gains(gains);
     }
+}
+
+/// The fields of a request. Arguments that are rejected as a whole count as `nothing`, so that the answer to them, too, echoes
+/// the values as they are.
+fn read<'a>(
+    arguments: &'a Arguments,
+    nothing: &'a Arguments,
+    service: Service,
+) -> Result<Fields<'a>, Rejection> {
+    Fields::read(arguments, service).or_else(|rejection| {
+        let mut fields = Fields::read(nothing, service)?;
+        fields.refuse(&rejection.field, &rejection.reason);
+        Ok(fields)
+    })
 }
 
 /// The values as an array; the reader has checked how many they are.

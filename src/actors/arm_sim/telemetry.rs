@@ -11,6 +11,7 @@ use super::{ArmSim, PUBLISH_RATE};
 use crate::actors::gauges::Gauges;
 use crate::actors::registry::Publish;
 use crate::math::dynamics;
+use crate::math::pacer::CATCH_UP;
 use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::{
@@ -31,6 +32,8 @@ pub(super) struct Telemetry {
     /// Energy when it was last changed from outside \[J\]: what the drift is measured from.
     energy_reference: f64,
     window: Window,
+    /// Wall time that the latest wake-up left owed \[s\].
+    owed: f64,
     /// Rates over the window before, for a message that comes early in the present one.
     last_rates: Rates,
 }
@@ -41,8 +44,22 @@ struct Window {
     steps: u64,
     /// Simulation time \[s\].
     simulated: f64,
-    /// Longest batch divided by its steps \[s\].
-    max_step_time: f64,
+    /// The longest batch since the last message.
+    longest: Batch,
+}
+
+/// The steps of one wake-up.
+#[derive(Clone, Copy, Default)]
+struct Batch {
+    steps: u64,
+    took: Duration,
+}
+
+impl Batch {
+    /// Time per step \[s\]; 0 where there was none.
+    fn step_time(self) -> f64 {
+        self.took.as_secs_f64() / as_f64(self.steps.max(1))
+    }
 }
 
 #[derive(Clone, Copy, Default)]
@@ -59,6 +76,7 @@ impl Telemetry {
             ticks: 0,
             energy_reference: energy(simulation),
             window: Window::new(),
+            owed: 0.0,
             last_rates: Rates::default(),
         }
     }
@@ -81,10 +99,19 @@ impl Telemetry {
         }
         self.window.steps += steps;
         self.window.simulated += as_f64(steps) * timestep;
-        self.window.max_step_time = self
-            .window
-            .max_step_time
-            .max(took.as_secs_f64() / as_f64(steps));
+        if took > self.window.longest.took {
+            self.window.longest = Batch { steps, took };
+        }
+    }
+
+    /// Notes how many steps a wake-up left owed.
+    pub(super) fn owes(&mut self, steps: u64, timestep: f64) {
+        self.owed = as_f64(steps) * timestep;
+    }
+
+    /// Whether the arm lags so far behind wall time that it soon has to drop some, or does so already.
+    fn lags(&self) -> bool {
+        self.owed > CATCH_UP.as_secs_f64() / 2.0
     }
 }
 
@@ -94,7 +121,7 @@ impl Window {
             began: Instant::now(),
             steps: 0,
             simulated: 0.0,
-            max_step_time: 0.0,
+            longest: Batch::default(),
         }
     }
 
@@ -130,7 +157,7 @@ impl<const N: usize> ArmSim<N> {
     pub(super) fn publish_diagnostics(&mut self) {
         if self.telemetry.wants(Topic::Diagnostics) {
             self.publish(Topic::Diagnostics, &self.diagnostics());
-            self.telemetry.window.max_step_time = 0.0;
+            self.telemetry.window.longest = Batch::default();
         }
     }
 
@@ -184,7 +211,10 @@ impl<const N: usize> ArmSim<N> {
                 (2, "diverged", message)
             }
             None if self.paused => (0, "paused", "paused".to_owned()),
-            None => (0, "running", "running".to_owned()),
+            None => {
+                let level = u8::from(self.telemetry.lags());
+                (level, "running", "running".to_owned())
+            }
         };
         let energy = energy(&self.simulation);
         let rates = self
@@ -198,7 +228,7 @@ impl<const N: usize> ArmSim<N> {
             ("steps_per_second", rates.steps_per_second),
             ("energy", energy),
             ("energy_drift", energy - self.telemetry.energy_reference),
-            ("max_step_time", self.telemetry.window.max_step_time),
+            ("max_step_time", self.telemetry.window.longest.step_time()),
         ];
         let mut values = vec![entry("state", state)];
         // Debug prints what is huge or tiny with an exponent.

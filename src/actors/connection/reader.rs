@@ -7,13 +7,14 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use actix::prelude::*;
-use bytes::BytesMut;
+use bytes::{Bytes, BytesMut};
+use serde_json::value::RawValue;
 use tokio::io::{AsyncRead, AsyncReadExt};
 use tokio::time::timeout;
 
-use super::{Finish, LINGER, Shared};
+use super::{ANSWERS_OWED, Finish, Shared};
 use crate::actors::ConnectionId;
-use crate::actors::registry::{Disconnect, Registry, Request};
+use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
 use crate::protocol::frame::{Frame, FrameError, FrameReader, Opening, opening};
 use crate::protocol::messages::{self, Level};
@@ -55,7 +56,11 @@ impl Reader {
     pub(super) async fn run<R: AsyncRead + Unpin>(mut self, mut input: R) {
         let mut chunk = BytesMut::with_capacity(CHUNK);
         match self.greet(&mut input, &mut chunk).await {
-            Opening::Json => self.converse(&mut input, &mut chunk).await,
+            Opening::Json => match self.converse(&mut input, &mut chunk).await {
+                Ok(()) => self.settle().await,
+                // A broken stream takes no answers.
+                Err(_) => self.shared.abandon_computations(),
+            },
             Opening::Foreign(foreign) => {
                 self.shared.refusing.set(true);
                 self.shared
@@ -75,8 +80,8 @@ impl Reader {
     async fn greet<R: AsyncRead + Unpin>(&self, input: &mut R, chunk: &mut BytesMut) -> Opening {
         loop {
             match read_some(input, chunk).await {
-                0 => return Opening::Json,
-                _ => match opening(chunk) {
+                Ok(0) | Err(_) => return Opening::Json,
+                Ok(_) => match opening(chunk) {
                     Opening::Undecided => {}
                     decided => return decided,
                 },
@@ -84,28 +89,47 @@ impl Reader {
         }
     }
 
-    /// Handles frames until the stream ends.
-    async fn converse<R: AsyncRead + Unpin>(&mut self, input: &mut R, chunk: &mut BytesMut) {
+    /// Handles frames until the stream ends; an error if it broke.
+    async fn converse<R: AsyncRead + Unpin>(
+        &mut self,
+        input: &mut R,
+        chunk: &mut BytesMut,
+    ) -> std::io::Result<()> {
         loop {
+            let full = chunk.len() >= CHUNK / 2;
             self.frames.push(chunk);
             chunk.clear();
             while let Some(frame) = self.next_frame().await {
                 self.take(frame).await;
             }
-            if self.shared.finishing.get() || read_some(input, chunk).await == 0 {
+            if full {
+                // A long frame comes in many chunks, all of them at hand: the other clients have a turn in between.
+                tokio::task::yield_now().await;
+            }
+            if self.shared.finishing.get() || read_some(input, chunk).await? == 0 {
                 break;
             }
         }
         if let Some(error) = self.frames.finish() {
-            self.shared
-                .send(messages::status(Level::Error, &error.to_string(), None));
+            self.complain(&error.to_string(), None).await;
         }
-        let computations = async {
+        Ok(())
+    }
+
+    /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
+    /// answer or withdraw, and waits for the answers that it is owed.
+    async fn settle(&self) {
+        let answered = async {
+            if let Ok(Handled(Some(calls))) = self.registry.send(Retire(self.id)).await {
+                let _ = calls.await;
+            }
             while self.shared.is_computing() {
                 self.shared.room.notified().await;
             }
         };
-        let _ = timeout(LINGER, computations).await;
+        if timeout(ANSWERS_OWED, answered).await.is_err() {
+            self.shared.abandon_computations();
+        }
     }
 
     /// The next complete frame, once the client may be read.
@@ -120,12 +144,9 @@ impl Reader {
     async fn take(&self, frame: Result<Frame, FrameError>) {
         let frame = match frame {
             Ok(frame) => frame,
-            Err(error) => {
-                return self
-                    .shared
-                    .send(messages::status(Level::Error, &error.to_string(), None));
-            }
+            Err(error) => return self.complain(&error.to_string(), None).await,
         };
+        self.shared.unbatched.set(!frame.newline);
         let Incoming { id, op } = op::read(&frame.text);
         match op {
             Ok(op) => {
@@ -134,19 +155,33 @@ impl Reader {
                     id,
                     op,
                 })
-                .await
+                .await;
             }
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
-                self.shared
-                    .send(messages::failure(&service, id.as_deref(), &why));
+                self.say(messages::failure(&service, id.as_deref(), &why))
+                    .await;
             }
             Err(OpError::Status(problem)) => {
-                let why = problem.to_string();
-                self.shared
-                    .send(messages::status(Level::Error, &why, id.as_deref()));
+                self.complain(&problem.to_string(), id.as_deref()).await;
             }
         }
+    }
+
+    async fn complain(&self, why: &str, id: Option<&RawValue>) {
+        self.say(messages::status(Level::Error, why, id)).await;
+    }
+
+    /// Sends a frame to the client by way of the registry: an answer to an earlier frame may still be in its mailbox,
+    /// and must not be overtaken.
+    async fn say(&self, frame: Bytes) {
+        let respond = Respond {
+            connection: self.id,
+            frame,
+            service: None,
+            done: None,
+        };
+        let _ = self.registry.send(respond).await;
     }
 
     async fn perform(&self, request: Request) {
@@ -165,10 +200,13 @@ impl Reader {
     }
 }
 
-/// Reads what is there; 0 at the end of the stream, or if it broke.
-async fn read_some<R: AsyncRead + Unpin>(input: &mut R, chunk: &mut BytesMut) -> usize {
+/// Reads what is there; 0 at the end of the stream.
+async fn read_some<R: AsyncRead + Unpin>(
+    input: &mut R,
+    chunk: &mut BytesMut,
+) -> std::io::Result<usize> {
     chunk.reserve(CHUNK);
-    input.read_buf(chunk).await.unwrap_or(0)
+    input.read_buf(chunk).await
 }
 
 /// Swallows a refused client's input for a bounded time.
@@ -179,8 +217,8 @@ pub(super) async fn discard<R: AsyncRead + Unpin>(mut input: R) {
         while swallowed < DISCARD_BYTES {
             chunk.clear();
             match read_some(&mut input, &mut chunk).await {
-                0 => break,
-                read => swallowed += read,
+                Ok(0) | Err(_) => break,
+                Ok(read) => swallowed += read,
             }
         }
     };

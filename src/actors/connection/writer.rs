@@ -27,15 +27,21 @@ pub(super) async fn run<W: AsyncWrite + Unpin>(
     let mut batch = Vec::with_capacity(BATCH_FRAMES);
     loop {
         let now = Instant::now().into_std();
+        // Clients that end no line take what one read gives them for one frame.
+        let frames = if shared.unbatched.get() {
+            1
+        } else {
+            BATCH_FRAMES
+        };
         shared
             .outbox
             .borrow_mut()
-            .take_batch(now, BATCH_FRAMES, BATCH_BYTES, &mut batch);
+            .take_batch(now, frames, BATCH_BYTES, &mut batch);
         if !batch.is_empty() {
             if !write_batch(&mut output, &mut batch, shared, registry).await {
                 return false;
             }
-        } else if shared.finishing.get() {
+        } else if shared.finishing.get() && !shared.is_computing() {
             return timeout_at(Instant::now() + LINGER, output.shutdown())
                 .await
                 .is_ok();
@@ -116,15 +122,14 @@ async fn write_some<W: AsyncWrite + Unpin>(output: &mut W, frames: &[Bytes]) -> 
         .filter(|&written| written > 0)
 }
 
-/// Ends when the client has taken nothing since `last_byte` for too long while responses wait, or the connection is
-/// finishing and its time for that is over.
+/// Ends when the client has taken nothing since `last_byte` for too long: while responses wait, or because the
+/// connection is finishing.
 async fn stalled(shared: &Shared, last_byte: Instant) {
     loop {
         let waiting_since = shared.responses_since.get();
-        let limit = if shared.finishing.get() {
-            Some(last_byte + LINGER)
-        } else {
-            waiting_since.map(|since| since.max(last_byte) + STALL_LIMIT)
+        let limit = match waiting_since {
+            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
+            None => shared.finishing.get().then(|| last_byte + LINGER),
         };
         match limit {
             None => shared.outgoing.notified().await,

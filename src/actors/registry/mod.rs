@@ -9,7 +9,7 @@ mod topics;
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -17,19 +17,20 @@ use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
 use self::refusal::Refusal;
-use self::services::Services;
+use self::services::{Forwarded, Services};
 pub use self::topics::Throttle;
 use self::topics::{Subscription, Topics};
 use super::ConnectionId;
-use super::connection::{Answer, Configure, Deliver, Finish};
+use super::connection::{Answer, Configure, Deliver, Finish, MAX_RESPONSES_WAITING};
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::Op;
 
-/// Clients at once; each costs a few kilobytes at rest and at most its outbox under load.
-pub const MAX_CONNECTIONS: usize = 1024;
+/// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
+/// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
+pub const MAX_CONNECTIONS: usize = 960;
 /// Subscriptions (topic and id) of one connection.
 pub const MAX_SUBSCRIPTIONS: usize = 1024;
 /// Topics that one connection advertises.
@@ -38,6 +39,9 @@ pub const MAX_ADVERTISED: usize = 1024;
 pub const MAX_PROVIDED: usize = 256;
 /// Calls of one connection that wait for clients to answer.
 pub const MAX_WAITING_CALLS: usize = 256;
+/// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
+/// answers to its own calls) is refused: it has not been read for long then, but others would go on.
+pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -62,6 +66,8 @@ struct Client {
     withdrawn: HashSet<Topic>,
     subscriptions: HashMap<Arc<str>, Vec<Subscription>>,
     provided: HashSet<Box<str>>,
+    /// Dropped once no call of this client waits any more, if it has stopped sending.
+    answered: Option<oneshot::Sender<()>>,
 }
 
 /// The runtime's own nodes: who serves, listens and publishes what.
@@ -116,6 +122,8 @@ pub struct Outlets {
     pub finish: Recipient<Finish>,
     /// Set when the client is gone: heavy computations for it stop.
     pub gone: Arc<AtomicBool>,
+    /// Bytes of responses that wait to be written; kept by the connection.
+    pub backlog: Arc<AtomicUsize>,
 }
 
 /// Why a client was not taken.
@@ -128,6 +136,12 @@ pub enum Refused {
     #[error("shutting down")]
     Closed,
 }
+
+/// The client has stopped sending: all that it registered is withdrawn. From its connection; the receiver, if there is
+/// one, ends when the calls that it made have been answered.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Retire(pub ConnectionId);
 
 /// The client is gone: all that it registered is withdrawn. From its connection; repeating is harmless.
 #[derive(Message)]
@@ -225,24 +239,31 @@ impl Handler<Connect> for Registry {
     }
 }
 
+impl Handler<Retire> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
+        self.withdraw(id);
+        if self.services.waiting_for(id) == 0 {
+            return Handled(None);
+        }
+        let (answered, all_answered) = oneshot::channel();
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.answered = Some(answered);
+        }
+        Handled(Some(all_answered))
+    }
+}
+
 impl Handler<Disconnect> for Registry {
     type Result = ();
 
     fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
-        let Some(client) = self.clients.remove(&id) else {
-            return;
-        };
-        client
-            .outlets
-            .gone
-            .store(true, std::sync::atomic::Ordering::Relaxed);
-        self.gauges.set_connections(self.clients.len() as u64);
-        for topic in client.subscriptions.keys() {
-            self.drop_subscriber(topic, id);
-        }
-        for call in self.services.forget(id) {
-            let why = Refusal::ProviderGone(call.service.to_string());
-            self.answer_forwarded(&call, &why);
+        self.withdraw(id);
+        self.services.forget_caller(id);
+        if let Some(client) = self.clients.remove(&id) {
+            client.outlets.gone.store(true, Ordering::Relaxed);
+            self.gauges.set_connections(self.clients.len() as u64);
         }
     }
 }
@@ -276,10 +297,7 @@ impl Handler<Respond> for Registry {
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
         if let Some(client) = self.clients.get(&respond.connection) {
-            client.outlets.answer.do_send(Answer {
-                frame: respond.frame,
-                service: respond.service,
-            });
+            client.send(respond.frame, respond.service);
         }
     }
 }
@@ -326,7 +344,17 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: HashMap::new(),
             provided: HashSet::new(),
+            answered: None,
         }
+    }
+
+    fn send(&self, frame: Bytes, service: Option<Service>) {
+        self.outlets.answer.do_send(Answer { frame, service });
+    }
+
+    /// Bytes of responses that it has not taken yet.
+    fn backlog(&self) -> usize {
+        self.outlets.backlog.load(Ordering::Relaxed)
     }
 }
 
@@ -343,6 +371,26 @@ impl Registry {
                 frame: frame.clone(),
             };
             subscriber.outlet.do_send(message);
+        }
+    }
+
+    /// Withdraws all that a client has registered, and fails the calls that wait for it as provider.
+    fn withdraw(&mut self, id: ConnectionId) {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return;
+        };
+        client.advertised.clear();
+        let subscriptions = std::mem::take(&mut client.subscriptions);
+        let provided = std::mem::take(&mut client.provided);
+        for topic in subscriptions.keys() {
+            self.drop_subscriber(topic, id);
+        }
+        for service in provided {
+            self.services.withdraw(&service, id);
+        }
+        for call in self.services.take_provided_by(id) {
+            let why = Refusal::ProviderGone(call.service.to_string());
+            self.answer_forwarded(&call, &why);
         }
     }
 
@@ -370,25 +418,30 @@ impl Registry {
 
     fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&RawValue>) {
         if let Some(client) = self.clients.get(&to) {
-            let frame = messages::status(level, msg, id);
-            client.outlets.answer.do_send(Answer {
-                frame,
-                service: None,
-            });
+            client.send(messages::status(level, msg, id), None);
         }
     }
 
     /// Fails a forwarded call.
-    fn answer_forwarded(&self, call: &services::Forwarded, why: &Refusal) {
+    fn answer_forwarded(&mut self, call: &Forwarded, why: &Refusal) {
         self.send_response(call.caller, &call.service, call.id.as_deref(), why);
+        self.note_answered(call.caller);
+    }
+
+    /// A call of `caller` has been answered: if it was the last one, a client that has stopped sending may go.
+    fn note_answered(&mut self, caller: ConnectionId) {
+        if self.services.waiting_for(caller) == 0
+            && let Some(client) = self.clients.get_mut(&caller)
+        {
+            client.answered = None;
+        }
     }
 
     /// Answers a call with `result: false`.
     fn send_response(&self, to: ConnectionId, service: &str, id: Option<&RawValue>, why: &Refusal) {
         if let Some(client) = self.clients.get(&to) {
             let frame = messages::failure(service, id, &why.to_string());
-            let service = Service::from_name(service);
-            client.outlets.answer.do_send(Answer { frame, service });
+            client.send(frame, Service::from_name(service));
         }
     }
 }

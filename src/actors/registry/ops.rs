@@ -13,11 +13,11 @@ use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
 use super::topics::{Subscription, Throttle};
 use super::{
-    Handled, MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS, Registry, Request,
-    TimedOut,
+    Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
+    Registry, Request, TimedOut,
 };
 use crate::actors::ConnectionId;
-use crate::actors::connection::{Answer, Configure};
+use crate::actors::connection::Configure;
 use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Direction, Service, Topic};
 use crate::protocol::messages::{self, Level};
@@ -291,12 +291,12 @@ impl Registry {
         if self.services.waiting_for(origin.from) >= MAX_WAITING_CALLS {
             return Err(Refusal::TooManyWaiting);
         }
+        if client.backlog() > MAX_BACKLOG {
+            return Err(Refusal::ProviderBusy(service.to_owned()));
+        }
         let number = self.services.next_call();
         let frame = messages::call(service, &Services::call_id(number), call.args.raw());
-        client.outlets.answer.do_send(Answer {
-            frame,
-            service: None,
-        });
+        client.send(frame, None);
         let registry = ctx.address();
         let patience = call.timeout.unwrap_or(DEFAULT_TIMEOUT);
         let timer = actix_rt::spawn(async move {
@@ -327,12 +327,14 @@ impl Registry {
             .services
             .complete(origin.id.as_deref(), service, origin.from)
             .ok_or_else(|| Refusal::StaleCall(service.to_owned()))?;
-        if let Some(caller) = self.clients.get(&call.caller) {
-            let frame = encode(service, call.id.as_deref());
-            caller.outlets.answer.do_send(Answer {
-                frame,
-                service: None,
-            });
+        let Some(caller) = self.clients.get(&call.caller) else {
+            return Ok(());
+        };
+        if caller.backlog() > MAX_BACKLOG {
+            self.answer_forwarded(&call, &Refusal::CallerBusy(service.to_owned()));
+        } else {
+            caller.send(encode(service, call.id.as_deref()), None);
+            self.note_answered(call.caller);
         }
         Ok(())
     }

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every sentence begins with the field it is about, or names the service.
 
-use super::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS};
+use super::{MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS};
 
 /// An op or a call that changed nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -29,6 +29,12 @@ pub(super) enum Refusal {
     ProviderGone(String),
     #[error("timeout: the provider of {0} did not answer in time")]
     TimedOut(String),
+    #[error("the provider of {0} does not read: more than {MAX_BACKLOG} bytes wait for it")]
+    ProviderBusy(String),
+    #[error(
+        "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
+    )]
+    CallerBusy(String),
     #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
     TooManyWaiting,
     #[error("{0} is not served by this runtime")]

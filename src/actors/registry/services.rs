@@ -103,30 +103,31 @@ impl Services {
 
     /// Takes every outstanding call, oldest first.
     pub(super) fn take_all(&mut self) -> Vec<Forwarded> {
-        let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
+        self.take_where(|_| true)
+    }
+
+    /// Takes the calls that wait for `provider`, oldest first.
+    pub(super) fn take_provided_by(&mut self, provider: ConnectionId) -> Vec<Forwarded> {
+        self.take_where(|call| call.provider == provider)
+    }
+
+    /// Forgets the calls that `caller` has made.
+    pub(super) fn forget_caller(&mut self, caller: ConnectionId) {
+        if self.waiting_for(caller) > 0 {
+            self.take_where(|call| call.caller == caller);
+        }
+    }
+
+    fn take_where(&mut self, wanted: impl Fn(&Forwarded) -> bool) -> Vec<Forwarded> {
+        let numbers: Vec<u64> = self
+            .outstanding
+            .iter()
+            .filter(|(_, call)| wanted(call))
+            .map(|(number, _)| *number)
+            .collect();
         numbers
             .into_iter()
             .filter_map(|number| self.take(number))
             .collect()
-    }
-
-    /// Withdraws all that `connection` provides and forgets all that it called; gives the calls that waited on it.
-    pub(super) fn forget(&mut self, connection: ConnectionId) -> Vec<Forwarded> {
-        self.providers.retain(|_, provider| *provider != connection);
-        let mut orphans = Vec::new();
-        let numbers: Vec<u64> = self
-            .outstanding
-            .iter()
-            .filter(|(_, call)| call.caller == connection || call.provider == connection)
-            .map(|(number, _)| *number)
-            .collect();
-        for number in numbers {
-            if let Some(call) = self.take(number)
-                && call.caller != connection
-            {
-                orphans.push(call);
-            }
-        }
-        orphans
     }
 }
