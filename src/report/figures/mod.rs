@@ -8,6 +8,7 @@ mod drift;
 mod error;
 mod horizon;
 mod stability;
+mod work;
 
 use super::Desk;
 use super::section::Section;
@@ -23,7 +24,7 @@ pub(crate) struct Maker {
 }
 
 /// All sections in the order in which they are made and shown.
-pub(crate) const SECTIONS: [Maker; 6] = [
+pub(crate) const SECTIONS: [Maker; 7] = [
     Maker {
         name: "error",
         title: "Error against cost",
@@ -59,6 +60,12 @@ pub(crate) const SECTIONS: [Maker; 6] = [
         title: "Uneven arms",
         weight: 2.0,
         make: conditioning::make,
+    },
+    Maker {
+        name: "work",
+        title: "What a scene does not need is left out",
+        weight: 6.0,
+        make: work::make,
     },
 ];
 

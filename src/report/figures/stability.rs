@@ -173,9 +173,16 @@ fn lines_of<const N: usize>(
 
 fn told(sampling: Sampling) -> &'static str {
     match sampling {
-        Sampling::Held => "held for the step (as shipped)",
+        Sampling::Held => "effort held for the step (as shipped)",
         Sampling::Continuous => "law in every stage",
     }
+}
+
+fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
 }
 
 fn table(lines: &[Line]) -> Table {
@@ -278,17 +285,17 @@ fn radius_figure(lines: &[Line]) -> (Figure, Csv) {
     let mut csv = Csv::new("control,method,dt,spectral_radius");
     let linear = Linear::at_setpoint(&arm, &Gains::<2>::default(), &setpoint);
     let plots = Sampling::ALL.map(|sampling| {
-        let x = Axis::log_between("timestep", Unit::Seconds, 3e-4, 3e-2);
-        let y = Axis::linear("growth per step (spectral radius)", 0.0, 2.0);
-        let mut plot = Plot::new(format!("Effort {}", told(sampling)), x, y);
+        let x = Axis::log_between("timestep", Unit::Seconds, 5e-4, 2e-2);
+        let y = Axis::linear("growth per step (spectral radius)", 0.9, 1.1);
+        let mut plot = Plot::new(capital(told(sampling)), x, y);
         plot.marks.push(Mark::Horizontal {
             y: 1.0,
             class: "ink",
             label: "unstable above".to_owned(),
         });
         for method in Method::ALL {
-            let curve = (0..=160).map(|index| {
-                let h = 3e-4 * 10_f64.powf(f64::from(index) / 80.0);
+            let curve = (0..=400).map(|index| {
+                let h = 5e-4 * 40_f64.powf(f64::from(index) / 400.0);
                 (
                     h,
                     step_matrix(&linear, method, sampling, h).spectral_radius(),
@@ -303,7 +310,7 @@ fn radius_figure(lines: &[Line]) -> (Figure, Csv) {
                     (*radius).into(),
                 ]);
             }
-            let shown = curve.into_iter().filter(|(_, radius)| *radius <= 2.0);
+            let shown = curve.into_iter().filter(|(_, radius)| *radius <= 1.1);
             plot.series.push(Series {
                 // Where curves lie on each other the dashed one lets the other through.
                 dashed: matches!(method, Method::Verlet | Method::Rk4)
@@ -421,7 +428,8 @@ fn map(desk: &mut Desk<'_>, meter: &mut Meter, cells: usize) -> (Figure, Csv, (u
             tally.0
         ),
         "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power of 3/2: the same motion, faster). Colour: whether \
-         a nudge of the arm itself dies out (blue) or grows (orange), the darker the faster. Line: the predicted limit. Dots: cells where the two disagree.",
+         a nudge of the arm itself dies out (blue) or grows (orange), the darker the faster. Line: the predicted limit. Dots: cells where the two disagree. In the lowest rows the gains are too weak \
+         to carry the arm against gravity: no timestep is stable.",
         &[Key::line("ink", "predicted limit")],
         &plots,
     );

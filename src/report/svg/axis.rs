@@ -117,18 +117,36 @@ impl Axis {
         );
         let stride = ((last - first) / most).ceil().max(1.0);
         let mut ticks = Vec::new();
+        // Decades alone would leave a short axis bare.
+        if (self.max / self.min).log10() < 2.2 {
+            let mut exponent = first - 1.0;
+            while exponent <= last {
+                for value in [1.0, 2.0, 5.0].map(|factor| factor * 10_f64.powf(exponent)) {
+                    if self.holds(value) {
+                        ticks.push((value, self.label(value)));
+                    }
+                }
+                exponent += 1.0;
+            }
+            return ticks;
+        }
         // Multiples of the stride, so that panels side by side agree.
         let mut exponent = (first / stride).ceil() * stride;
         while exponent <= last {
             let value = 10_f64.powf(exponent);
-            let label = match self.unit {
-                Unit::Number => power(exponent),
-                Unit::Seconds => seconds(value),
-            };
-            ticks.push((value, label));
+            ticks.push((value, self.label(value)));
             exponent += stride;
         }
         ticks
+    }
+
+    fn label(&self, value: f64) -> String {
+        let exponent = value.log10();
+        match self.unit {
+            Unit::Seconds => seconds(value),
+            Unit::Number if (exponent - exponent.round()).abs() < 1e-9 => power(exponent.round()),
+            Unit::Number => number(value),
+        }
     }
 }
 

@@ -144,13 +144,6 @@ pub(crate) enum Mark {
         decades: f64,
         orders: Vec<f64>,
     },
-    /// Words at a place.
-    Note {
-        x: f64,
-        y: f64,
-        label: String,
-        class: &'static str,
-    },
 }
 
 /// One panel.
@@ -308,13 +301,6 @@ impl Plot {
                 decades,
                 orders,
             } => self.slopes(out, (*x, *y), *decades, orders),
-            Mark::Note { x, y, label, class } => write!(
-                out,
-                "<text class=\"note {class}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>",
-                self.across(*x) + 4.0,
-                self.down(*y),
-                escape(label)
-            ),
             Mark::Vertical { .. } | Mark::Horizontal { .. } => Ok(()),
         }
     }
@@ -455,8 +441,12 @@ impl Key {
 }
 
 /// Panels and legend as one file: a grid `columns` wide, with its style inside.
-pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String], columns: usize) -> String {
-    let columns = columns.clamp(1, panels.len().max(1));
+pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
+    let columns = match panels.len() {
+        few @ 0..=2 => few.max(1),
+        many if many % 4 == 0 => 4,
+        _ => 3,
+    };
     let rows = panels.len().div_ceil(columns);
     let header = 62.0;
     let (width, height) = (WIDTH * in_f64(columns), HEIGHT * in_f64(rows) + header);
