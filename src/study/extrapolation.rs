@@ -20,7 +20,7 @@ use crate::math::integrator::two_sum;
 /// Rows of the scheme; the last has order 16.
 const ROWS: usize = 8;
 
-/// Two results agree if they differ by so little, relative to what the span changes: ten times what rounding leaves.
+/// Two results agree if they differ by so little, relative to what the span changes: some ten times what rounding leaves.
 const TOLERANCE: f64 = 3e-15;
 
 /// How often a span may be halved. A timestep of a second is followed in spans of a millisecond.
@@ -104,8 +104,13 @@ impl<const N: usize> Follower<N> {
     /// The change over `span`, if the scheme settles.
     fn extrapolate(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> Option<Change<N>> {
         let mut previous: [Change<N>; ROWS] = [([0.0; N], [0.0; N]); ROWS];
-        let start = forward_dynamics(arm, &self.state.position, &self.state.velocity, effort);
-        self.evaluations += 1;
+        let State { position, velocity } = &self.state;
+        let start = forward_dynamics(arm, position, velocity, effort);
+        // An arm that is held still is the difference of two large accelerations, and no better known than these.
+        let falling = forward_dynamics(arm, position, velocity, &[0.0; N]);
+        self.evaluations += 2;
+        let lifting = std::array::from_fn(|i| start[i] - falling[i]);
+        let noise = f64::EPSILON * span * (size(&falling) + size::<N>(&lifting));
         let mut steps = 0.0;
         let speed = size(&self.state.velocity);
         for row in 0..ROWS {
@@ -128,8 +133,10 @@ impl<const N: usize> Follower<N> {
             previous[row] = best;
             let apart =
                 |a: &[f64; N], b: &[f64; N]| size::<N>(&std::array::from_fn(|i| a[i] - b[i]));
-            let settled = apart(&best.0, &last.0) <= TOLERANCE * (size(&best.0) + span * speed)
-                && apart(&best.1, &last.1) <= TOLERANCE * (size(&best.1) + speed);
+            let enough_q = TOLERANCE * (size(&best.0) + span * speed) + span * noise;
+            let enough_v = TOLERANCE * (size(&best.1) + speed) + noise;
+            let settled =
+                apart(&best.0, &last.0) <= enough_q && apart(&best.1, &last.1) <= enough_v;
             if row > 0 && settled {
                 return Some(best);
             }

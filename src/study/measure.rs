@@ -16,9 +16,9 @@
 use super::linear::{equilibrium, gravity_gradient, no_control};
 use super::stability::Sampling;
 use crate::math::arm::{Arm, State};
-use crate::math::dynamics::{forward_dynamics, mass_matrix};
+use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
 use crate::math::integrator::{Method, increment};
-use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
 use crate::math::simulation::Simulation;
 
 /// Steps for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold meanwhile.
@@ -59,33 +59,17 @@ impl<const N: usize> Setting<N> {
     /// thousandfold of it divides what decays from what does not.
     #[must_use]
     pub fn measured_limit(&self, guess: f64) -> Option<f64> {
-        let (mut stable, mut unstable) = (0.5 * guess, 2.0 * guess);
-        let mut widenings = 0;
-        while !self.decays(stable) {
-            unstable = stable;
-            stable *= 0.5;
-            widenings += 1;
-            if widenings > WIDENINGS {
-                return None;
-            }
-        }
-        while self.decays(unstable) {
-            stable = unstable;
-            unstable *= 2.0;
-            widenings += 1;
-            if widenings > WIDENINGS {
-                return None;
-            }
-        }
-        for _ in 0..HALVINGS {
-            let middle = (stable * unstable).sqrt();
-            if self.decays(middle) {
-                stable = middle;
-            } else {
-                unstable = middle;
-            }
-        }
-        Some(stable)
+        boundary(guess, |timestep| self.decays(timestep))
+    }
+
+    /// As [`Setting::measured_limit`] for the control period, with `substeps` steps of the method in each; `delayed`: every
+    /// effort acts one period late.
+    #[must_use]
+    pub fn measured_period(&self, guess: f64, substeps: u32, delayed: bool) -> Option<f64> {
+        boundary(guess, |period| {
+            self.sampled_growth(period, substeps, delayed)
+                .is_some_and(|growth| growth < 1.0)
+        })
     }
 
     /// Whether a small deviation from the equilibrium has less energy at the end of [`STEPS`] steps of `timestep` \[s\] than
@@ -100,17 +84,7 @@ impl<const N: usize> Setting<N> {
     #[must_use]
     pub fn growth(&self, timestep: f64) -> Option<f64> {
         let rest = equilibrium(&self.arm, &self.gains, &self.setpoint);
-        let mut start = State {
-            position: rest.position,
-            velocity: [0.0; N],
-        };
-        let mut nudge = NUDGE;
-        for i in 0..N {
-            // No two joints alike, so that every mode gets its part: fast ones through the velocity.
-            start.position[i] += nudge;
-            start.velocity[i] -= 0.5 * nudge / timestep;
-            nudge *= -0.618;
-        }
+        let start = nudged(&rest.position, timestep);
         let energy = self.energy_about(&rest.position, timestep);
         match self.sampling {
             Sampling::Held => {
@@ -127,6 +101,38 @@ impl<const N: usize> Setting<N> {
                 watch(|| whole.step(timestep).then(|| energy(&whole.state)).flatten())
             }
         }
+    }
+
+    /// As [`Setting::growth`], per control period of `substeps` steps, each effort one period late if `delayed`.
+    #[must_use]
+    pub fn sampled_growth(&self, period: f64, substeps: u32, delayed: bool) -> Option<f64> {
+        let rest = equilibrium(&self.arm, &self.gains, &self.setpoint);
+        let energy = self.energy_about(&rest.position, period);
+        let mut state = nudged(&rest.position, period);
+        let mut pid = Pid::new(self.gains);
+        pid.set_setpoint(self.setpoint);
+        pid.enable(true);
+        pid.commit(rest.integral);
+        let h = period / f64::from(substeps.max(1));
+        let mut late = gravity_load(&self.arm, &rest.position);
+        watch(|| {
+            let control = pid.control(&state, period);
+            pid.commit(control.integral);
+            let acting = if delayed { late } else { control.effort };
+            late = control.effort;
+            for _ in 0..substeps.max(1) {
+                let (dq, dv) = increment(
+                    self.method,
+                    |_, q, v| forward_dynamics(&self.arm, q, v, &acting),
+                    0.0,
+                    &state.position,
+                    &state.velocity,
+                    h,
+                );
+                state = moved(&state, &dq, &dv);
+            }
+            energy(&state)
+        })
     }
 
     /// The energy of a deviation from `rest` \[J\], zero below [`DEAD`]; `None` beyond [`ESCAPED`].
@@ -169,6 +175,59 @@ impl<const N: usize> Setting<N> {
         live.set_setpoint(self.setpoint);
         primed.then_some(live)
     }
+}
+
+/// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the velocity.
+fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
+    let mut state = State {
+        position: *position,
+        velocity: [0.0; N],
+    };
+    let mut nudge = NUDGE;
+    for i in 0..N {
+        state.position[i] += nudge;
+        state.velocity[i] -= 0.5 * nudge / timestep;
+        nudge *= -0.618;
+    }
+    state
+}
+
+fn moved<const N: usize>(state: &State<N>, dq: &[f64; N], dv: &[f64; N]) -> State<N> {
+    State {
+        position: std::array::from_fn(|i| state.position[i] + dq[i]),
+        velocity: std::array::from_fn(|i| state.velocity[i] + dv[i]),
+    }
+}
+
+/// The boundary above which `holds` no longer does, by bisection around `guess`.
+pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    let (mut below, mut above) = (0.5 * guess, 2.0 * guess);
+    let mut widenings = 0;
+    while !holds(below) {
+        above = below;
+        below *= 0.5;
+        widenings += 1;
+        if widenings > WIDENINGS {
+            return None;
+        }
+    }
+    while holds(above) {
+        below = above;
+        above *= 2.0;
+        widenings += 1;
+        if widenings > WIDENINGS {
+            return None;
+        }
+    }
+    for _ in 0..HALVINGS {
+        let middle = (below * above).sqrt();
+        if holds(middle) {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    Some(below)
 }
 
 /// Largest of the last eighth of [`STEPS`] energies per largest of the second; zero once one is zero, `None` once one is
@@ -279,10 +338,7 @@ impl<const N: usize> ContinuousLoop<N> {
     }
 
     fn take(&mut self, dq: &[f64; N], dv: &[f64; N], ds: &[f64; N]) -> bool {
-        let next = State {
-            position: std::array::from_fn(|i| self.state.position[i] + dq[i]),
-            velocity: std::array::from_fn(|i| self.state.velocity[i] + dv[i]),
-        };
+        let next = moved(&self.state, dq, dv);
         let finite = next.is_finite();
         if finite {
             self.state = next;

@@ -29,4 +29,5 @@ pub mod measure;
 mod poses;
 pub mod reference;
 pub mod rollout;
+pub mod scenarios;
 pub mod stability;

@@ -15,7 +15,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::linear::Linear;
-use super::stability::{Sampling, Stepping};
+use super::stability::{Modes, Sampling, Stepping};
 use crate::math::arm::Arm;
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
@@ -44,16 +44,19 @@ pub(super) fn minimum_over_poses<const N: usize>(
     let integrating = gains.ki.map(|ki| ki > 0.0);
     let mut judge = |linear: &Linear, gravity: bool| {
         let stepping = Stepping::new(linear, method, sampling);
-        let rate = stepping.rate();
         let passes = smallest.is_some_and(|limit| {
             PROBES
                 .iter()
                 .all(|part| limit == 0.0 || stepping.is_stable(part * limit))
         });
-        if passes || (gravity && stepping.runs_away()) {
+        if passes {
             return;
         }
-        if let Some(limit) = stepping.search(rate) {
+        let modes = Modes::of(linear);
+        if gravity && modes.run_away() {
+            return;
+        }
+        if let Some(limit) = stepping.search(&modes) {
             smallest = Some(smallest.map_or(limit, |smallest| smallest.min(limit)));
         }
     };

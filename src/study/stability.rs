@@ -134,7 +134,7 @@ fn at_rest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>, rest: &Equilibrium<N>
 #[must_use]
 pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> Option<f64> {
     let stepping = Stepping::new(linear, method, sampling);
-    stepping.search(stepping.rate())
+    stepping.search(&Modes::of(linear))
 }
 
 /// As [`largest_timestep`] with the effort held over `substeps` steps of the method: the limit of the control period.
@@ -144,7 +144,19 @@ pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<
         substeps: substeps.max(1),
         ..Stepping::new(linear, method, Sampling::Held)
     };
-    stepping.search(stepping.rate())
+    stepping.search(&Modes::of(linear))
+}
+
+/// As [`largest_period`] with every effort acting one period late, as a bus or a slow controller would have it. There is no
+/// integral in it.
+#[must_use]
+pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
+    let stepping = Stepping {
+        substeps: substeps.max(1),
+        delayed: true,
+        ..Stepping::new(linear, method, Sampling::Held)
+    };
+    stepping.search(&Modes::of(linear))
 }
 
 /// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
@@ -154,6 +166,34 @@ pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) 
     stepping.generator(h).shifted_identity(h)
 }
 
+/// The loop as it would be in continuous time.
+pub(super) struct Modes {
+    eigenvalues: Vec<Complex>,
+    /// The fastest rate \[1/s\].
+    rate: f64,
+}
+
+impl Modes {
+    pub(super) fn of(linear: &Linear) -> Self {
+        let eigenvalues = linear.flow().eigenvalues();
+        Self {
+            rate: largest(eigenvalues.iter().map(|mode| mode.modulus())),
+            eigenvalues,
+        }
+    }
+
+    /// Whether there is a mode that no timestep can help: one that grows, or one so near to drifting that rounding
+    /// decides on which side it is (a double zero is good to the root of the rounding error).
+    pub(super) fn run_away(&self) -> bool {
+        let noise = 0.1 * NEUTRAL * self.rate;
+        self.eigenvalues.iter().any(|mode| {
+            let drifts = mode.modulus() < 1e-6 * self.rate;
+            // NaN counts as growing.
+            !(mode.re <= if drifts { -noise } else { noise })
+        })
+    }
+}
+
 /// A linear loop, and how it is stepped.
 pub(super) struct Stepping<'a> {
     linear: &'a Linear,
@@ -161,42 +201,25 @@ pub(super) struct Stepping<'a> {
     sampling: Sampling,
     /// Steps of the method in one control period.
     substeps: u32,
+    /// Whether an effort acts one period late.
+    delayed: bool,
     /// What the method steps: the loop, or the arm with constant efforts.
     stepped: Matrix,
-    /// Eigenvalues of the loop as it would be in continuous time.
-    modes: Vec<Complex>,
 }
 
 impl<'a> Stepping<'a> {
     pub(super) fn new(linear: &'a Linear, method: Method, sampling: Sampling) -> Self {
-        let flow = linear.flow();
         Self {
             linear,
             method,
             sampling,
             substeps: 1,
-            modes: flow.eigenvalues(),
+            delayed: false,
             stepped: match sampling {
-                Sampling::Continuous => flow,
+                Sampling::Continuous => linear.flow(),
                 Sampling::Held => linear.plant(),
             },
         }
-    }
-
-    /// The fastest rate of the loop in continuous time \[1/s\].
-    pub(super) fn rate(&self) -> f64 {
-        largest(self.modes.iter().map(|mode| mode.modulus()))
-    }
-
-    /// Whether the loop has a mode that no timestep can help: one that grows in continuous time, or one so near to
-    /// drifting that rounding decides on which side it is (a double zero is good to the root of the rounding error).
-    pub(super) fn runs_away(&self) -> bool {
-        let rate = self.rate();
-        let grows = |growth: f64| !(growth <= 0.1 * NEUTRAL * rate);
-        self.modes.iter().any(|mode| {
-            grows(mode.re)
-                || (mode.modulus() < 1e-6 * rate && grows(-mode.re.abs() + 0.2 * NEUTRAL * rate))
-        })
     }
 
     /// `E` of `x ↦ (I + T E) x` over the period `T` \[s\].
@@ -209,6 +232,7 @@ impl<'a> Stepping<'a> {
         };
         match self.sampling {
             Sampling::Continuous => free,
+            Sampling::Held if self.delayed => self.close_late(self.repeated(free, h), period),
             Sampling::Held => self.close(&self.repeated(free, h), period),
         }
     }
@@ -270,6 +294,17 @@ impl<'a> Stepping<'a> {
         closed
     }
 
+    /// The law, once a period, for the period after: efforts are states, `u ↦ -kp x - kd v`.
+    fn close_late(&self, mut arm: Matrix, period: f64) -> Matrix {
+        let n = self.linear.joints();
+        for j in 0..n {
+            arm[(2 * n + j, j)] = -self.linear.kp[j] / period;
+            arm[(2 * n + j, n + j)] = -self.linear.kd[j] / period;
+            arm[(2 * n + j, 2 * n + j)] = -1.0 / period;
+        }
+        arm
+    }
+
     /// Fastest growth of any mode, `max (2 Re μ + h |μ|²)`, relative to the largest `|μ|`; NaN if not finite.
     pub(super) fn growth(&self, period: f64) -> f64 {
         let values = self.generator(period).eigenvalues();
@@ -295,7 +330,8 @@ impl<'a> Stepping<'a> {
     }
 
     /// Upward from far below the fastest time constant to the first unstable period, then bisection.
-    pub(super) fn search(&self, rate: f64) -> Option<f64> {
+    pub(super) fn search(&self, modes: &Modes) -> Option<f64> {
+        let rate = modes.rate;
         if rate == 0.0 {
             return None;
         }
