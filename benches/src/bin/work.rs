@@ -34,8 +34,8 @@ where
     black_box(simulation.state());
 }
 
-fn particle(method: Method, count: u64) {
-    let function = Expression::parse("cos(2*t)").expect("a function");
+fn particle(method: Method, function: &str, count: u64) {
+    let function = Expression::parse(function).expect("a function");
     let mut particle = Particle::new(function, 0.5, -0.25, 1e-4, count, method).expect("a particle");
     particle.advance(usize::MAX);
     black_box(particle.positions());
@@ -51,7 +51,8 @@ fn main() {
     match parts.as_slice() {
         ["step", "2", method, what] => step::<2>(method.parse().expect("a method"), what, count),
         ["step", "3", method, what] => step::<3>(method.parse().expect("a method"), what, count),
-        ["particle", method] => particle(method.parse().expect("a method"), count),
+        ["particle", method, "constant"] => particle(method.parse().expect("a method"), "1", count),
+        ["particle", method, "cosine"] => particle(method.parse().expect("a method"), "cos(2*t)", count),
         _ => panic!("unknown variant {variant}"),
     }
 }

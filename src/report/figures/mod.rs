@@ -7,6 +7,7 @@ mod conditioning;
 mod drift;
 mod error;
 mod horizon;
+mod scenarios;
 mod stability;
 mod work;
 
@@ -24,7 +25,7 @@ pub(crate) struct Maker {
 }
 
 /// All sections in the order in which they are made and shown.
-pub(crate) const SECTIONS: [Maker; 7] = [
+pub(crate) const SECTIONS: [Maker; 8] = [
     Maker {
         name: "error",
         title: "Error against cost",
@@ -36,6 +37,12 @@ pub(crate) const SECTIONS: [Maker; 7] = [
         title: "Where it goes unstable",
         weight: 40.0,
         make: stability::make,
+    },
+    Maker {
+        name: "scenarios",
+        title: "Stiff and extreme scenes",
+        weight: 40.0,
+        make: scenarios::make,
     },
     Maker {
         name: "budget",
