@@ -1,5 +1,17 @@
 //! The arm's actor in virtual time: exact step counts, what it says and when, and that it is the offline simulation.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 use std::cell::RefCell;
 use std::future::Future;
 use std::rc::Rc;

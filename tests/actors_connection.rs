@@ -2,17 +2,32 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod virtual_time;
 
+use std::cell::RefCell;
+use std::io::IoSlice;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 use pendularm::actors::connection::{
-    ANSWERS_OWED, LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
+    ANSWERS_OWED, Connection, LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
 };
 use pendularm::actors::registry::{FinishAll, Nodes, Publish, RefuseCalls};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::messages;
 use serde_json::{Value, json};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
 use tokio::time::{Instant, sleep};
 use virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
 
@@ -517,5 +532,82 @@ fn a_foreign_client_gets_its_line_and_the_end_at_once() {
         assert_elapsed(began, Duration::ZERO);
         sleep(Duration::from_secs(2)).await;
         assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+/// A stream that notes every write as a frame count, and takes all of it.
+struct Noting {
+    input: DuplexStream,
+    writes: Rc<RefCell<Vec<usize>>>,
+}
+
+impl AsyncRead for Noting {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.input).poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for Noting {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<std::io::Result<usize>> {
+        self.poll_write_vectored(context, &[IoSlice::new(bytes)])
+    }
+
+    fn poll_write_vectored(
+        self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<std::io::Result<usize>> {
+        let bytes: Vec<u8> = slices.iter().flat_map(|slice| slice.to_vec()).collect();
+        let frames = bytes.iter().filter(|&&byte| byte == b'\n').count();
+        self.writes.borrow_mut().push(frames);
+        Poll::Ready(Ok(bytes.len()))
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+}
+
+#[test]
+fn several_frames_leave_in_one_write_but_not_to_a_client_that_ends_no_line() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        for (end, expected) in [("\n", vec![1, 5]), ("", vec![1, 1, 1, 1, 1, 1])] {
+            let writes = Rc::default();
+            let (mut client, input) = tokio::io::duplex(WIDE);
+            let stream = Noting {
+                input,
+                writes: Rc::clone(&writes),
+            };
+            Connection::start_on(
+                stream,
+                gateway.registry.clone(),
+                Arc::clone(&gateway.gauges),
+            );
+            let subscribe = format!("{{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}}{end}");
+            client.write_all(subscribe.as_bytes()).await.unwrap();
+            settle().await;
+            for n in 0..5 {
+                gateway.registry.do_send(Publish {
+                    topic: Topic::JointStates,
+                    frame: messages::publish("/joint_states", &json!({"n": n})),
+                    msg: None,
+                });
+            }
+            settle().await;
+            assert_eq!(*writes.borrow(), expected);
+        }
     });
 }

@@ -1,8 +1,9 @@
 //! Sines and cosines of joint angles against 60-digit values and against the C library.
 
 #![allow(
+    clippy::approx_constant,
     clippy::float_cmp,
-    reason = "what is compared exactly is meant to be equal to the bit"
+    reason = "what is compared exactly is meant to be equal to the bit; the numbers next to π are angles like others"
 )]
 
 use pendularm::math::trig::sin_cos;

@@ -1,5 +1,17 @@
 //! What happens when a step leaves the finite numbers.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;
@@ -144,6 +156,41 @@ fn a_diverged_arm_that_is_paused_is_diverged_still() {
     client.kept.clear();
     let after = client.message("/diagnostics");
     assert_eq!(arm_status(&after)["message"], "paused");
+}
+
+#[test]
+fn enormous_setpoints_and_gains_leave_the_runtime_answering_in_valid_json() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    client.subscribe("/diagnostics");
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    let defaults = client.ask("/pid_controller/set_gains", json!({}));
+    for gains in [
+        json!({}),
+        json!({"kp": [1e308, 1e308], "ki": [1e308, 1e308], "kd": [1e308, 1e308]}),
+        json!({"kp": [5e-324, 5e-324], "ki": [0, 0], "kd": [0, 0]}),
+    ] {
+        for positions in [[1e308, -1e308], [5e-324, -5e-324], [1e16, 1e-16]] {
+            client.ask("/pid_controller/set_gains", gains.clone());
+            client.ask("/arm_sim/reset", json!({}));
+            let msg = json!({"points": [{"positions": positions, "velocities": positions}]});
+            send_trajectory(&mut client, &msg);
+            // Each frame is parsed strictly on its way in, and must hold numbers only.
+            for _ in 0..5 {
+                let state = client.message("/joint_states");
+                for field in ["position", "velocity", "effort"] {
+                    assert_eq!(numbers(&state[field]).len(), 2);
+                }
+            }
+        }
+    }
+    client.ask("/pid_controller/set_gains", defaults);
+    client.ask("/arm_sim/reset", json!({}));
+    send_trajectory(&mut client, &trajectory(&[0.3, 0.3]));
+    state_where(&mut client, "a settled arm", |state| {
+        arm::is_near(state, &[0.3, 0.3], 0.02)
+    });
 }
 
 /// The lesson of the whole: what is unstable at 20 ms is not at 1 ms.

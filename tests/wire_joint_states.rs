@@ -1,12 +1,24 @@
 //! `/joint_states` from outside.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;
 
 use std::time::{Duration, Instant};
 
-use arm::{numbers, stamp, state_where};
+use arm::{in_one_of_three_tries, numbers, stamp, state_where};
 use common::Runtime;
 use serde_json::{Value, json};
 
@@ -52,38 +64,42 @@ fn the_header_carries_simulation_time_and_the_world() {
     assert!(last <= began.elapsed().as_secs_f64() + 0.5, "{last}");
 }
 
-/// Sixty a second by design. A busy machine may skip ticks, never make them up.
+/// Sixty a second by design. A busy machine may skip ticks, never make them up: no more than there are in the time, and in
+/// one of three tries no fewer than half.
+fn assert_sixty_a_second(paused: bool) {
+    in_one_of_three_tries("60 Hz", || {
+        let runtime = Runtime::start();
+        let mut clients = [runtime.connect(), runtime.connect()];
+        for client in &mut clients {
+            client.ask("/arm_sim/pause", json!({"data": paused}));
+            client.subscribe("/joint_states");
+        }
+        let began = Instant::now();
+        let seen = clients[0].receive_for(Duration::from_secs(2));
+        clients[1].settle();
+        let most = (began.elapsed().as_secs_f64() * 60.0) as usize + 3;
+        let others = clients[1].kept.iter();
+        let other = others.filter(|frame| frame["op"] == "publish").count();
+        assert!(
+            seen.len() <= most && other <= most,
+            "{} and {other} of {most}",
+            seen.len()
+        );
+        let enough = seen.len() >= 60 && other >= 60;
+        enough
+            .then_some(())
+            .ok_or(format!("{} and {other}", seen.len()))
+    });
+}
+
 #[test]
-fn messages_come_about_sixty_times_a_second_to_every_subscriber() {
-    let runtime = Runtime::start();
-    let mut clients = [runtime.connect(), runtime.connect()];
-    for client in &mut clients {
-        client.subscribe("/joint_states");
-    }
-    let seen = clients[0].receive_for(Duration::from_secs(3));
-    assert!((90..=183).contains(&seen.len()), "{} in 3 s", seen.len());
-    clients[1].settle();
-    let other = clients[1]
-        .kept
-        .iter()
-        .filter(|frame| frame["op"] == "publish")
-        .count();
-    assert!(
-        other.abs_diff(seen.len()) < 20,
-        "{other} and {}",
-        seen.len()
-    );
+fn messages_come_sixty_times_a_second_to_every_subscriber() {
+    assert_sixty_a_second(false);
 }
 
 #[test]
 fn a_paused_arm_is_published_at_the_same_rate() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
-    client.ask("/arm_sim/pause", json!({"data": true}));
-    client.subscribe("/joint_states");
-    let seen = client.receive_for(Duration::from_secs(2));
-    assert!((60..=123).contains(&seen.len()), "{} in 2 s", seen.len());
-    assert!(seen.iter().all(|frame| frame["msg"] == seen[0]["msg"]));
+    assert_sixty_a_second(true);
 }
 
 #[test]

@@ -1,5 +1,18 @@
 //! `/joint_trajectory` from outside: the last point is the setpoint.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared exactly is exact; `json!` literals are handed over"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;

@@ -1,5 +1,17 @@
 //! How the program starts, refuses to start, and ends.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 mod common;
 
 use std::io::{BufRead, BufReader, Read};
@@ -150,7 +162,12 @@ fn the_address_comes_from_the_environment_too() {
 
 #[test]
 fn bad_usage_is_told_in_one_line_with_status_2() {
-    let cases: [(&[&str], &[(&str, &str)], &str); 14] = [
+    type Case = (
+        &'static [&'static str],
+        &'static [(&'static str, &'static str)],
+        &'static str,
+    );
+    let cases: [Case; 14] = [
         (&[], &[("ARM_SIM_LINKS", "1")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "4")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "two")], "ARM_SIM_LINKS"),
@@ -281,6 +298,18 @@ fn a_client_that_never_reads_does_not_hold_up_the_end() {
         json!({"function": "t", "x0": 0, "dt": 1e-3, "steps": 1_000_000, "integrator": "euler"});
     deaf.send(&json!({"op": "call_service", "service": "/arm_sim/integration_step", "args": big}));
     std::thread::sleep(Duration::from_secs(2));
+    let since = serving.signal("TERM");
+    let (status, took) = serving.end(since);
+    assert_eq!(status, Some(0));
+    assert!(took < Duration::from_secs(2), "{took:?}");
+}
+
+#[test]
+fn an_arm_that_lags_does_not_hold_up_the_end() {
+    let mut serving = Serving::start(&["--bind", "127.0.0.1:0"], &[]);
+    let mut client = serving.connect();
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e-12}));
+    std::thread::sleep(Duration::from_millis(500));
     let since = serving.signal("TERM");
     let (status, took) = serving.end(since);
     assert_eq!(status, Some(0));

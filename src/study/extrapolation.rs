@@ -118,12 +118,12 @@ impl<const N: usize> Follower<N> {
             let mut best = self.midpoint(arm, effort, &start, span, steps);
             let mut last = best;
             let mut inner = steps;
-            for column in 0..row {
+            for of_column in previous.iter_mut().take(row) {
                 // Row k has 2 k steps; the weight is that of Neville's scheme in the square of the step.
                 inner -= 2.0;
                 let weight = 1.0 / ((steps / inner).powi(2) - 1.0);
-                let before = previous[column];
-                previous[column] = best;
+                let before = *of_column;
+                *of_column = best;
                 last = best;
                 best = (
                     std::array::from_fn(|i| best.0[i] + (best.0[i] - before.0[i]) * weight),

@@ -188,8 +188,7 @@ impl Modes {
         let noise = 0.1 * NEUTRAL * self.rate;
         self.eigenvalues.iter().any(|mode| {
             let drifts = mode.modulus() < 1e-6 * self.rate;
-            // NaN counts as growing.
-            !(mode.re <= if drifts { -noise } else { noise })
+            mode.re > if drifts { -noise } else { noise } || mode.re.is_nan()
         })
     }
 }
@@ -232,8 +231,8 @@ impl<'a> Stepping<'a> {
         };
         match self.sampling {
             Sampling::Continuous => free,
-            Sampling::Held if self.delayed => self.close_late(self.repeated(free, h), period),
-            Sampling::Held => self.close(&self.repeated(free, h), period),
+            Sampling::Held if self.delayed => self.close_late(self.repeated(&free, h), period),
+            Sampling::Held => self.close(&self.repeated(&free, h), period),
         }
     }
 
@@ -261,11 +260,11 @@ impl<'a> Stepping<'a> {
     }
 
     /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period.
-    fn repeated(&self, step: Matrix, h: f64) -> Matrix {
+    fn repeated(&self, step: &Matrix, h: f64) -> Matrix {
         let mut sum = step.clone();
         for _ in 1..self.substeps {
             let product = step.product(&sum);
-            sum = sum.plus(1.0, &step).plus(h, &product);
+            sum = sum.plus(1.0, step).plus(h, &product);
         }
         let size = sum.size();
         Matrix::zeros(size).plus(1.0 / f64::from(self.substeps), &sum)

@@ -1,7 +1,8 @@
 //! The arm: steps the simulation against wall time, serves `/arm_sim/*` and `/pid_controller/*`, publishes its state.
 //!
 //! The actor only asks the clock and says who hears what. What is due is reckoned by `math::pacer`, what happens in a
-//! step by `math::simulation`, requests are read in [`services`], messages written in [`telemetry`].
+//! step by `math::simulation`, requests are read in [`services`], messages written in [`telemetry`], goals judged in
+//! [`goals`].
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
 //! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up after
@@ -9,6 +10,7 @@
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
+mod goals;
 mod services;
 mod telemetry;
 
@@ -18,6 +20,8 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
+use self::goals::Goals;
+pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::telemetry::Telemetry;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
@@ -43,6 +47,12 @@ const BATCH: u64 = 64;
 /// Names of the joints, base first.
 const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
 
+/// The names of an arm's joints, base first.
+#[must_use]
+pub fn joint_names<const N: usize>() -> [&'static str; N] {
+    std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default())
+}
+
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The node `arm_sim` for an arm of `N` links.
@@ -58,6 +68,7 @@ pub struct ArmSim<const N: usize> {
     respond: Recipient<Respond>,
     telemetry: Telemetry,
     joint_names: [&'static str; N],
+    goals: Goals<N>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -80,7 +91,8 @@ impl<const N: usize> ArmSim<N> {
             epoch: Instant::now(),
             publish,
             respond,
-            joint_names: std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default()),
+            joint_names: joint_names(),
+            goals: Goals::default(),
         }
     }
 
@@ -132,7 +144,7 @@ impl<const N: usize> Handler<ServiceCall> for ArmSim<N> {
 
     fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
         self.advance_to_now(ctx);
-        self.serve(call);
+        self.serve(call, ctx);
     }
 }
 
@@ -142,6 +154,9 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
     /// A trajectory: its last point is the setpoint, from the next step on.
     fn handle(&mut self, message: TopicMessage, ctx: &mut Context<Self>) {
         self.advance_to_now(ctx);
+        if message.sender.is_none() && !self.is_valid_trajectory() {
+            return;
+        }
         match joint_trajectory(&message.msg, &self.joint_names) {
             Ok(request) => {
                 if let (Ok(position), Ok(velocity)) =
@@ -236,10 +251,8 @@ impl<const N: usize> ArmSim<N> {
         let started = std::time::Instant::now();
         let mut taken = 0;
         while taken < due && started.elapsed() < WAKE_UP_BUDGET {
-            let batch = BATCH.min(due - taken);
-            let advanced = self.simulation.advance(batch);
-            taken += advanced;
-            if advanced < batch {
+            taken += self.advance(BATCH.min(due - taken));
+            if self.simulation.divergence().is_some() {
                 break;
             }
         }

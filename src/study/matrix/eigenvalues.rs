@@ -155,7 +155,7 @@ impl Hessenberg {
     fn shift(&self, last: usize, sweeps: usize) -> Complex {
         let d = self.at(last, last);
         let product = self.at(last - 1, last) * self.at(last, last - 1);
-        if sweeps % 10 == 0 {
+        if sweeps.is_multiple_of(10) {
             return d + Complex::real(self.at(last, last - 1).modulus());
         }
         let half = (self.at(last - 1, last - 1) - d).scaled(0.5);

@@ -17,7 +17,7 @@ use crate::math::simulation::Simulation;
 use crate::study::linear::{Linear, no_control};
 use crate::study::matrix::largest;
 use crate::study::reference::DoubleDouble;
-use crate::study::rollout::{Plan, Rollout};
+use crate::study::rollout::{Deviation, Plan, Rollout};
 use crate::study::stability::{Sampling, largest_timestep};
 
 pub(super) const SCENES: [Scenario; 9] = [
@@ -164,9 +164,7 @@ fn tiny_steps() -> Verdict {
         return verdict(false, "not run".to_owned());
     };
     while rollout.advance(u64::MAX) > 0 {}
-    let error = rollout
-        .deviation()
-        .map_or(f64::NAN, |deviation| deviation.largest());
+    let error = rollout.deviation().map_or(f64::NAN, Deviation::largest);
     let end = rollout.times().last().copied().unwrap_or(f64::NAN);
     let late = (end - 1e7 * 1e-6).abs();
     verdict(

@@ -196,7 +196,7 @@ fn windup() -> Verdict {
     }
     let back = recovered.map_or_else(|| "never".to_owned(), |s| format!("after {s} s"));
     verdict(
-        limited <= INTEGRAL_LIMIT && limited == INTEGRAL_LIMIT.min(wound) && recovered.is_some(),
+        limited <= INTEGRAL_LIMIT && wound > limited && recovered.is_some(),
         format!(
             "integral {limited:.1} rad s, unlimited {wound:.1}; released, the arm is back {back}"
         ),
