@@ -245,7 +245,8 @@ pub(crate) fn seconds(value: f64) -> String {
         v if v >= 0.9995e-6 => (1e6, "µs"),
         _ => (1e9, "ns"),
     };
-    format!("{} {unit}", number(value * factor))
+    // A number and its unit stay on one line.
+    format!("{}\u{a0}{unit}", number(value * factor))
 }
 
 #[cfg(test)]
@@ -266,8 +267,8 @@ mod tests {
         for (value, text) in cases {
             assert_eq!(number(value), text);
         }
-        assert_eq!(seconds(0.000_25), "250 µs");
-        assert_eq!(seconds(0.001), "1 ms");
+        assert_eq!(seconds(0.000_25), "250\u{a0}µs");
+        assert_eq!(seconds(0.001), "1\u{a0}ms");
     }
 
     #[test]
@@ -280,7 +281,14 @@ mod tests {
         let times = Axis::log("", Unit::Seconds, [2e-6, 0.03]);
         assert_eq!(
             labels(&times, 9.0),
-            ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms"]
+            [
+                "1\u{a0}µs",
+                "10\u{a0}µs",
+                "100\u{a0}µs",
+                "1\u{a0}ms",
+                "10\u{a0}ms",
+                "100\u{a0}ms"
+            ]
         );
         let linear = Axis::linear("", 0.0, 30.0);
         assert_eq!(

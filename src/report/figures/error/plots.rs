@@ -87,7 +87,7 @@ fn floor() -> Mark {
         y: f64::EPSILON,
         class: "soft",
         label: "rounding".to_owned(),
-        right: true,
+        right: false,
     }
 }
 

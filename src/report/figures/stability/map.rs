@@ -9,11 +9,15 @@ use super::super::super::svg::{Axis, Heat, Key, Marker, Plot, Point, Series, Uni
 use super::{Meter, setting};
 use crate::math::integrator::Method;
 use crate::study::linear::Linear;
-use crate::study::stability::{Sampling, largest_timestep};
+use crate::study::matrix::Matrix;
+use crate::study::stability::{Sampling, largest_timestep, step_matrix};
 
 /// Ends of the axes: timestep \[s\], factor on the shipped gains.
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
+
+/// Steps that a measurement of `study::measure` watches.
+const WATCHED: f64 = 4000.0;
 
 /// The map as it is made.
 pub(super) struct Map {
@@ -21,6 +25,8 @@ pub(super) struct Map {
     /// Cells judged, and those whose verdict is not the predicted one.
     pub(super) cells: usize,
     pub(super) disagreeing: usize,
+    /// Cells not judged: see [`undecided`].
+    pub(super) undecided: usize,
     /// Edges of the cells.
     timesteps: Vec<f64>,
     factors: Vec<f64>,
@@ -33,6 +39,7 @@ pub(super) fn map(desk: &mut Desk<'_>, meter: &mut Meter, columns: usize) -> Map
         csv: Csv::new("control,method,dt,gain_factor,growth,predicted_limit"),
         cells: 0,
         disagreeing: 0,
+        undecided: 0,
         timesteps: edges_between(TIMESTEPS, columns),
         factors: edges_between(FACTORS, columns * 3 / 4),
         plots: Vec::new(),
@@ -101,12 +108,6 @@ impl Map {
         let mut row = Vec::new();
         for h in centres(&self.timesteps) {
             let growth = setting.growth(h);
-            row.push(level(growth));
-            self.cells += 1;
-            if growth.is_some_and(|growth| growth < 1.0) != (h < limit) {
-                let told = format!("predicted limit {}", seconds(limit));
-                disagreeing.push(Point::new(h, factor, told));
-            }
             self.csv.row(&[
                 sampling.name().into(),
                 method.name().into(),
@@ -115,6 +116,18 @@ impl Map {
                 growth.into(),
                 limit.into(),
             ]);
+            let agrees = growth.is_some_and(|growth| growth < 1.0) == (h < limit);
+            if !agrees && undecided(&step_matrix(&linear, method, sampling, h)) {
+                self.undecided += 1;
+                row.push(0);
+                continue;
+            }
+            row.push(level(growth));
+            self.cells += 1;
+            if !agrees {
+                let told = format!("predicted limit {}", seconds(limit));
+                disagreeing.push(Point::new(h, factor, told));
+            }
         }
         (limit, row)
     }
@@ -123,18 +136,26 @@ impl Map {
         Figure::new(
             "stability-map",
             format!(
-                "Predicted and measured stability agree in {} of {} cells",
+                "Predicted and measured stability agree in {} of {} cells; {} change too slowly to judge",
                 self.cells - self.disagreeing,
-                self.cells
+                self.cells,
+                self.undecided
             ),
             "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power of 3/2: \
              the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows (orange), the darker \
-             the faster. Line: the predicted limit. Dots: cells where the two disagree. In the lowest rows the gains are too \
+             the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: cells that \
+             the watch of some thousand steps is too short to judge, by the prediction itself. In the lowest rows the gains are too \
              weak to carry the arm against gravity: no timestep is stable.",
             &[Key::line("ink", "predicted limit")],
             &self.plots,
         )
     }
+}
+
+/// Whether the watch of some thousand steps is too short to tell: by the prediction itself the slowest mode changes its energy by
+/// less than a factor e meanwhile, so that where in its swing it is looked at decides.
+fn undecided(step: &Matrix) -> bool {
+    2.0 * WATCHED * step.spectral_radius().ln().abs() < 1.0
 }
 
 /// Colour of a growth of energy over a few thousand steps.

@@ -40,7 +40,7 @@ pub(super) fn period_table(periods: &[Period]) -> Table {
         "control-period",
         "The limit belongs to the control period",
         "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the method (2 links, shipped gains). Smaller steps at the \
-         same control period buy nothing but for Euler.",
+         same control period buy nothing; Euler only moves to the limit of the others.",
         &["Method", "1 step per period", "10 steps", "100 steps"],
     );
     for method in Method::ALL {

@@ -64,8 +64,11 @@ pub(super) fn verdicts(lines: &[Line], map: &Map, periods: &[Period]) -> Vec<Ver
             holds: worst <= AGREEMENT,
         },
         Verdict {
-            claim: "At most 1 % of the map's cells disagree with the prediction".to_owned(),
-            seen: format!("{} of {}", map.disagreeing, map.cells),
+            claim: "At most 1 % of the map's cells that can be judged disagree with the prediction".to_owned(),
+            seen: format!(
+                "{} of {}; {} more change too slowly to judge",
+                map.disagreeing, map.cells, map.undecided
+            ),
             holds: map.disagreeing * 100 <= map.cells,
         },
         Verdict {
