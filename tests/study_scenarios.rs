@@ -47,7 +47,7 @@ fn every_quick_scene_is_as_expected() {
 }
 
 #[test]
-#[ignore = "takes a minute unoptimised; the report runs them"]
+#[ignore = "takes some seconds; the report runs them"]
 fn every_slow_scene_is_as_expected() {
     check(all().into_iter().filter(|scene| scene.slow));
 }

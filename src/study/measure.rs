@@ -265,7 +265,8 @@ pub struct ContinuousLoop<const N: usize> {
 }
 
 impl<const N: usize> ContinuousLoop<N> {
-    /// One step of `h` \[s\]; `false`, and nothing changes, if its result would not be finite.
+    /// One step of `h` \[s\]; `false`, and nothing changes, if its result would not be finite. Integrals are stepped for up
+    /// to three joints; more are not, which is `false` too.
     pub fn step(&mut self, h: f64) -> bool {
         let integrates = self.setting.gains.ki.iter().any(|&ki| ki > 0.0);
         match N {

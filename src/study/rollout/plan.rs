@@ -6,7 +6,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 
-/// Most steps of one run: some seconds of one core, with a reference under control a few minutes.
+/// Most steps of one run: some seconds of one core, with a reference under control up to a minute.
 pub const MAX_STEPS: u64 = 10_000_000;
 
 /// Most samples of one run, some 30 MB of JSON.
