@@ -258,6 +258,12 @@ impl Options {
             Err(error) => return told(&error),
         };
         if let Some(report) = matches.subcommand_matches(REPORT) {
+            // What serving is told means nothing to a report.
+            if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
+                return Err(UsageError::UnknownArgument {
+                    argument: format!("--{}", stray.option),
+                });
+            }
             return Ok(Parsed::Report(read_report(report)));
         }
         let given = |setting| given(setting, &matches, &environment);
@@ -304,7 +310,6 @@ fn command() -> Command {
         .about(env!("CARGO_PKG_DESCRIPTION"))
         .after_help(AFTER_HELP)
         .args(options)
-        .args_conflicts_with_subcommands(true)
         .disable_help_subcommand(true)
         .subcommand(report_command())
 }

@@ -4,7 +4,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::study::budget::Budget;
 use pendularm::study::chaos::{energy_drift, horizon, lyapunov_rate, separation};
-use pendularm::study::error::{OUTPUTS, Scene, scenes};
+use pendularm::study::error::{OUTPUTS, scenes};
 use pendularm::study::reference::{Law, Reference};
 
 /// Halving the timestep divides the error by 2^p where truncation is all there is.

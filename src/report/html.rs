@@ -122,7 +122,11 @@ fn figure(out: &mut String, figure: &Figure) {
     for (swatch, label) in &figure.legend {
         append(out, format_args!("<span>{swatch} {}</span>", escape(label)));
     }
-    let few = if figure.panels.len() < 3 { " few" } else { "" };
+    let few = match figure.panels.len() {
+        0..=2 => " few",
+        many if many % 4 == 0 => " four",
+        _ => "",
+    };
     append(out, format_args!("</p><div class=\"panels{few}\">"));
     for panel in &figure.panels {
         out.push_str(panel);

@@ -129,6 +129,7 @@ fn make(
     let started = Instant::now();
     let mut desk = Desk {
         quick: options.quick,
+        out: &options.out,
         progress,
         tables: Vec::new(),
     };
@@ -154,6 +155,8 @@ fn make(
 #[derive(Debug)]
 pub(crate) struct Desk<'a> {
     quick: bool,
+    /// Where the report is written, and counts from outside are looked for.
+    out: &'a Path,
     progress: &'a mut Progress,
     /// Stems and contents of `.csv` files.
     tables: Vec<(String, Csv)>,

@@ -75,7 +75,7 @@ impl Figure {
         let panels: Vec<String> = plots.iter().map(Plot::render).collect();
         Self {
             name: name.to_owned(),
-            sheet: sheet(&title, legend, &panels, 3),
+            sheet: sheet(&title, legend, &panels),
             title,
             caption: caption.into(),
             legend: legend

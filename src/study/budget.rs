@@ -7,7 +7,7 @@
 //!
 //! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the others.
 
-use super::error::{OUTPUTS, REACH_GAINS, REACH_SETPOINT};
+use super::error::{OUTPUTS, REACH_GAINS, REACH_SETPOINT, SAMPLES};
 use super::reference::{DoubleDouble, Law, Reference, exact_steps, largest_difference};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
@@ -48,7 +48,7 @@ impl Budget {
             Law::FREE
         };
         let (arm, start) = (Arm::default(), State::rest());
-        let law = Reference::of(&arm, &start, &law, duration / in_f64(OUTPUTS), COUNT);
+        let law = Reference::of(&arm, &start, &law, duration / in_f64(OUTPUTS), SAMPLES);
         Self {
             arm,
             start,
@@ -70,15 +70,22 @@ impl Budget {
         };
         let plant = self.control.then(|| {
             let spacing = self.duration / in_f64(OUTPUTS);
-            Reference::of(&self.arm, &self.start, &held, spacing, COUNT)
+            Reference::of(&self.arm, &self.start, &held, spacing, SAMPLES)
         });
         let law = if self.control { held } else { Law::FREE };
         let plant = plant.as_ref().unwrap_or(&self.law).samples();
         methods
             .iter()
             .map(|&method| {
-                let exact =
-                    exact_steps(&self.arm, &self.start, &law, method, timestep, every, COUNT);
+                let exact = exact_steps(
+                    &self.arm,
+                    &self.start,
+                    &law,
+                    method,
+                    timestep,
+                    every,
+                    SAMPLES,
+                );
                 let live = self.live(method, timestep, every);
                 let mut parts = Parts {
                     timestep,
@@ -106,7 +113,7 @@ impl Budget {
         simulation.set_state(self.start);
         simulation.enable(self.control);
         simulation.set_setpoint(REACH_SETPOINT);
-        (0..COUNT)
+        (0..SAMPLES)
             .map(|_| {
                 let whole = simulation.advance(every) == every;
                 let position = simulation.state().position;
@@ -115,8 +122,6 @@ impl Budget {
             .collect()
     }
 }
-
-const COUNT: usize = 64;
 
 fn distance(a: &[DoubleDouble; 2], b: &[DoubleDouble; 2]) -> f64 {
     a.iter()

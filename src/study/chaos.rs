@@ -59,7 +59,9 @@ pub fn separation<const N: usize>(
     reason = "sample counts are far below 2^53"
 )]
 pub fn horizon(errors: &[f64], spacing: f64) -> Option<f64> {
-    let index = errors.iter().position(|error| !(*error <= HORIZON_ERROR))?;
+    let index = errors
+        .iter()
+        .position(|error| error.is_nan() || *error > HORIZON_ERROR)?;
     Some((index + 1) as f64 * spacing)
 }
 

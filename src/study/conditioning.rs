@@ -97,10 +97,8 @@ fn by_elimination(arm: &Arm<3>, state: &State<3>, tau: &[f64; 3]) -> [f64; 3] {
     let mut l = [[0.0_f64; 3]; 3];
     for i in 0..3 {
         for j in 0..=i {
-            let mut sum = m[i][j];
-            for k in 0..j {
-                sum -= l[i][k] * l[j][k];
-            }
+            let done: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let sum = m[i][j] - done;
             l[i][j] = if i == j { sum.sqrt() } else { sum / l[j][j] };
         }
     }

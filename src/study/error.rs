@@ -22,6 +22,9 @@ use crate::math::pid::{Gains, Setpoint};
 /// a duration that is one too are exact.
 pub const OUTPUTS: u64 = 64;
 
+/// [`OUTPUTS`] as a length.
+pub(super) const SAMPLES: usize = 64;
+
 /// A run whose angles are off by a whole turn \[rad\] shows nothing any more, and counts as diverged.
 pub const LOST: f64 = std::f64::consts::TAU;
 
@@ -155,7 +158,7 @@ impl Worst {
 
     /// Takes in one output; `false` once there is nothing left to compare.
     fn take(&mut self, time: f64, error: f64, tip_error: f64) -> bool {
-        if !(error <= LOST) {
+        if error.is_nan() || error > LOST {
             self.diverged = Some(time);
             self.error = f64::INFINITY;
             self.end_error = f64::INFINITY;

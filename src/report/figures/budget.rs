@@ -93,6 +93,47 @@ const PARTS: [(&str, &str, Marker); 3] = [
     ("c2", "control hold (the period)", Marker::Square),
 ];
 
+fn plot(panel: &Panel, x: &Axis, y: &Axis) -> Plot {
+    let title = format!("{}, {}", scene(panel.control), panel.method);
+    let mut plot = Plot::new(title, x.clone(), y.clone());
+    let total = panel
+        .parts
+        .iter()
+        .map(|parts| (parts.timestep, parts.total));
+    plot.series.push(Series {
+        dashed: true,
+        ..Series::line("ink", total)
+    });
+    for (class, name, marker) in PARTS {
+        let points: Vec<Point> = panel
+            .parts
+            .iter()
+            .map(|parts| {
+                let value = match class {
+                    "c1" => parts.truncation,
+                    "c3" => parts.rounding,
+                    _ => parts.hold,
+                };
+                let told = format!(
+                    "{name}: {} rad at {}",
+                    scientific(value),
+                    seconds(parts.timestep)
+                );
+                Point::new(parts.timestep, value, told)
+            })
+            .filter(|point| point.y != 0.0)
+            .collect();
+        plot.series.push(Series {
+            class,
+            marker,
+            line: true,
+            dashed: false,
+            points,
+        });
+    }
+    plot
+}
+
 fn figure(panels: &[Panel]) -> Figure {
     let all = panels.iter().flat_map(|panel| &panel.parts);
     let x = Axis::log(
@@ -101,49 +142,7 @@ fn figure(panels: &[Panel]) -> Figure {
         all.map(|parts| parts.timestep),
     );
     let y = Axis::log_between("largest error [rad]", Unit::Number, 1e-18, 10.0);
-    let plots: Vec<Plot> = panels
-        .iter()
-        .map(|panel| {
-            let title = format!("{}, {}", scene(panel.control), panel.method);
-            let mut plot = Plot::new(title, x.clone(), y.clone());
-            let total = panel
-                .parts
-                .iter()
-                .map(|parts| (parts.timestep, parts.total));
-            plot.series.push(Series {
-                dashed: true,
-                ..Series::line("ink", total)
-            });
-            for (class, name, marker) in PARTS {
-                let points: Vec<Point> = panel
-                    .parts
-                    .iter()
-                    .map(|parts| {
-                        let value = match class {
-                            "c1" => parts.truncation,
-                            "c3" => parts.rounding,
-                            _ => parts.hold,
-                        };
-                        let told = format!(
-                            "{name}: {} rad at {}",
-                            scientific(value),
-                            seconds(parts.timestep)
-                        );
-                        Point::new(parts.timestep, value, told)
-                    })
-                    .filter(|point| point.y != 0.0)
-                    .collect();
-                plot.series.push(Series {
-                    class,
-                    marker,
-                    line: true,
-                    dashed: false,
-                    points,
-                });
-            }
-            plot
-        })
-        .collect();
+    let plots: Vec<Plot> = panels.iter().map(|panel| plot(panel, &x, &y)).collect();
     let mut legend: Vec<Key> = PARTS
         .iter()
         .map(|(class, label, marker)| Key {

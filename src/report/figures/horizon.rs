@@ -137,6 +137,7 @@ fn figure(swings: &[Swing]) -> Figure {
                 y: HORIZON_ERROR,
                 class: "soft",
                 label: "horizon".to_owned(),
+                right: true,
             });
             for (method, _, errors) in swing.runs.iter().filter(|run| run.1 == SHOWN) {
                 let points = errors

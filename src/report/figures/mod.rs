@@ -7,7 +7,9 @@ mod conditioning;
 mod drift;
 mod error;
 mod horizon;
+mod scenarios;
 mod stability;
+mod work;
 
 use super::Desk;
 use super::section::Section;
@@ -23,42 +25,54 @@ pub(crate) struct Maker {
 }
 
 /// All sections in the order in which they are made and shown.
-pub(crate) const SECTIONS: [Maker; 6] = [
+pub(crate) const SECTIONS: [Maker; 8] = [
     Maker {
         name: "error",
         title: "Error against cost",
-        weight: 80.0,
+        weight: 115.0,
         make: error::make,
     },
     Maker {
         name: "stability",
         title: "Where it goes unstable",
-        weight: 40.0,
+        weight: 12.0,
         make: stability::make,
+    },
+    Maker {
+        name: "scenarios",
+        title: "Stiff and extreme scenes",
+        weight: 8.0,
+        make: scenarios::make,
     },
     Maker {
         name: "budget",
         title: "Where an error comes from",
-        weight: 20.0,
+        weight: 22.0,
         make: budget::make,
     },
     Maker {
         name: "drift",
         title: "Energy over long swings",
-        weight: 6.0,
+        weight: 4.0,
         make: drift::make,
     },
     Maker {
         name: "horizon",
         title: "How far a chaotic swing can be followed",
-        weight: 20.0,
+        weight: 10.0,
         make: horizon::make,
     },
     Maker {
         name: "conditioning",
         title: "Uneven arms",
-        weight: 2.0,
+        weight: 1.0,
         make: conditioning::make,
+    },
+    Maker {
+        name: "work",
+        title: "What a scene does not need is left out",
+        weight: 4.0,
+        make: work::make,
     },
 ];
 

@@ -117,18 +117,36 @@ impl Axis {
         );
         let stride = ((last - first) / most).ceil().max(1.0);
         let mut ticks = Vec::new();
+        // Decades alone would leave a short axis bare.
+        if (self.max / self.min).log10() < 2.2 {
+            let mut exponent = first - 1.0;
+            while exponent <= last {
+                for value in [1.0, 2.0, 5.0].map(|factor| factor * 10_f64.powf(exponent)) {
+                    if self.holds(value) {
+                        ticks.push((value, self.label(value)));
+                    }
+                }
+                exponent += 1.0;
+            }
+            return ticks;
+        }
         // Multiples of the stride, so that panels side by side agree.
         let mut exponent = (first / stride).ceil() * stride;
         while exponent <= last {
             let value = 10_f64.powf(exponent);
-            let label = match self.unit {
-                Unit::Number => power(exponent),
-                Unit::Seconds => seconds(value),
-            };
-            ticks.push((value, label));
+            ticks.push((value, self.label(value)));
             exponent += stride;
         }
         ticks
+    }
+
+    fn label(&self, value: f64) -> String {
+        let exponent = value.log10();
+        match self.unit {
+            Unit::Seconds => seconds(value),
+            Unit::Number if (exponent - exponent.round()).abs() < 1e-9 => power(exponent.round()),
+            Unit::Number => number(value),
+        }
     }
 }
 
@@ -227,7 +245,8 @@ pub(crate) fn seconds(value: f64) -> String {
         v if v >= 0.9995e-6 => (1e6, "µs"),
         _ => (1e9, "ns"),
     };
-    format!("{} {unit}", number(value * factor))
+    // A number and its unit stay on one line.
+    format!("{}\u{a0}{unit}", number(value * factor))
 }
 
 #[cfg(test)]
@@ -248,8 +267,8 @@ mod tests {
         for (value, text) in cases {
             assert_eq!(number(value), text);
         }
-        assert_eq!(seconds(0.000_25), "250 µs");
-        assert_eq!(seconds(0.001), "1 ms");
+        assert_eq!(seconds(0.000_25), "250\u{a0}µs");
+        assert_eq!(seconds(0.001), "1\u{a0}ms");
     }
 
     #[test]
@@ -262,7 +281,14 @@ mod tests {
         let times = Axis::log("", Unit::Seconds, [2e-6, 0.03]);
         assert_eq!(
             labels(&times, 9.0),
-            ["1 µs", "10 µs", "100 µs", "1 ms", "10 ms", "100 ms"]
+            [
+                "1\u{a0}µs",
+                "10\u{a0}µs",
+                "100\u{a0}µs",
+                "1\u{a0}ms",
+                "10\u{a0}ms",
+                "100\u{a0}ms"
+            ]
         );
         let linear = Axis::linear("", 0.0, 30.0);
         assert_eq!(

@@ -3,7 +3,7 @@
 //! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the law in
 //! every stage).
 
-use super::{OUTPUTS, Outcome, Scene, Worst, in_f64};
+use super::{OUTPUTS, Outcome, SAMPLES, Scene, Worst, in_f64};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics, kinetic_energy, potential_energy};
 use crate::math::integrator::{Method, increment, two_sum};
@@ -56,7 +56,7 @@ impl<const N: usize> ArmScene<N> {
             }
         };
         let spacing = duration / in_f64(OUTPUTS);
-        let reference = Reference::of(&arm, &start, &law, spacing, OUTPUTS as usize);
+        let reference = Reference::of(&arm, &start, &law, spacing, SAMPLES);
         let energy_scale = energy_scale(&arm, &start);
         Self {
             name,

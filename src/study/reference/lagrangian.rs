@@ -79,9 +79,9 @@ impl<const N: usize> Factors<N> {
             for row in pivot + 1..N {
                 let factor = matrix[row][pivot] / matrix[pivot][pivot];
                 matrix[row][pivot] = factor;
-                for column in pivot + 1..N {
-                    let above = matrix[pivot][column];
-                    matrix[row][column] += -(factor * above);
+                let above = matrix[pivot];
+                for (value, above) in matrix[row].iter_mut().zip(above).skip(pivot + 1) {
+                    *value += -(factor * above);
                 }
             }
         }

@@ -134,13 +134,10 @@ impl<const N: usize> Taylor<N> {
 
     /// The mass matrix at the start of the step, which every coefficient is solved with.
     fn factors(&self) -> Factors<N> {
-        let mut matrix = self.lagrangian.coupling;
-        for i in 0..N {
-            for j in 0..N {
-                matrix[i][j] = matrix[i][j] * self.along[0][i][j];
-            }
-        }
-        Factors::of(matrix)
+        let coupling = &self.lagrangian.coupling;
+        Factors::of(std::array::from_fn(|i| {
+            std::array::from_fn(|j| coupling[i][j] * self.along[0][i][j])
+        }))
     }
 
     /// Coefficient `k` of sine and cosine of every angle, of their differences, and of the squared rates.
