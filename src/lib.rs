@@ -2,6 +2,8 @@
 //!
 //! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), [`protocol`] (pure: bytes
 //! and JSON) and [`actors`] (joins the two, one actor per node). `math` and `protocol` do not know each other.
+//!
+//! Beside them [`study`] (pure: `math` measured against theory) and [`report`] (clock, files and drawings around the study).
 
 pub mod actors;
 pub mod logging;

@@ -1,5 +1,7 @@
 //! `pendularm report`: files, resuming, refusals. What is in them is the study's own business.
 
+#![allow(clippy::unwrap_used, reason = "a test that panics has failed")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

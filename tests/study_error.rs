@@ -1,5 +1,7 @@
 //! Error against cost: the study's scenes behave as theory says, and are what the live arm does.
 
+#![allow(clippy::unwrap_used, reason = "a test that panics has failed")]
+
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::study::budget::Budget;

@@ -5,7 +5,7 @@
 //! | [`stability`] | the largest stable timestep, predicted from the linearised loop ([`linear`], [`matrix`]) |
 //! | [`measure`] | the same, measured on the arm itself |
 //! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
-//! | [`reference`] | the true motion, with twice the digits and a bound on its own error |
+//! | [`reference`](mod@reference) | the true motion, with twice the digits and a bound on its own error |
 //! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
 //! | [`conditioning`] | digits lost in the accelerations of arms with uneven masses |
 //! | [`budget`] | truncation, rounding and control hold, apart |

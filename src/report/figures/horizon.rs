@@ -178,7 +178,7 @@ fn figure(swings: &[Swing]) -> Figure {
         "separation",
         headline(swings),
         "Free swing from the horizontal. An error of 0.01 rad is the horizon (dotted upright lines); past it a swing and the true one have only \
-         their energy in common. The panel ends where the reference itself is no longer known.",
+         their energy in common. The panel ends where the reference itself is no longer known, or where it was not taken further.",
         &keys,
         &plots,
     )
@@ -196,7 +196,7 @@ fn headline(swings: &[Swing]) -> String {
         })
         .collect();
     format!(
-        "Doubles end every comparison: the latest horizon of RK4 at any timestep is, with {}",
+        "Doubles end every comparison: the latest horizon of RK4 at any timestep here is, with {}",
         words.join(", with ")
     )
 }

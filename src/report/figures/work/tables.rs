@@ -29,7 +29,7 @@ const ROWS: [Row; 5] = [
     },
     Row {
         work: "Gravity load without gravity",
-        place: "gravity is one number that the recursion starts from, not a term of its own",
+        place: "not left out: one number that the recursion starts from, not a term of its own",
         with: "step-2-rk4-free",
         without: "step-2-rk4-weightless",
     },
