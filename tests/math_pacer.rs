@@ -2,6 +2,7 @@
 
 #![allow(
     clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
     clippy::cast_sign_loss,
     clippy::float_cmp,
     clippy::indexing_slicing,
@@ -18,6 +19,7 @@ use proptest::prelude::*;
 const SECOND: u64 = 1_000_000_000;
 /// The arm wakes 60 times a second.
 const WAKE: u64 = SECOND / 60;
+const TEN_DAYS: u64 = 10 * 86_400 * SECOND;
 
 fn ns(nanoseconds: u64) -> Duration {
     Duration::from_nanos(nanoseconds)
@@ -64,9 +66,8 @@ fn after_t_seconds_the_arm_has_made_the_whole_part_of_t_over_the_timestep() {
 /// Ten days at 1 ms: 864 million steps. A running sum of the timestep would be off by more than a step.
 #[test]
 fn a_millisecond_stays_exact_for_days() {
-    let ten_days = 10 * 86_400 * SECOND;
-    assert_eq!(paced(0.001, 249_999_937, ten_days), 864_000_000);
-    assert_eq!(paced(0.001, 249_999_937, ten_days - 1), 863_999_999);
+    assert_eq!(paced(0.001, 249_999_937, TEN_DAYS), 864_000_000);
+    assert_eq!(paced(0.001, 249_999_937, TEN_DAYS - 1), 863_999_999);
 }
 
 #[test]
@@ -169,7 +170,36 @@ fn timestep() -> impl Strategy<Value = u64> {
     (3.0..10.3f64).prop_map(|exponent| 10f64.powf(exponent).round() as u64)
 }
 
+/// Frequencies that are no whole number of nanoseconds, nor of anything binary.
+#[test]
+fn at_every_whole_frequency_every_whole_second_has_all_its_steps() {
+    for hertz in 1..=1000 {
+        for second in [1, 2, 3, 10, 3600, 864_000] {
+            let mut pacer = Pacer::new(Duration::ZERO, 1.0 / hertz as f64);
+            pacer.took(hertz * second - 1);
+            assert_eq!(pacer.due(ns(second * SECOND)), 1, "{hertz} Hz, {second} s");
+            assert_eq!(
+                pacer.due(ns(second * SECOND - 1)),
+                0,
+                "{hertz} Hz, {second} s"
+            );
+        }
+    }
+}
+
 proptest! {
+    #[test]
+    fn a_step_is_due_in_the_nanosecond_in_which_it_is_complete_and_not_before(
+        step in timestep(),
+        share in 0.0..1.0f64,
+    ) {
+        let count = 1 + ((TEN_DAYS / step) as f64 * share) as u64;
+        let mut pacer = Pacer::new(Duration::ZERO, seconds(step));
+        pacer.took(count - 1);
+        prop_assert_eq!(pacer.due(ns(count * step - 1)), 0);
+        prop_assert_eq!(pacer.due(ns(count * step)), 1);
+    }
+
     /// The number of whole steps is checked in integers, which know no rounding.
     #[test]
     fn polls_less_than_a_quarter_of_a_second_apart_lose_nothing(

@@ -281,6 +281,16 @@ fn time_is_a_product_and_goes_on_over_a_new_timestep() {
 }
 
 #[test]
+fn setting_the_same_timestep_again_does_not_turn_time_into_a_sum() {
+    let mut simulation = moving(Method::Euler);
+    for _ in 0..1000 {
+        simulation.set_timestep(0.0001);
+        simulation.step();
+    }
+    assert_eq!(simulation.time(), 1000.0 * 0.0001);
+}
+
+#[test]
 fn a_reset_puts_back_pose_clock_setpoint_integral_and_effort_and_nothing_else() {
     let mut simulation = moving(Method::Verlet);
     simulation.set_timestep(0.002);

@@ -21,12 +21,11 @@ pub const CATCH_UP: Duration = Duration::from_millis(250);
 
 const NANOSECONDS: f64 = 1e9;
 
-/// Relative slack of the division, without which 0.3 s at 0.1 s would be two steps.
+/// Relative slack of the division, without which 60 steps of 1/60 s might take a nanosecond more than a second.
 ///
-/// Four roundings can lower the quotient, by 2^-53 each: the one of the decimal timestep itself, the one to
-/// nanoseconds, the division's, and that of the product with the slack. Twice their sum is granted; it brings a step
-/// forward by less than a nanosecond for the first ten days.
-const SLACK: f64 = 1.0 + 4.0 * f64::EPSILON;
+/// Three roundings can lower the quotient, by 2^-53 each: the one of the timestep itself, the one to nanoseconds, and the
+/// division's. Four are granted; that brings a step forward by less than a nanosecond for the first ten days.
+const SLACK: f64 = 1.0 + 2.0 * f64::EPSILON;
 
 /// Counts whole steps against a clock that it is told.
 ///

@@ -25,7 +25,7 @@
 
 use super::arm::State;
 
-/// Bound of each joint's integral \[rad s\]. With the default gains it stands for thousands of times the effort that
+/// Bound of each joint's integral \[rad s\]. With the default gains it stands for over a thousand times the effort that
 /// gravity asks for, so it never hinders; without it a blocked or impossible setpoint would wind up for ever.
 pub const INTEGRAL_LIMIT: f64 = 50.0;
 
@@ -40,7 +40,10 @@ pub struct Gains<const N: usize> {
     pub kd: [f64; N],
 }
 
-/// The gains of the default 2-link arm.
+/// Gains for the default 2-link arm: any setpoint within ±2π, from rest or out of a free swing, is reached to 0.02 rad
+/// and 0.02 m within 2 s. Stable in every pose up to a timestep of 4.3 ms.
+///
+/// Other numbers of links have no default: gains must fit the inertia that each joint moves.
 impl Default for Gains<2> {
     fn default() -> Self {
         Self {
@@ -51,13 +54,16 @@ impl Default for Gains<2> {
     }
 }
 
-/// The gains of the default 3-link arm.
+/// Gains for the default 3-link arm: as for two links, within 3.5 s. Stable in every pose up to a timestep of 3.1 ms.
+///
+/// Found by a search for the least settling time that keeps turns of 4π from diverging at 3 ms with any method. The last
+/// joint has little damping of its own, because `kd dt` there is what limits the timestep.
 impl Default for Gains<3> {
     fn default() -> Self {
         Self {
-            kp: [2000.0, 230.0, 90.0],
-            ki: [5000.0, 600.0, 225.0],
-            kd: [170.0, 32.0, 8.0],
+            kp: [1900.0, 240.0, 115.0],
+            ki: [4800.0, 500.0, 340.0],
+            kd: [185.0, 32.0, 5.0],
         }
     }
 }
