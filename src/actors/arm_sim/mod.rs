@@ -161,6 +161,7 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
                         connection: sender.connection,
                         frame,
                         service: None,
+                        status: Some(Level::Error),
                         done: Some(sender.done),
                     });
                 }
