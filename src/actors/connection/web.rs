@@ -71,6 +71,7 @@ impl Session {
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,
+            shared: Rc::clone(&self.shared),
             in_message: false,
         };
         // Whoever got here has shown the token already, if there is one.
@@ -240,6 +241,7 @@ fn farewell(error: &Error) -> (CloseCode, &'static str) {
 /// The sending half.
 struct Output<S> {
     link: Rc<Link<S>>,
+    shared: Rc<Shared>,
     /// The first frame of the next write goes on with a message that has begun.
     in_message: bool,
 }
@@ -291,7 +293,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         let gone = || io::Error::from(io::ErrorKind::ConnectionAborted);
         let close = Message::Close(Some(CloseFrame { code, reason }));
         self.link.put(close).ok_or_else(gone)?;
-        self.link.flush().await.ok_or_else(gone)
+        self.link.flush().await.ok_or_else(gone)?;
+        if !self.shared.refusing.get() {
+            return Ok(());
+        }
+        // Nothing that it sends is looked at any more, a close frame included: the stream's own end has to do.
+        poll_fn(|cx| Pin::new(self.link.socket.borrow_mut().get_mut()).poll_shutdown(cx)).await
     }
 }
 
