@@ -10,7 +10,6 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use actix::prelude::*;
 use futures_util::{SinkExt, StreamExt};
 use pendularm::actors::connection::gate::Gate;
 use pendularm::actors::connection::{Connection, STALL_LIMIT};
