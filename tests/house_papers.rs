@@ -158,6 +158,7 @@ fn the_readme_lists_every_service_with_its_fields_in_order() {
     }
 }
 
+#[cfg(feature = "web")]
 #[test]
 fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
     let help = Command::new(env!("CARGO_BIN_EXE_pendularm"))
@@ -168,9 +169,9 @@ fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
     let rows = table(&text("README.md"), "option");
     for row in &rows {
         let (option, variable) = (codes(&row[0])[0], codes(&row[1])[0]);
-        let line = help
-            .lines()
-            .find(|line| line.contains(&format!("{option} <")));
+        let line = help.lines().find(|line| {
+            line.contains(&format!("{option} <")) || line.contains(&format!("{option}[=<"))
+        });
         let line = line.unwrap_or_else(|| panic!("{option} is not in the help"));
         assert!(line.contains(&format!("[env: {variable}]")), "{line}");
     }

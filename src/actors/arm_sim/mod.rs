@@ -10,6 +10,7 @@
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
+mod by_hand;
 mod goals;
 mod services;
 mod telemetry;
@@ -20,6 +21,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
+pub use self::by_hand::MAX_STEPS;
 use self::goals::Goals;
 pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::telemetry::Telemetry;
@@ -174,6 +176,7 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
                         connection: sender.connection,
                         frame,
                         service: None,
+                        status: Some(Level::Error),
                         done: Some(sender.done),
                     });
                 }
@@ -225,14 +228,8 @@ impl<const N: usize> ArmSim<N> {
         }
         let taken = self.take_steps(due);
         self.pacer.took(taken);
-        if let Some(divergence) = self.simulation.divergence() {
-            self.telemetry.owes(0, 0.0);
-            tracing::warn!(
-                step = divergence.step,
-                time = divergence.time,
-                "the simulation has diverged"
-            );
-            self.publish_diagnostics();
+        if self.simulation.divergence().is_some() {
+            self.note_divergence();
             return;
         }
         self.telemetry.owes(due - taken, self.simulation.timestep());
@@ -259,6 +256,19 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry
             .stepped(taken, started.elapsed(), self.simulation.timestep());
         taken
+    }
+
+    /// Tells of a divergence that has just happened.
+    fn note_divergence(&mut self) {
+        self.telemetry.owes(0, 0.0);
+        if let Some(divergence) = self.simulation.divergence() {
+            tracing::warn!(
+                step = divergence.step,
+                time = divergence.time,
+                "the simulation has diverged"
+            );
+        }
+        self.publish_diagnostics();
     }
 
     /// Time counts from here: what was owed of an unfinished step is gone.

@@ -91,6 +91,8 @@ impl<const N: usize> ArmSim<N> {
                 };
                 self.answer_reset(reply, fields.status(), ended, ctx);
             }
+            Service::Step => self.step_by_hand(&mut fields, reply),
+            Service::Disturb => self.disturb(&mut fields, reply),
             Service::Enable => {
                 let data = self.enable(&mut fields);
                 reply.conclude(&Switch { data }, &fields.status());

@@ -14,6 +14,7 @@ use super::{MAX_CONNECTIONS, Nodes};
 use crate::actors::ConnectionId;
 use crate::actors::connection::{Answer, Configure, Deliver, Finish};
 use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::Level;
 use crate::protocol::op::Op;
 
 /// The runtime's nodes. From the runtime, once, before any client is accepted.
@@ -101,8 +102,10 @@ pub struct Respond {
     pub connection: ConnectionId,
     /// The whole frame.
     pub frame: Bytes,
-    /// The service that it answers; `None` for a status.
+    /// The service that it answers, if it is the runtime's own.
     pub service: Option<Service>,
+    /// The level, if it is a status: sent only if the client wants such.
+    pub status: Option<Level>,
     /// Dropped once the frame is on its way, where that is also the end of the call.
     pub done: Option<oneshot::Sender<()>>,
 }

@@ -32,6 +32,7 @@ use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self as frames, Level};
+use crate::protocol::op::Verbosity;
 
 /// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
 /// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
@@ -71,6 +72,8 @@ struct Client {
     withdrawn: HashSet<Topic>,
     subscriptions: HashMap<Arc<str>, Vec<Subscription>>,
     provided: HashSet<Box<str>>,
+    /// Which statuses it wants.
+    verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
     answered: Option<oneshot::Sender<()>>,
 }
@@ -193,7 +196,11 @@ impl Handler<Respond> for Registry {
     type Result = ();
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&respond.connection) {
+        if let Some(client) = self.clients.get(&respond.connection)
+            && respond
+                .status
+                .is_none_or(|level| client.verbosity.wants(level))
+        {
             client.send(respond.frame, respond.service);
         }
     }
@@ -241,6 +248,7 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: HashMap::new(),
             provided: HashSet::new(),
+            verbosity: Verbosity::ALL,
             answered: None,
         }
     }
@@ -314,7 +322,9 @@ impl Registry {
     }
 
     fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&RawValue>) {
-        if let Some(client) = self.clients.get(&to) {
+        if let Some(client) = self.clients.get(&to)
+            && client.verbosity.wants(level)
+        {
             client.send(frames::status(level, msg, id), None);
         }
     }
