@@ -20,11 +20,11 @@ use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use tracing::level_filters::LevelFilter;
 
-use crate::report::{self, ReportOptions};
 pub use self::usage::{Origin, UsageError};
 #[cfg(feature = "web")]
 pub use self::web::WebOptions;
 use crate::protocol::token::Token;
+use crate::report::{self, ReportOptions};
 
 /// Where the runtime listens unless told otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
