@@ -46,6 +46,7 @@ function drawGrid(context, width, height, scale) {
   const power = 10 ** Math.floor(Math.log10(rough));
   const metres = [1, 2, 5, 10].map((one) => one * power).find((one) => one >= rough);
   const digits = Math.max(0, -Math.floor(Math.log10(metres)));
+  const every = metres * scale < 64 ? 2 : 1; // labels need more room than lines
   context.font = LABEL;
   context.fillStyle = colors.muted;
   context.lineWidth = 1;
@@ -60,10 +61,10 @@ function drawGrid(context, width, height, scale) {
       context.stroke();
       const label = fixed(i * metres, digits);
       const edge = at < 24 || at > size - 24;
-      if (i % 2 !== 0 || edge) continue;
+      if (i % every !== 0 || edge) continue;
       context.textAlign = vertical ? "center" : "left";
       context.textBaseline = vertical ? "alphabetic" : "middle";
-      context.fillText(vertical && i === most - (most % 2) ? `${label} m` : label, vertical ? at : 6, vertical ? height - 6 : at);
+      context.fillText(vertical && i === most - (most % every) ? `${label} m` : label, vertical ? at : 6, vertical ? height - 6 : at);
     }
   }
 }
@@ -77,16 +78,16 @@ function drawGravity(context, width, gravity) {
   context.textBaseline = "middle";
   context.font = "12px system-ui, sans-serif";
   const text = gravity > 0 ? `g ${significant(gravity, 3)} m/s²` : "no gravity";
-  context.fillText(text, x - (gravity > 0 ? 12 : -14), 76);
+  context.fillText(text, x - (gravity > 0 ? 12 : -14), 28);
   if (!(gravity > 0)) return;
   context.beginPath();
-  context.moveTo(x, 60);
-  context.lineTo(x, 86);
+  context.moveTo(x, 12);
+  context.lineTo(x, 38);
   context.stroke();
   context.beginPath();
-  context.moveTo(x, 93);
-  context.lineTo(x - 5, 84);
-  context.lineTo(x + 5, 84);
+  context.moveTo(x, 45);
+  context.lineTo(x - 5, 36);
+  context.lineTo(x + 5, 36);
   context.closePath();
   context.fill();
 }

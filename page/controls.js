@@ -23,7 +23,11 @@ export function startControls() {
   startServo();
   startPush();
   watch("links", makeJointFields);
-  for (const key of ["params", "gains", "setpoint"]) watch(key, () => perJoint.forEach((take) => take()));
+  for (const key of ["params", "gains", "setpoint"]) watch(key, showStored);
+}
+
+function showStored() {
+  for (const take of perJoint) take();
 }
 
 function startIntegrator() {
@@ -124,6 +128,7 @@ function makeJointFields(links) {
   fill("kd-fields", links, gain("kd", "N m s/rad", 1000, "derivative gain"), "gains", setGains);
   fillSetpoint(links);
   makeJointChoice(links);
+  showStored();
 }
 
 /** One field per joint of the array `key` in the stored `group`; a change sends the whole array. */

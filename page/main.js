@@ -35,6 +35,11 @@ startKeyboard();
 startShare();
 startAim(byId("arm"));
 
+// On a small screen what is not needed at once is folded away.
+if (matchMedia("(max-width: 779px)").matches) {
+  for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3), #compare > details")) one.open = false;
+}
+
 function forget() {
   record.clear();
   clearTrail();

@@ -36,7 +36,7 @@ export function showReadouts() {
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), `${fixed(factor, 2)}×`);
   byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < 0.95);
-  setText(byId("out-method"), methodName(state.integrator?.method));
+  setText(byId("out-method"), methodName(state.integrator?.method).replace("Runge–Kutta 4", "RK 4"));
   setText(byId("out-timestep"), duration(state.integrator?.timestep ?? NaN));
   setText(byId("out-servo"), state.enabled == null ? "–" : state.enabled ? "on" : "off");
   setText(byId("out-steps"), `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
