@@ -122,7 +122,7 @@ export function drawArm(now) {
   context.clearRect(0, 0, width, height);
   context.drawImage(backdrop, 0, 0, width, height);
   const n = state.links;
-  if (n === 0 || lengths().length !== n) return;
+  if (n === 0 || state.params?.lengths.length !== n) return;
   context.lineCap = "round";
   context.lineJoin = "round";
   drawTrail();

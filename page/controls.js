@@ -11,6 +11,10 @@ const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.
 const PUSH_EFFORT = 50; // N m, as on the classic page
 const PUSH_SECONDS = 0.1;
 
+const ECHO_MS = 300;
+
+let placed = []; // the setpoint that was sent last
+let placedAt = -Infinity;
 let perJoint = []; // functions that take the stored values into the fields of each joint
 let pushEffort;
 let pushSeconds;
@@ -104,9 +108,20 @@ export async function push(sign) {
 /** Moves the setpoint of the chosen joint by `angle` [rad]; from where the arm is, if none is known. */
 export function nudgeSetpoint(angle) {
   if (state.links === 0) return;
-  const from = state.setpointKnown ? state.setpoint : state.position;
-  const positions = Array.from(from.subarray(0, state.links));
+  const positions = presentSetpoint();
   positions[state.joint] = Number((positions[state.joint] + angle).toFixed(6));
+  place(positions);
+}
+
+/** The setpoint, or the one just sent: a held key is faster than the way to the runtime and back. */
+function presentSetpoint() {
+  if (performance.now() - placedAt < ECHO_MS && placed.length === state.links) return [...placed];
+  return Array.from((state.setpointKnown ? state.setpoint : state.position).subarray(0, state.links));
+}
+
+function place(positions) {
+  placed = positions;
+  placedAt = performance.now();
   sendSetpoint(positions);
 }
 
@@ -153,9 +168,9 @@ function fillSetpoint(links) {
     label: `setpoint ${joint + 1}`, short: String(joint + 1), unit: "rad", low: -Math.PI, high: Math.PI, className: `joint${joint + 1}`,
     // There is no answer to a trajectory: it comes back over its topic once it counts.
     commit: (value) => {
-      const positions = Array.from((state.setpointKnown ? state.setpoint : state.position).subarray(0, links));
+      const positions = presentSetpoint();
       positions[joint] = value;
-      sendSetpoint(positions);
+      place(positions);
       return Promise.resolve({ result: true, status: "" });
     },
   }));

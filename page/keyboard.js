@@ -39,9 +39,10 @@ const actions = new Map(shortcuts.map(([key, , act]) => [key, act]));
 
 /** After key 0, choosing an integrator sets the arm going again, as it did there. */
 async function useMethod(method, name) {
-  if ((await setIntegrator({ method })).result) announce(`${name}.`);
-  if (stoppedByZero && state.paused) setPaused(false);
+  const goOn = stoppedByZero;
   stoppedByZero = false;
+  if ((await setIntegrator({ method })).result) announce(`${name}.`);
+  if (goOn) setPaused(false);
 }
 
 function pushNow(sign) {

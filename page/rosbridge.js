@@ -105,5 +105,5 @@ function failure(status) {
 
 /** Whether an answer says that nobody provides the service. */
 export function nobodyProvides(answer) {
-  return !answer.result && /no provider|does not exist|unknown service/i.test(answer.status);
+  return !answer.result && /no provider|not served|does not exist/i.test(answer.status);
 }

@@ -33,7 +33,7 @@ class BrowserError(Exception):
 class Browser:
     """One Chromium with an empty profile; use it with `with`."""
 
-    def __init__(self, binary="chromium"):
+    def __init__(self, binary="chromium", extra=()):
         self.profile = tempfile.mkdtemp(prefix="pendularm-browser-")
         commands, to_browser = os.pipe()
         from_browser, answers = os.pipe()
@@ -46,7 +46,7 @@ class Browser:
             os.dup2(ends[1], 4)
 
         self.process = subprocess.Popen(
-            [binary, *FLAGS, f"--user-data-dir={self.profile}", "about:blank"],
+            [binary, *FLAGS, *extra, f"--user-data-dir={self.profile}", "about:blank"],
             preexec_fn=take_ends, pass_fds=(3, 4), start_new_session=True,
             stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
         )
