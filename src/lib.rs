@@ -8,3 +8,5 @@ pub mod logging;
 pub mod math;
 pub mod options;
 pub mod protocol;
+#[cfg(feature = "web")]
+pub mod web;

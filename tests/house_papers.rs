@@ -160,9 +160,9 @@ fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
     let rows = table(&text("README.md"), "option");
     for row in &rows {
         let (option, variable) = (codes(&row[0])[0], codes(&row[1])[0]);
-        let line = help
-            .lines()
-            .find(|line| line.contains(&format!("{option} <")));
+        let line = help.lines().find(|line| {
+            line.contains(&format!("{option} <")) || line.contains(&format!("{option}[=<"))
+        });
         let line = line.unwrap_or_else(|| panic!("{option} is not in the help"));
         assert!(line.contains(&format!("[env: {variable}]")), "{line}");
     }

@@ -18,8 +18,8 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
         .collect()
 }
 
-/// Contract section 3, the table: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 13] = [
+/// Contract section 3, the table, and what came later: service, request, values.
+const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -37,6 +37,12 @@ const SERVICES: [(&str, &[&str], &[&str]); 13] = [
     ),
     ("/arm_sim/pause", &["data"], &["data"]),
     ("/arm_sim/reset", &[], &["position", "velocity"]),
+    ("/arm_sim/step", &["steps"], &["steps", "time"]),
+    (
+        "/arm_sim/disturb",
+        &["effort", "duration"],
+        &["effort", "duration"],
+    ),
     ("/pid_controller/enable", &["data"], &["data"]),
     (
         "/pid_controller/set_gains",
@@ -128,6 +134,8 @@ fn required_fields_are_those_that_have_no_default() {
         let expected: &[&str] = match service {
             Service::IntegrationStep => &["function", "x0", "dt", "steps", "integrator"],
             Service::Solve | Service::SendGoal => &["x", "y"],
+            Service::Step => &["steps"],
+            Service::Disturb => &["effort", "duration"],
             _ => &[],
         };
         assert_eq!(required(service.fields()), expected, "{}", service.name());
@@ -135,7 +143,7 @@ fn required_fields_are_those_that_have_no_default() {
 }
 
 #[test]
-fn one_service_computes_and_four_take_all_or_nothing() {
+fn one_service_computes_and_six_take_all_or_nothing() {
     let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
         Service::ALL
             .into_iter()
@@ -147,6 +155,8 @@ fn one_service_computes_and_four_take_all_or_nothing() {
         of(Service::all_or_nothing),
         [
             Service::IntegrationStep,
+            Service::Step,
+            Service::Disturb,
             Service::Solve,
             Service::SendGoal,
             Service::TrialStart

@@ -17,6 +17,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep};
 
 use super::arm_sim::ArmSim;
+use super::connection::gate::Gate;
 use super::gauges::Gauges;
 use super::integration::Integration;
 use super::listener::{Listener, StopListening};
@@ -25,6 +26,11 @@ use super::workers::WorkerPool;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::{Links, Options};
+#[cfg(feature = "web")]
+use crate::{
+    options::WebOptions,
+    web::{Door, access::Access, authority::Host},
+};
 
 /// What waiting calls are told when the runtime ends.
 const SHUTTING_DOWN: &str = "shutting down";
@@ -82,11 +88,17 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     // The registry lives as long as this function: it can't be gone.
     let _ = registry.send(Attach(nodes)).await;
 
+    let gate = Arc::new(gate(options));
     let listeners: Vec<Addr<Listener>> = sockets
         .into_iter()
-        .map(|socket| Listener::new(socket, registry.clone(), Arc::clone(&gauges)).start())
+        .map(|socket| {
+            let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
+            Listener::behind(Arc::clone(&gate), socket, registry, gauges).start()
+        })
         .collect();
     announce(address);
+    #[cfg(feature = "web")]
+    announce_page(address, options.token.is_some());
     wait_for_signal(&mut interrupt, &mut terminate).await;
 
     for listener in listeners {
@@ -95,6 +107,30 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     shut_down(&registry, &workers, &gauges).await;
     arm_thread.stop();
     Ok(())
+}
+
+/// What is asked of clients, and what they find behind it.
+fn gate(options: &Options) -> Gate {
+    Gate {
+        token: options.token.clone(),
+        #[cfg(feature = "web")]
+        door: {
+            let WebOptions {
+                hosts,
+                origins,
+                strict_origin,
+                report,
+            } = options.web.clone();
+            let token = options.token.clone();
+            let access = Access {
+                token,
+                hosts,
+                origins,
+                strict_origin,
+            };
+            Door::new(access, report)
+        },
+    }
 }
 
 /// The arm and the nodes that know its number of links.
@@ -136,6 +172,22 @@ fn announce(address: SocketAddr) {
     let mut stdout = std::io::stdout();
     let _ = writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush());
     tracing::info!(%address, "serving rosbridge clients");
+}
+
+/// Where a browser finds the page. The token is not for the log.
+#[cfg(feature = "web")]
+fn announce_page(address: SocketAddr, asks_token: bool) {
+    let host = if address.ip().is_unspecified() {
+        "localhost".to_owned()
+    } else {
+        Host::Address(address.ip()).to_string()
+    };
+    let port = address.port();
+    if asks_token {
+        tracing::info!("page: http://{host}:{port}/?token=... (with the token, once)");
+    } else {
+        tracing::info!("page: http://{host}:{port}/");
+    }
 }
 
 async fn wait_for_signal(interrupt: &mut Signal, terminate: &mut Signal) {

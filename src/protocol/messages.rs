@@ -19,7 +19,7 @@ const LARGE_FRAME: usize = 64 * 1024;
 const NANOSECONDS: u32 = 1_000_000_000;
 
 /// How serious a status is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Level {
     /// All is well.
     Info,
@@ -30,6 +30,9 @@ pub enum Level {
 }
 
 impl Level {
+    /// All levels, the least serious first.
+    pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Error];
+
     /// The level's name on the wire.
     #[must_use]
     pub const fn name(self) -> &'static str {

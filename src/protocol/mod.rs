@@ -14,4 +14,5 @@ pub mod outbox;
 pub mod streamed;
 mod text;
 mod throttle;
+pub mod token;
 pub mod trajectory;

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
+use super::messages::Level;
 pub use reader::read;
 
 /// Longest topic or service name, and subscription id, in bytes: the registry keeps them for as long as a connection lives.
@@ -74,6 +75,13 @@ pub enum Op {
     },
     /// Calls a service.
     CallService(CallService),
+    /// Which statuses the sender wants from now on.
+    SetLevel(Verbosity),
+    /// Shows who the sender is, where the runtime asks for that.
+    Auth {
+        /// What it shows.
+        token: String,
+    },
     /// A provider's answer to a forwarded call.
     ServiceResponse {
         /// Service name.
@@ -85,6 +93,23 @@ pub enum Op {
         /// The provider's own `status`, if it is a string.
         status: Option<String>,
     },
+}
+
+/// The least serious status that a client wants; `None` for no status at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verbosity(pub Option<Level>);
+
+impl Verbosity {
+    /// Every status: what holds over raw TCP until the client says otherwise.
+    pub const ALL: Self = Self(Some(Level::Info));
+    /// No status: what holds over WebSocket until the client says otherwise.
+    pub const NONE: Self = Self(None);
+
+    /// Whether a status of that level is wanted.
+    #[must_use]
+    pub fn wants(self, level: Level) -> bool {
+        self.0.is_some_and(|least| level >= least)
+    }
 }
 
 /// A subscription.

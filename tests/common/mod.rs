@@ -43,6 +43,11 @@ impl Runtime {
             "ARM_SIM_BIND",
             "ARM_SIM_SEED",
             "ARM_SIM_LOG",
+            "ARM_SIM_TOKEN",
+            "ARM_SIM_ALLOW_HOST",
+            "ARM_SIM_ALLOW_ORIGIN",
+            "ARM_SIM_STRICT_ORIGIN",
+            "ARM_SIM_REPORT",
         ] {
             command.env_remove(variable);
         }

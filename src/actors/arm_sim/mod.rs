@@ -9,6 +9,7 @@
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
+mod by_hand;
 mod services;
 mod telemetry;
 
@@ -18,6 +19,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
+pub use self::by_hand::MAX_STEPS;
 use self::telemetry::Telemetry;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
@@ -159,6 +161,7 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
                         connection: sender.connection,
                         frame,
                         service: None,
+                        status: Some(Level::Error),
                         done: Some(sender.done),
                     });
                 }
@@ -210,14 +213,8 @@ impl<const N: usize> ArmSim<N> {
         }
         let taken = self.take_steps(due);
         self.pacer.took(taken);
-        if let Some(divergence) = self.simulation.divergence() {
-            self.telemetry.owes(0, 0.0);
-            tracing::warn!(
-                step = divergence.step,
-                time = divergence.time,
-                "the simulation has diverged"
-            );
-            self.publish_diagnostics();
+        if self.simulation.divergence().is_some() {
+            self.note_divergence();
             return;
         }
         self.telemetry.owes(due - taken, self.simulation.timestep());
@@ -237,7 +234,7 @@ impl<const N: usize> ArmSim<N> {
         let mut taken = 0;
         while taken < due && started.elapsed() < WAKE_UP_BUDGET {
             let batch = BATCH.min(due - taken);
-            let advanced = self.simulation.advance(batch);
+            let advanced = self.advance(batch);
             taken += advanced;
             if advanced < batch {
                 break;
@@ -246,6 +243,24 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry
             .stepped(taken, started.elapsed(), self.simulation.timestep());
         taken
+    }
+
+    /// Takes up to so many steps, whatever they cost, and answers how many: fewer where the simulation diverges.
+    fn advance(&mut self, steps: u64) -> u64 {
+        self.simulation.advance(steps)
+    }
+
+    /// Tells of a divergence that has just happened.
+    fn note_divergence(&mut self) {
+        self.telemetry.owes(0, 0.0);
+        if let Some(divergence) = self.simulation.divergence() {
+            tracing::warn!(
+                step = divergence.step,
+                time = divergence.time,
+                "the simulation has diverged"
+            );
+        }
+        self.publish_diagnostics();
     }
 
     /// Time counts from here: what was owed of an unfinished step is gone.

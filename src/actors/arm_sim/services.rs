@@ -93,6 +93,8 @@ impl<const N: usize> ArmSim<N> {
                 };
                 reply.conclude(&pose, &fields.status());
             }
+            Service::Step => self.step_by_hand(&mut fields, reply),
+            Service::Disturb => self.disturb(&mut fields, reply),
             Service::Enable => {
                 let data = self.enable(&mut fields);
                 reply.conclude(&Switch { data }, &fields.status());

@@ -26,7 +26,7 @@ use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::Op;
+use crate::protocol::op::{Op, Verbosity};
 
 /// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
 /// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
@@ -66,6 +66,8 @@ struct Client {
     withdrawn: HashSet<Topic>,
     subscriptions: HashMap<Arc<str>, Vec<Subscription>>,
     provided: HashSet<Box<str>>,
+    /// Which statuses it wants.
+    verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
     answered: Option<oneshot::Sender<()>>,
 }
@@ -184,8 +186,10 @@ pub struct Respond {
     pub connection: ConnectionId,
     /// The whole frame.
     pub frame: Bytes,
-    /// The service that it answers; `None` for a status.
+    /// The service that it answers, if it is the runtime's own.
     pub service: Option<Service>,
+    /// The level, if it is a status: sent only if the client wants such.
+    pub status: Option<Level>,
     /// Dropped once the frame is on its way, where that is also the end of the call.
     pub done: Option<oneshot::Sender<()>>,
 }
@@ -296,7 +300,11 @@ impl Handler<Respond> for Registry {
     type Result = ();
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&respond.connection) {
+        if let Some(client) = self.clients.get(&respond.connection)
+            && respond
+                .status
+                .is_none_or(|level| client.verbosity.wants(level))
+        {
             client.send(respond.frame, respond.service);
         }
     }
@@ -344,6 +352,7 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: HashMap::new(),
             provided: HashSet::new(),
+            verbosity: Verbosity::ALL,
             answered: None,
         }
     }
@@ -417,7 +426,9 @@ impl Registry {
     }
 
     fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&RawValue>) {
-        if let Some(client) = self.clients.get(&to) {
+        if let Some(client) = self.clients.get(&to)
+            && client.verbosity.wants(level)
+        {
             client.send(messages::status(level, msg, id), None);
         }
     }

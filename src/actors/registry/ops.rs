@@ -54,6 +54,14 @@ impl Registry {
             }
             Op::AdvertiseService { service, .. } => self.advertise_service(&origin, &service),
             Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
+            Op::SetLevel(verbosity) => {
+                if let Some(client) = self.clients.get_mut(&origin.from) {
+                    client.verbosity = verbosity;
+                }
+                Ok(())
+            }
+            // Asked of a client before it gets here; where nothing is asked, anything shown will do.
+            Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
                 service,
                 values,

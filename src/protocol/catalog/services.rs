@@ -17,6 +17,10 @@ pub enum Service {
     Pause,
     /// Back to the starting pose at time 0.
     Reset,
+    /// Takes single steps of a paused arm.
+    Step,
+    /// Pushes the arm for a while.
+    Disturb,
     /// The controller on or off.
     Enable,
     /// The controller's gains.
@@ -37,12 +41,14 @@ pub enum Service {
 
 impl Service {
     /// All services, in the order in which they are documented.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::IntegrationStep,
         Self::SetIntegrator,
         Self::SetParams,
         Self::Pause,
         Self::Reset,
+        Self::Step,
+        Self::Disturb,
         Self::Enable,
         Self::SetGains,
         Self::Solve,
@@ -60,6 +66,8 @@ impl Service {
             Self::SetParams => &SET_PARAMS,
             Self::Pause => &PAUSE,
             Self::Reset => &RESET,
+            Self::Step => &STEP,
+            Self::Disturb => &DISTURB,
             Self::Enable => &ENABLE,
             Self::SetGains => &SET_GAINS,
             Self::Solve => &SOLVE,
@@ -106,7 +114,12 @@ impl Service {
     pub const fn all_or_nothing(self) -> bool {
         matches!(
             self,
-            Self::IntegrationStep | Self::Solve | Self::SendGoal | Self::TrialStart
+            Self::IntegrationStep
+                | Self::Step
+                | Self::Disturb
+                | Self::Solve
+                | Self::SendGoal
+                | Self::TrialStart
         )
     }
 
@@ -197,6 +210,27 @@ const RESET: ServiceEntry = ServiceEntry {
         required("velocity", "float64[]", "rad/s"),
     ],
 };
+const STEP: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/step",
+    type_name: "pendularm_interfaces/srv/Step",
+    owner: Node::ArmSim,
+    request: &[required("steps", "uint64", "")],
+    response: &[
+        required("steps", "uint64", ""),
+        required("time", "float64", "s"),
+    ],
+};
+const DISTURB: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/disturb",
+    type_name: "pendularm_interfaces/srv/Disturb",
+    owner: Node::ArmSim,
+    request: &DISTURBANCE,
+    response: &DISTURBANCE,
+};
+const DISTURBANCE: [Field; 2] = [
+    required("effort", "float64[]", "N m"),
+    required("duration", "float64", "s"),
+];
 const SET_GAINS: ServiceEntry = ServiceEntry {
     name: "/pid_controller/set_gains",
     type_name: "pendularm_interfaces/srv/SetGains",

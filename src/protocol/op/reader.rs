@@ -9,15 +9,16 @@ use serde_json::value::RawValue;
 
 use super::{
     Arguments, CallService, Incoming, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
-    OpError, Problem, Subscribe,
+    OpError, Problem, Subscribe, Verbosity,
 };
+use crate::protocol::messages::Level;
 use crate::protocol::{json, text};
 
 /// Characters of the JSON parser's complaint that go into a message: it may quote the client.
 const MAX_COMPLAINT: usize = 160;
 
 /// The members of a frame that mean something to us.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 15] = [
     "op",
     "id",
     "topic",
@@ -31,10 +32,12 @@ const KEYS: [&str; 13] = [
     "values",
     "result",
     "status",
+    "level",
+    "token",
 ];
 
 /// The operations that we know.
-const OPS: [&str; 9] = [
+const OPS: [&str; 11] = [
     "advertise",
     "unadvertise",
     "publish",
@@ -44,6 +47,8 @@ const OPS: [&str; 9] = [
     "unadvertise_service",
     "call_service",
     "service_response",
+    "set_level",
+    "auth",
 ];
 
 /// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
@@ -123,6 +128,10 @@ impl<'a> Reader<'a> {
             "unadvertise_service" => Op::UnadvertiseService {
                 service: self.name("service")?,
             },
+            "set_level" => Op::SetLevel(self.verbosity()?),
+            "auth" => Op::Auth {
+                token: self.secret()?,
+            },
             _ => self.response()?,
         })
     }
@@ -137,6 +146,33 @@ impl<'a> Reader<'a> {
             throttle: self.throttle()?,
             queue_length: self.queue_length()?,
         })
+    }
+
+    fn verbosity(&self) -> Result<Verbosity, Problem> {
+        let raw = self.required("level")?;
+        let name = json::text(raw);
+        let level = Level::ALL
+            .into_iter()
+            .find(|level| name.as_deref() == Some(level.name()));
+        match level {
+            None if name.as_deref() != Some("none") => {
+                Err(self.mistyped("level", "info, warning, error or none", raw))
+            }
+            level => Ok(Verbosity(level)),
+        }
+    }
+
+    /// What a client shows to be let in. What is wrong with it is told without repeating it.
+    fn secret(&self) -> Result<String, Problem> {
+        let raw = self.required("token")?;
+        let token = json::text(raw).ok_or(Problem::Mistyped {
+            op: self.op,
+            field: "token",
+            expected: "a string",
+            found: "something else".to_owned(),
+        })?;
+        self.short("token", &token)?;
+        Ok(token.into_owned())
     }
 
     fn response(&self) -> Result<Op, Problem> {

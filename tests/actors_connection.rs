@@ -1,0 +1,517 @@
+//! A connection in virtual time: throttling, stalls, what is owed at the end, the queue of computations.
+//!
+//! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
+
+mod virtual_time;
+
+use std::time::Duration;
+
+use pendularm::actors::connection::{
+    CALLS_OWED, LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
+};
+use pendularm::actors::registry::{FinishAll, Nodes, Publish, RefuseCalls};
+use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::protocol::messages;
+use serde_json::{Value, json};
+use tokio::time::{Instant, sleep};
+use virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
+
+const STEP: &str = Service::IntegrationStep.name();
+const PARAMS: &str = Service::SetParams.name();
+
+/// A gateway whose computations and whose parameters wait for the test to answer.
+async fn held_back() -> (Gateway, Held, Held) {
+    let (computations, calls) = (Held::default(), Held::default());
+    let mut nodes = Nodes::default();
+    Node::holding(&computations).attach(&mut nodes, &[Service::IntegrationStep], &[]);
+    Node::holding(&calls).attach(&mut nodes, &[Service::SetParams], &[]);
+    (Gateway::with(nodes).await, computations, calls)
+}
+
+fn id(frame: &Value) -> u64 {
+    frame["id"].as_u64().expect("an id")
+}
+
+#[test]
+fn a_throttled_topic_comes_at_its_rate_and_the_newest_are_kept() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        publisher.advertise("/t").await;
+        subscriber
+            .send(
+                json!({"op": "subscribe", "topic": "/t", "throttle_rate": 100, "queue_length": 2}),
+            )
+            .await;
+        subscriber.receive().await;
+        let began = Instant::now();
+        for n in 0..100 {
+            publisher.publish("/t", n).await;
+            sleep(Duration::from_millis(10)).await;
+        }
+        // Message n at 10 n ms. At 100 k ms the older of the two newest goes: 10 k - 2 or 10 k - 1, by which of two
+        // timers of the same instant is first.
+        let mut came = vec![];
+        while came.len() < 13 {
+            came.push((
+                subscriber.receive().await["msg"]["n"].as_u64().unwrap(),
+                began.elapsed(),
+            ));
+            if came.last().unwrap().0 == 99 {
+                break;
+            }
+        }
+        assert_eq!(came[0].0, 0);
+        assert_eq!(came.last().unwrap().0, 99);
+        assert!(came.len() >= 11, "about ten a second: {came:?}");
+        for pair in came.windows(2) {
+            assert!(pair[0].0 < pair[1].0, "{came:?}");
+        }
+        assert!(subscriber.hears_nothing_for(Duration::from_secs(5)).await);
+    });
+}
+
+/// What the stream shows can be late by what was read at once; the last of n can't come before (n - 1) intervals.
+#[test]
+fn no_more_messages_come_than_the_interval_allows() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        publisher.advertise("/t").await;
+        subscriber
+            .send(
+                json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1000, "queue_length": 5}),
+            )
+            .await;
+        subscriber.receive().await;
+        let began = Instant::now();
+        for n in 0..10 {
+            publisher.publish("/t", n).await;
+        }
+        for (intervals, n) in [(0, 0), (1, 5), (2, 6), (3, 7), (4, 8), (5, 9)] {
+            assert_eq!(subscriber.receive().await["msg"]["n"], n);
+            assert_elapsed(began, Duration::from_secs(intervals));
+        }
+    });
+}
+
+#[test]
+fn after_an_unsubscription_nothing_that_was_held_back_comes() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        publisher.advertise("/t").await;
+        subscriber
+            .send(json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1000}))
+            .await;
+        subscriber.receive().await;
+        publisher.publish("/t", 0).await;
+        publisher.publish("/t", 1).await;
+        assert_eq!(subscriber.receive().await["msg"]["n"], 0);
+        subscriber
+            .send(json!({"op": "unsubscribe", "topic": "/t"}))
+            .await;
+        assert!(subscriber.hears_nothing_for(Duration::from_secs(9)).await);
+    });
+}
+
+#[test]
+fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
+    run(async {
+        let (gateway, _, calls) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        client
+            .send(json!({"op": "subscribe", "topic": "/joint_states", "throttle_rate": 1000}))
+            .await;
+        client.receive().await;
+        let publish = |n: u64| Publish {
+            topic: Topic::JointStates,
+            frame: messages::publish("/joint_states", &json!({"n": n})),
+            msg: None,
+        };
+        for n in 0..2 {
+            gateway.registry.do_send(publish(n));
+        }
+        assert_eq!(client.receive().await["msg"]["n"], 0);
+        client.call(PARAMS, 7).await;
+        settle().await;
+        calls.answer();
+        assert_eq!(client.receive().await["id"], 7);
+        gateway.registry.do_send(publish(2));
+        assert_eq!(
+            client.receive().await["msg"]["n"],
+            2,
+            "1 is from before the response"
+        );
+    });
+}
+
+#[test]
+fn a_client_that_takes_nothing_while_responses_wait_is_disconnected_after_twenty_seconds() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(64);
+        client.call("/none", 1).await;
+        settle().await;
+        sleep(STALL_LIMIT - Duration::from_secs(1)).await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        sleep(Duration::from_secs(2)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+        assert_eq!(STALL_LIMIT, Duration::from_secs(20));
+    });
+}
+
+#[test]
+fn every_byte_that_it_takes_gives_a_client_twenty_seconds_more() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(16);
+        client.call("/none", 1).await;
+        for _ in 0..5 {
+            sleep(STALL_LIMIT - Duration::from_secs(1)).await;
+            assert_eq!(gateway.gauges.connections(), 1);
+            client.take(1).await;
+        }
+        sleep(STALL_LIMIT + Duration::from_secs(1)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+#[test]
+fn a_client_that_takes_no_topic_message_is_never_disconnected() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut client) = (gateway.connect(WIDE), gateway.connect(64));
+        client.subscribe("/t").await;
+        publisher.advertise("/t").await;
+        for n in 0..1000 {
+            publisher.publish("/t", n).await;
+            sleep(Duration::from_secs(1)).await;
+        }
+        assert_eq!(gateway.gauges.connections(), 2);
+        assert_eq!(client.receive().await["msg"]["n"], 0);
+    });
+}
+
+#[test]
+fn the_twenty_seconds_begin_with_the_response_not_with_the_messages_before_it() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut client) = (gateway.connect(WIDE), gateway.connect(128));
+        client.subscribe("/t").await;
+        publisher.advertise("/t").await;
+        for n in 0..10 {
+            publisher.publish("/t", n).await;
+        }
+        sleep(Duration::from_secs(60)).await;
+        client.call("/none", 1).await;
+        sleep(STALL_LIMIT - Duration::from_secs(1)).await;
+        assert_eq!(gateway.gauges.connections(), 2);
+        sleep(Duration::from_secs(2)).await;
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+#[test]
+fn responses_and_messages_leave_in_the_order_in_which_they_were_produced() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        client.subscribe("/t").await;
+        client.advertise("/t").await;
+        for n in 0..50 {
+            client.publish("/t", n).await;
+            client.call("/none", n).await;
+            client.send_text("garbage\n").await;
+        }
+        for n in 0..50 {
+            assert_eq!(client.receive().await["msg"]["n"], n);
+            assert_eq!(client.receive().await["id"], n);
+            assert_eq!(client.receive().await["level"], "error");
+        }
+    });
+}
+
+#[test]
+fn the_next_frame_is_taken_only_when_the_last_call_has_ended() {
+    run(async {
+        let (gateway, _, calls) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        client.call(PARAMS, 1).await;
+        client.call(PARAMS, 2).await;
+        client.call("/none", 3).await;
+        settle().await;
+        assert_eq!(calls.count(), 1);
+        let mut reply = calls.take();
+        reply.succeed(&json!({}));
+        assert_eq!(id(&client.receive().await), 1);
+        assert!(client.hears_nothing_for(Duration::from_secs(60)).await);
+        assert_eq!(
+            calls.count(),
+            0,
+            "answered, but not ended: its effects may follow"
+        );
+        drop(reply);
+        settle().await;
+        calls.answer();
+        assert_eq!(id(&client.receive().await), 2);
+        assert_eq!(id(&client.receive().await), 3);
+    });
+}
+
+#[test]
+fn a_call_that_its_node_drops_is_answered_all_the_same() {
+    run(async {
+        let (gateway, computations, calls) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        for (service, held) in [(PARAMS, &calls), (STEP, &computations)] {
+            client.call(service, 1).await;
+            settle().await;
+            drop(held.take());
+            let response = client.receive().await;
+            assert_eq!(response["result"], false, "{response}");
+            assert_eq!(response["id"], 1);
+            assert_ne!(response["status"], "");
+        }
+    });
+}
+
+#[test]
+fn one_computation_runs_sixteen_wait_and_then_nothing_more_is_read() {
+    run(async {
+        let (gateway, computations, calls) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        // One runs, and one place in the queue is left: another call is still taken.
+        for n in 0..16 {
+            client.call(STEP, n).await;
+        }
+        client.call(PARAMS, 100).await;
+        settle().await;
+        assert_eq!((computations.count(), calls.count()), (1, 1));
+        calls.answer();
+        assert_eq!(id(&client.receive().await), 100);
+        // The queue is full: the call behind it waits in the pipe.
+        client.call(STEP, 16).await;
+        client.call(PARAMS, 101).await;
+        sleep(Duration::from_secs(60)).await;
+        assert_eq!((computations.count(), calls.count()), (1, 0));
+        computations.answer();
+        assert_eq!(id(&client.receive().await), 0);
+        settle().await;
+        assert_eq!((computations.count(), calls.count()), (1, 1));
+        calls.answer();
+        assert_eq!(id(&client.receive().await), 101);
+        for n in 1..17 {
+            computations.answer();
+            assert_eq!(id(&client.receive().await), n);
+            settle().await;
+        }
+        assert_eq!(MAX_COMPUTATIONS_WAITING, 16);
+    });
+}
+
+#[test]
+fn computations_of_one_connection_hold_up_no_other() {
+    run(async {
+        let (gateway, computations, calls) = held_back().await;
+        let (mut heavy, mut other) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        for n in 0..40 {
+            heavy.call(STEP, n).await;
+        }
+        other.call(STEP, 7).await;
+        other.call(PARAMS, 8).await;
+        settle().await;
+        assert_eq!(
+            (computations.count(), calls.count()),
+            (2, 1),
+            "one of each connection runs"
+        );
+    });
+}
+
+#[test]
+fn while_more_than_32_mebibytes_wait_no_computation_starts_and_nothing_is_read() {
+    run(async {
+        let (gateway, computations, calls) = held_back().await;
+        let mut client = gateway.connect(1024);
+        for n in 0..2 {
+            client.call(STEP, n).await;
+        }
+        client.call(PARAMS, 2).await;
+        settle().await;
+        calls.take().refuse("");
+        let blob = "x".repeat(MAX_RESPONSES_WAITING + 4096);
+        let mut reply = computations.take();
+        reply.succeed(&blob);
+        drop(reply);
+        settle().await;
+        client.call(PARAMS, 3).await;
+        sleep(Duration::from_secs(15)).await;
+        assert_eq!(
+            computations.count(),
+            0,
+            "the next computation waits for room"
+        );
+        assert_eq!(calls.count(), 0, "the next frame too");
+        // A little is taken: now what waits is less than 32 MiB.
+        client.take(8192).await;
+        settle().await;
+        assert_eq!((computations.count(), calls.count()), (1, 1));
+    });
+}
+
+#[test]
+fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
+    run(async {
+        let (gateway, computations, _) = held_back().await;
+        let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        for n in 0..3 {
+            client.call(STEP, n).await;
+        }
+        client
+            .send(json!({"op": "call_service", "service": "/s", "id": 3, "timeout": 25}))
+            .await;
+        client.half_close().await;
+        provider.receive().await;
+        sleep(Duration::from_secs(60)).await;
+        for n in 0..3 {
+            computations.answer();
+            settle().await;
+            assert_eq!(computations.count(), usize::from(n < 2));
+        }
+        let ids: Vec<u64> = client.rest().await.iter().map(id).collect();
+        assert_eq!(ids, [3, 0, 1, 2], "the call timed out long before");
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+#[test]
+fn a_half_closed_client_is_not_kept_for_ever_by_a_call() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        client
+            .send(json!({"op": "call_service", "service": "/s", "id": 3, "timeout": 80000}))
+            .await;
+        client.half_close().await;
+        settle().await;
+        let began = Instant::now();
+        client.rest().await;
+        assert!(began.elapsed() <= CALLS_OWED, "{:?}", began.elapsed());
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+#[test]
+fn a_half_closed_client_that_reads_nothing_is_let_go() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        // Responses wait: twenty seconds, as ever.
+        let mut client = gateway.connect(64);
+        client.call("/none", 1).await;
+        client.half_close().await;
+        sleep(STALL_LIMIT - Duration::from_secs(1)).await;
+        let kept = client.rest().await;
+        assert_eq!(kept.len(), 1, "what is read in time arrives whole");
+
+        // Topic messages only: they are not owed for so long. The registry has let go of it at once.
+        let (mut publisher, mut client) = (gateway.connect(WIDE), gateway.connect(64));
+        client.subscribe("/t").await;
+        publisher.advertise("/t").await;
+        for n in 0..9 {
+            publisher.publish("/t", n).await;
+        }
+        settle().await;
+        client.half_close().await;
+        sleep(LINGER + Duration::from_secs(1)).await;
+        client.take(64).await;
+        assert!(
+            !client.hears_nothing_for(Duration::from_secs(1)).await,
+            "the stream has ended"
+        );
+    });
+}
+
+#[test]
+fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_stream_ends() {
+    run(async {
+        let (gateway, computations, _) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        for n in 0..17 {
+            client.call(STEP, n).await;
+        }
+        settle().await;
+        gateway
+            .registry
+            .send(RefuseCalls("shutting down"))
+            .await
+            .unwrap();
+        // The end overtakes the answer to the one that runs, as it does when a worker is slow.
+        gateway.registry.send(FinishAll).await.unwrap();
+        settle().await;
+        computations.take().refuse("shutting down");
+        let frames = client.rest().await;
+        assert_eq!(
+            frames.iter().map(id).collect::<Vec<_>>(),
+            (0..17).collect::<Vec<_>>()
+        );
+        assert!(
+            frames
+                .iter()
+                .all(|frame| frame["status"] == "shutting down")
+        );
+    });
+}
+
+#[test]
+fn at_the_end_of_the_runtime_forwarded_calls_are_refused_and_streams_end() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        client.call("/s", 1).await;
+        provider.receive().await;
+        gateway
+            .registry
+            .send(RefuseCalls("shutting down"))
+            .await
+            .unwrap();
+        client.call("/s", 2).await;
+        settle().await;
+        gateway.registry.send(FinishAll).await.unwrap();
+        let frames = client.rest().await;
+        assert_eq!(frames.iter().map(id).collect::<Vec<_>>(), [1, 2]);
+        assert!(
+            frames
+                .iter()
+                .all(|frame| frame["status"] == "shutting down")
+        );
+        let mut late = gateway.connect(WIDE);
+        let frames = late.rest().await;
+        assert_eq!(frames.len(), 1);
+        assert_eq!(frames[0]["msg"], "shutting down");
+        provider.rest().await;
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+#[test]
+fn a_foreign_client_gets_its_line_and_the_end_at_once() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        let began = Instant::now();
+        client
+            .send_text("POST / HTTP/1.1\r\n\r\n{\"op\":\"nonsense\"}\n")
+            .await;
+        assert_eq!(client.rest().await.len(), 1);
+        assert_elapsed(began, Duration::ZERO);
+        sleep(Duration::from_secs(2)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
