@@ -2,17 +2,32 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod virtual_time;
 
+use std::cell::RefCell;
+use std::io::IoSlice;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::task::{Context, Poll};
 use std::time::Duration;
 
 use pendularm::actors::connection::{
-    CALLS_OWED, LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
+    ANSWERS_OWED, Connection, LINGER, MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
 };
 use pendularm::actors::registry::{FinishAll, Nodes, Publish, RefuseCalls};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::messages;
 use serde_json::{Value, json};
+use tokio::io::{AsyncRead, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
 use tokio::time::{Instant, sleep};
 use virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
 
@@ -137,6 +152,7 @@ fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
         settle().await;
         calls.answer();
         assert_eq!(client.receive().await["id"], 7);
+        assert!(client.hears_nothing_for(Duration::from_secs(5)).await);
         gateway.registry.do_send(publish(2));
         assert_eq!(
             client.receive().await["msg"]["n"],
@@ -369,30 +385,31 @@ fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
         for n in 0..3 {
             client.call(STEP, n).await;
         }
-        client
-            .send(json!({"op": "call_service", "service": "/s", "id": 3, "timeout": 25}))
-            .await;
+        client.call("/s", 3).await;
         client.half_close().await;
         provider.receive().await;
-        sleep(Duration::from_secs(60)).await;
+        sleep(Duration::from_secs(11)).await;
         for n in 0..3 {
             computations.answer();
-            settle().await;
+            sleep(Duration::from_secs(1)).await;
             assert_eq!(computations.count(), usize::from(n < 2));
         }
         let ids: Vec<u64> = client.rest().await.iter().map(id).collect();
-        assert_eq!(ids, [3, 0, 1, 2], "the call timed out long before");
+        assert_eq!(ids, [3, 0, 1, 2], "the call timed out before that");
         settle().await;
         assert_eq!(gateway.gauges.connections(), 1);
     });
 }
 
+/// Whether it has only stopped sending or is gone altogether can't be told until something is sent to it.
 #[test]
-fn a_half_closed_client_is_not_kept_for_ever_by_a_call() {
+fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
     run(async {
-        let gateway = Gateway::bare().await;
+        let (gateway, computations, _) = held_back().await;
         let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
+        client.call(STEP, 1).await;
+        client.call(STEP, 2).await;
         client
             .send(json!({"op": "call_service", "service": "/s", "id": 3, "timeout": 80000}))
             .await;
@@ -400,9 +417,11 @@ fn a_half_closed_client_is_not_kept_for_ever_by_a_call() {
         settle().await;
         let began = Instant::now();
         client.rest().await;
-        assert!(began.elapsed() <= CALLS_OWED, "{:?}", began.elapsed());
+        assert!(began.elapsed() <= ANSWERS_OWED, "{:?}", began.elapsed());
         settle().await;
         assert_eq!(gateway.gauges.connections(), 1);
+        assert!(computations.take().caller_is_gone(), "it need not go on");
+        assert_eq!(computations.count(), 0, "the next one is not begun");
     });
 }
 
@@ -513,5 +532,82 @@ fn a_foreign_client_gets_its_line_and_the_end_at_once() {
         assert_elapsed(began, Duration::ZERO);
         sleep(Duration::from_secs(2)).await;
         assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+/// A stream that notes every write as a frame count, and takes all of it.
+struct Noting {
+    input: DuplexStream,
+    writes: Rc<RefCell<Vec<usize>>>,
+}
+
+impl AsyncRead for Noting {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.input).poll_read(context, buffer)
+    }
+}
+
+impl AsyncWrite for Noting {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        context: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<std::io::Result<usize>> {
+        self.poll_write_vectored(context, &[IoSlice::new(bytes)])
+    }
+
+    fn poll_write_vectored(
+        self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<std::io::Result<usize>> {
+        let bytes: Vec<u8> = slices.iter().flat_map(|slice| slice.to_vec()).collect();
+        let frames = bytes.iter().filter(|&&byte| byte == b'\n').count();
+        self.writes.borrow_mut().push(frames);
+        Poll::Ready(Ok(bytes.len()))
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<std::io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+}
+
+#[test]
+fn several_frames_leave_in_one_write_but_not_to_a_client_that_ends_no_line() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        for (end, expected) in [("\n", vec![1, 5]), ("", vec![1, 1, 1, 1, 1, 1])] {
+            let writes = Rc::default();
+            let (mut client, input) = tokio::io::duplex(WIDE);
+            let stream = Noting {
+                input,
+                writes: Rc::clone(&writes),
+            };
+            Connection::start_on(
+                stream,
+                gateway.registry.clone(),
+                Arc::clone(&gateway.gauges),
+            );
+            let subscribe = format!("{{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}}{end}");
+            client.write_all(subscribe.as_bytes()).await.unwrap();
+            settle().await;
+            for n in 0..5 {
+                gateway.registry.do_send(Publish {
+                    topic: Topic::JointStates,
+                    frame: messages::publish("/joint_states", &json!({"n": n})),
+                    msg: None,
+                });
+            }
+            settle().await;
+            assert_eq!(*writes.borrow(), expected);
+        }
     });
 }

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** who has been accepted stays connected when the listening ends; who comes later is not accepted.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use std::sync::Arc;
 
 use actix::prelude::*;

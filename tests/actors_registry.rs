@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** nodes are closures that note what they are told; nothing else stands in for the runtime.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod virtual_time;
 
 use std::cell::RefCell;

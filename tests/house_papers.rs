@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** each check reads both sides, so that neither can change alone.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

@@ -1,5 +1,7 @@
 //! A goal's entry and dwell at every physics step, and the cadence of its feedback, in simulation time alone.
 
+#![allow(clippy::float_cmp, reason = "exact values are meant")]
+
 use glam::{DVec2, dvec2};
 use pendularm::math::goal::{Cadence, Criteria, EPSILON, Goal, Outcome, SUCCESS_HOLD};
 use proptest::prelude::*;
@@ -60,7 +62,13 @@ fn one_step_outside_starts_the_dwell_over() {
     let path = |k| if k == 6 { AWAY } else { THERE };
     assert_eq!(reached_at(&mut goal(0.625), H, 100, path), Some(12));
     // And so as often as it leaves.
-    let path = |k: u32| if k % 5 == 0 && k < 50 { AWAY } else { THERE };
+    let path = |k: u32| {
+        if k.is_multiple_of(5) && k < 50 {
+            AWAY
+        } else {
+            THERE
+        }
+    };
     assert_eq!(reached_at(&mut goal(0.5), H, 100, path), Some(50));
 }
 

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** the tests of the values hand arguments and variables in; only the last few start the program itself.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use std::ffi::OsString;
 use std::process::{Command, Output, Stdio};
 

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** names are spelled here as the contract spells them, not taken from the catalog.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 use std::collections::HashSet;
 
 use pendularm::protocol::catalog::{Direction, Field, Node, Service, Topic};

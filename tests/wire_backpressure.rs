@@ -3,6 +3,14 @@
 //! **Invariant:** nothing here is told by a clock: the fast client goes in lockstep, the slow one is shown by counts and
 //! by the program's peak memory.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::io::Write;
@@ -236,4 +244,22 @@ fn ids_of_four_mebibytes_are_echoed_again_and_again() {
         }
     }
     assert!(peak_memory(&runtime) < BASE + 32 * MIB);
+}
+
+/// A message of a few bytes must not cost a subscriber that never reads many times its size.
+#[test]
+fn an_outbox_full_of_the_smallest_messages_is_bounded_too() {
+    let runtime = Runtime::start();
+    let mut deaf = runtime.connect();
+    deaf.subscribe("/t");
+    let mut client = runtime.connect();
+    client.send(&json!({"op": "advertise", "topic": "/t"}));
+    // 12 MB: three times what the outbox holds.
+    let frames = "{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{}}\n".repeat(10_000);
+    for _ in 0..30 {
+        client.send_bytes(frames.as_bytes());
+        client.settle();
+    }
+    let peak = peak_memory(&runtime);
+    assert!(peak < BASE, "{peak} bytes");
 }

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** a client that has only stopped sending gets every answer that it is owed.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::net::Shutdown;

@@ -2,6 +2,18 @@
 //!
 //! **Invariant:** a call is answered once, by its provider or with the reason why not, and under its caller's own id.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+#![allow(
+    clippy::needless_pass_by_value,
+    reason = "`json!` literals are handed over as they are written"
+)]
+
 mod common;
 
 use std::time::{Duration, Instant};

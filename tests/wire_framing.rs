@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** whatever is sent, the connection works afterwards, and nothing inside a malformed frame is executed.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::net::Shutdown;

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** the ids are compared as text: a parser would hide what a number lost.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use common::Runtime;

@@ -3,6 +3,14 @@
 //! **Invariant:** what is over a limit is refused by name; what was registered before stays, and what is withdrawn makes
 //! room again.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use common::{Client, Runtime};

@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** the client's lines are taken from the README as they stand there; only the port is another.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::fs;

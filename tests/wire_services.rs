@@ -2,6 +2,14 @@
 //!
 //! **Invariant:** exactly one `service_response` for every call, whatever is wrong with it.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use common::Runtime;

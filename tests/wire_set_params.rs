@@ -1,5 +1,17 @@
 //! `/arm_sim/set_params` from outside.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a test that panics has failed; what is compared or cast exactly is exact"
+)]
+
 #[path = "common/arm.rs"]
 mod arm;
 mod common;
@@ -210,5 +222,25 @@ fn extreme_parameters_leave_the_runtime_answering_in_valid_json() {
         let fallen = state_where(&mut client, "a falling arm", |state| stamp(state) > 0.3);
         assert!(numbers(&fallen["position"])[0] < -0.05, "{fallen}");
         state(&mut client);
+    }
+}
+
+#[test]
+fn arguments_that_are_no_object_are_refused_by_name_and_the_values_echoed() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for bad in [
+        json!(5),
+        json!("x"),
+        json!(true),
+        json!([1.0, [1.0, 1.0], [1.0, 1.0], 4]),
+    ] {
+        let response = client.call("/arm_sim/set_params", bad.clone());
+        assert_eq!(response["result"], false, "{bad}");
+        assert!(
+            response["status"].as_str().unwrap().starts_with("args "),
+            "{response}"
+        );
+        assert_eq!(response["values"]["lengths"], json!([1.0, 1.0]), "{bad}");
     }
 }

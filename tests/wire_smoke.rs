@@ -1,5 +1,13 @@
 //! The program as a newcomer meets it: it starts, moves, and ends.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use common::Runtime;

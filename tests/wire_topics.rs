@@ -3,6 +3,14 @@
 //! **Invariant:** whether a message comes is told without waiting: after its sender has been answered, and then its
 //! receiver, nothing is still on its way.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
 mod common;
 
 use std::time::{Duration, Instant};

@@ -48,8 +48,9 @@ pub const STALL_LIMIT: Duration = Duration::from_secs(20);
 /// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
 /// end of the stream itself may take.
 pub const LINGER: Duration = Duration::from_secs(5);
-/// How long a client that has stopped sending is owed the answers of other clients: longer than these usually have.
-pub const CALLS_OWED: Duration = Duration::from_secs(30);
+/// How long a client that has stopped sending is owed the answers that are not ready yet: longer than other clients
+/// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
+pub const ANSWERS_OWED: Duration = Duration::from_secs(15);
 
 /// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
 const ARM_STATE: [&str; 3] = [

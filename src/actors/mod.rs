@@ -12,11 +12,18 @@
 //! | message | from | to | meaning |
 //! | --- | --- | --- | --- |
 //! | [`registry::Connect`] / [`registry::Disconnect`] | connection | registry | a client is there, is gone |
+//! | [`registry::Retire`] | connection | registry | the client has stopped sending: its registrations go, its answers still come |
 //! | [`registry::Request`] | connection | registry | one rosbridge op of that client |
 //! | [`node::ServiceCall`] | registry | the node that serves it | answered exactly once, through its [`node::Reply`] |
 //! | [`node::TopicMessage`] | registry | the node that subscribes | a message on a topic the runtime listens to |
 //! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: no encoding without |
 //! | [`registry::Publish`] / [`registry::Respond`] | nodes | registry | a topic message; an answer |
+//! | [`arm_sim::ArmPose`] | ik, `ik_trial` | `arm_sim` | lengths, positions and time, asked for every time |
+//! | [`ik::Solve`] | `ik_action` | ik | joint positions for a target |
+//! | [`arm_sim::TrackGoal`] / [`arm_sim::EndGoal`] | `ik_action` | `arm_sim` | a goal to be judged at every step; its end |
+//! | [`arm_sim::GoalJudged`] | `arm_sim` | `ik_action` | progress of a goal, or how it ended |
+//! | [`ik_action::SendGoal`] / [`ik_action::CancelGoal`] | `ik_trial` | `ik_action` | what clients ask by services |
+//! | [`ik_action::GoalNews`] | `ik_action` | `ik_trial` | what clients hear by topics |
 //! | [`connection::Deliver`] / [`connection::Answer`] / [`connection::Finish`] | registry | connection | bytes to send; the end |
 //!
 //! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
@@ -25,6 +32,9 @@
 pub mod arm_sim;
 pub mod connection;
 pub mod gauges;
+pub mod ik;
+pub mod ik_action;
+pub mod ik_trial;
 pub mod integration;
 pub mod listener;
 pub mod node;

@@ -19,6 +19,9 @@ use tokio::time::{Instant, sleep};
 use super::arm_sim::ArmSim;
 use super::connection::gate::Gate;
 use super::gauges::Gauges;
+use super::ik::Ik;
+use super::ik_action::{GoalTracker, IkAction};
+use super::ik_trial::{GoalClient, IkTrial};
 use super::integration::Integration;
 use super::listener::{Listener, StopListening};
 use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
@@ -79,9 +82,12 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     let arm_thread =
         Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
     let mut nodes = Nodes::default();
+    let rng = options
+        .seed
+        .map_or_else(fastrand::Rng::new, fastrand::Rng::with_seed);
     match options.links {
-        Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, &mut nodes),
-        Links::Three => start_nodes::<3>(&registry, &gauges, &arm_thread, &mut nodes),
+        Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, rng, &mut nodes),
+        Links::Three => start_nodes::<3>(&registry, &gauges, &arm_thread, rng, &mut nodes),
     }
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
@@ -138,6 +144,7 @@ fn start_nodes<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     arm_thread: &Arbiter,
+    rng: fastrand::Rng,
     nodes: &mut Nodes,
 ) where
     Gains<N>: Default,
@@ -148,6 +155,23 @@ fn start_nodes<const N: usize>(
         ArmSim::new(Arm::default(), Gains::default(), publish, respond, gauges)
     });
     ArmSim::attach(&arm, nodes);
+
+    let publish = registry.clone().recipient();
+    let ik = Ik::<N>::new(arm.clone().recipient()).start();
+    Ik::attach(&ik, nodes);
+    let tracker = GoalTracker {
+        track: arm.clone().recipient(),
+        end: arm.clone().recipient(),
+    };
+    let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        settle: action.recipient(),
+    };
+    let trial = IkTrial::<N>::new(arm.recipient(), goals, publish, rng).start();
+    IkTrial::attach(&trial, nodes);
 }
 
 /// The address asked for; for the default one also its IPv6 twin, where that is to be had.

@@ -3,6 +3,9 @@
 //! A computation is advanced for one slice and goes to the back of the queue. A connection has at most one computation
 //! here at a time (the rest wait in the connection), so the turns go round the connections.
 //!
+//! A long computation comes to hold a hundred megabytes of results. So one that has had [`SHORT_SLICES`] turns is long,
+//! and only [`MAX_LONG`] long ones take turns; the others wait, and still hold little. Short ones never wait for long ones.
+//!
 //! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
 
 use std::collections::VecDeque;
@@ -14,6 +17,11 @@ use std::time::{Duration, Instant};
 /// How long one computation may keep a worker before the next one has its turn: short beside the 5 ms that a client
 /// may be delayed, long beside the cost of changing over.
 pub const SLICE: Duration = Duration::from_millis(1);
+
+/// Turns after which a computation is long: enough for some ten thousand steps, so for nearly all that is asked.
+pub const SHORT_SLICES: u32 = 16;
+/// Long computations that take turns with one another: what they hold together stays below half a gigabyte.
+pub const MAX_LONG: usize = 4;
 
 /// Whether a computation wants another turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,9 +54,55 @@ struct Shared {
 
 #[derive(Default)]
 struct Queue {
-    waiting: VecDeque<Box<dyn Computation>>,
+    /// Whose turn comes next.
+    turns: VecDeque<Job>,
+    /// Long computations for which there is no place among the turns yet.
+    parked: VecDeque<Job>,
+    /// Long computations among the turns, those that run included.
+    long: usize,
     running: usize,
     closed: Option<&'static str>,
+}
+
+/// A computation and how often it has had its turn.
+struct Job {
+    computation: Box<dyn Computation>,
+    slices: u32,
+}
+
+impl Job {
+    fn is_long(&self) -> bool {
+        self.slices >= SHORT_SLICES
+    }
+}
+
+impl Queue {
+    /// Puts a computation back that has just had its turn.
+    fn put_back(&mut self, job: Job) {
+        // It becomes long once.
+        if job.slices == SHORT_SLICES {
+            if self.long == MAX_LONG {
+                self.parked.push_back(job);
+                return;
+            }
+            self.long += 1;
+        }
+        self.turns.push_back(job);
+    }
+
+    /// A computation has ended: if it was a long one, the next has its place. True if there is one.
+    fn end(&mut self, was_long: bool) -> bool {
+        if !was_long {
+            return false;
+        }
+        let next = self.parked.pop_front();
+        let found = next.is_some();
+        match next {
+            Some(next) => self.turns.push_back(next),
+            None => self.long -= 1,
+        }
+        found
+    }
 }
 
 impl WorkerPool {
@@ -81,7 +135,11 @@ impl WorkerPool {
         let closed = {
             let mut queue = self.shared.lock();
             if queue.closed.is_none() {
-                queue.waiting.push_back(computation);
+                let slices = 0;
+                queue.turns.push_back(Job {
+                    computation,
+                    slices,
+                });
                 self.shared.changed.notify_one();
                 return;
             }
@@ -95,11 +153,13 @@ impl WorkerPool {
         let waiting = {
             let mut queue = self.shared.lock();
             queue.closed = Some(why);
-            std::mem::take(&mut queue.waiting)
+            let mut waiting = std::mem::take(&mut queue.turns);
+            waiting.append(&mut queue.parked);
+            waiting
         };
         self.shared.changed.notify_all();
-        for mut computation in waiting {
-            computation.refuse(why);
+        for mut job in waiting {
+            job.computation.refuse(why);
         }
     }
 
@@ -107,7 +167,7 @@ impl WorkerPool {
     #[must_use]
     pub fn is_idle(&self) -> bool {
         let queue = self.shared.lock();
-        queue.running == 0 && queue.waiting.is_empty()
+        queue.running == 0 && queue.turns.is_empty() && queue.parked.is_empty()
     }
 }
 
@@ -118,22 +178,22 @@ impl Shared {
     }
 
     fn work(&self) {
-        while let Some(mut computation) = self.take() {
-            let slice = AssertUnwindSafe(|| computation.advance(Instant::now() + SLICE));
+        while let Some(mut job) = self.take() {
+            let slice = AssertUnwindSafe(|| job.computation.advance(Instant::now() + SLICE));
             let progress = catch_unwind(slice).unwrap_or_else(|_| {
                 tracing::error!("a computation panicked; its caller is told that it ended");
                 Progress::Finished
             });
-            self.put_back(computation, progress);
+            self.put_back(job, progress);
         }
     }
 
-    fn take(&self) -> Option<Box<dyn Computation>> {
+    fn take(&self) -> Option<Job> {
         let mut queue = self.lock();
         loop {
-            if let Some(computation) = queue.waiting.pop_front() {
+            if let Some(job) = queue.turns.pop_front() {
                 queue.running += 1;
-                return Some(computation);
+                return Some(job);
             }
             if queue.closed.is_some() {
                 return None;
@@ -145,22 +205,28 @@ impl Shared {
         }
     }
 
-    fn put_back(&self, mut computation: Box<dyn Computation>, progress: Progress) {
+    fn put_back(&self, mut job: Job, progress: Progress) {
+        let was_long = job.is_long();
         let closed = {
             let mut queue = self.lock();
             if progress == Progress::Unfinished && queue.closed.is_none() {
                 queue.running -= 1;
-                queue.waiting.push_back(computation);
+                job.slices = job.slices.saturating_add(1);
+                queue.put_back(job);
                 return;
             }
             queue.closed
         };
         // Dropped outside the lock: the end of a computation may free many megabytes.
         if progress == Progress::Unfinished {
-            computation.refuse(closed.unwrap_or_default());
+            job.computation.refuse(closed.unwrap_or_default());
         }
-        drop(computation);
-        self.lock().running -= 1;
+        drop(job);
+        let mut queue = self.lock();
+        queue.running -= 1;
+        if queue.end(was_long) {
+            self.changed.notify_one();
+        }
     }
 }
 
@@ -211,12 +277,54 @@ mod tests {
         {
             // Both wait before the worker takes the first: the lock is held meanwhile.
             let mut queue = pool.shared.lock();
-            queue.waiting.push_back(computation("a", 3, &log));
-            queue.waiting.push_back(computation("b", 2, &log));
+            for (name, slices) in [("a", 3), ("b", 2)] {
+                queue.turns.push_back(Job {
+                    computation: computation(name, slices, &log),
+                    slices: 0,
+                });
+            }
         }
         pool.shared.changed.notify_all();
         let order: Vec<String> = seen.iter().take(5).collect();
         assert_eq!(order, ["a", "b", "a", "b", "a"]);
+    }
+
+    /// The last of the long ones has its first turns with the others and then waits until one of them has ended.
+    #[test]
+    fn few_long_computations_take_turns_and_short_ones_wait_for_none() {
+        const NAMES: [&str; MAX_LONG + 1] = ["a", "b", "c", "d", "parked"];
+        let long = 3 * SHORT_SLICES as usize;
+        let (log, seen) = mpsc::channel();
+        let pool = WorkerPool::start(1).unwrap();
+        {
+            let mut queue = pool.shared.lock();
+            for name in NAMES {
+                queue.turns.push_back(Job {
+                    computation: computation(name, long, &log),
+                    slices: 0,
+                });
+            }
+        }
+        pool.submit(computation("short", 2, &log));
+        let order: Vec<String> = seen.iter().take(NAMES.len() * long + 2).collect();
+        let turns_of = |name: &str| -> Vec<usize> {
+            let turns = order.iter().enumerate().filter(|(_, turn)| *turn == name);
+            turns.map(|(at, _)| at).collect()
+        };
+        assert_eq!(turns_of("short").len(), 2);
+        assert!(turns_of("short")[1] <= 2 * (NAMES.len() + 1), "{order:?}");
+        let parked = turns_of("parked");
+        assert_eq!(parked.len(), long);
+        let first_end = NAMES[..MAX_LONG]
+            .iter()
+            .map(|name| turns_of(name)[long - 1])
+            .min();
+        let resumed = parked[SHORT_SLICES as usize];
+        assert!(first_end.unwrap() < resumed, "{order:?}");
+        while !pool.is_idle() {
+            thread::yield_now();
+        }
+        assert_eq!(pool.shared.lock().long, 0);
     }
 
     #[test]

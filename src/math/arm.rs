@@ -8,26 +8,28 @@
 
 use thiserror::Error;
 
-/// Parameters of an arm with `N` links, with the constants that the dynamics derive from them.
+/// Parameters of an arm with `N` links, and the constants that the dynamics derive from them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Arm<const N: usize> {
     lengths: [f64; N],
     masses: [f64; N],
     gravity: f64,
-    pub(super) derived: Derived<N>,
+    pub(super) rods: [Rod; N],
 }
 
-/// What the dynamics need of the parameters, per link.
+/// What the dynamics need to know of one link.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Derived<const N: usize> {
-    /// Mass of the links beyond this one \[kg\].
-    pub(super) beyond: [f64; N],
-    /// Mass of this link in units of the previous link's mass; 0 for the first, which has none.
-    pub(super) mass_ratio: [f64; N],
+pub(super) struct Rod {
+    /// Length \[m\].
+    pub(super) length: f64,
+    /// Mass of all links beyond this one \[kg\].
+    pub(super) beyond: f64,
+    /// Mass in units of the previous link's; 0 for the first link, which has none before it.
+    pub(super) mass_ratio: f64,
     /// `1 / l` \[1/m\].
-    pub(super) per_length: [f64; N],
-    /// `1 / (m l)` \[1/(kg m)\]: an effort times this is an acceleration at the tip of the link \[m/s²\].
-    pub(super) per_mass_length: [f64; N],
+    pub(super) per_length: f64,
+    /// `1 / (m l)` \[1/(kg m)\]; makes an acceleration of an effort.
+    pub(super) per_mass_length: f64,
 }
 
 /// A parameter that no arm can have.
@@ -85,35 +87,30 @@ impl<const N: usize> Arm<N> {
     }
 
     fn valid(lengths: [f64; N], masses: [f64; N], gravity: f64) -> Self {
-        let mut beyond = [0.0; N];
-        let mut outer = 0.0;
-        for (beyond, mass) in beyond.iter_mut().zip(&masses).rev() {
-            *beyond = outer;
-            outer += mass;
+        let mut rods = lengths.map(|length| Rod {
+            length,
+            beyond: 0.0,
+            mass_ratio: 0.0,
+            per_length: 1.0 / length,
+            per_mass_length: 0.0,
+        });
+        let mut previous = f64::INFINITY;
+        for (rod, mass) in rods.iter_mut().zip(&masses) {
+            rod.mass_ratio = mass / previous;
+            rod.per_mass_length = 1.0 / (mass * rod.length);
+            previous = *mass;
         }
-        let mut mass_ratio = [0.0; N];
-        for (ratio, pair) in mass_ratio.iter_mut().skip(1).zip(masses.windows(2)) {
-            if let [inner, outer] = pair {
-                *ratio = outer / inner;
-            }
+        let mut beyond = 0.0;
+        for (rod, mass) in rods.iter_mut().zip(&masses).rev() {
+            rod.beyond = beyond;
+            beyond += mass;
         }
-        let mut per_mass_length = lengths;
-        for (product, mass) in per_mass_length.iter_mut().zip(&masses) {
-            *product = 1.0 / (*product * mass);
-        }
-        let per_length = lengths.map(f64::recip);
-        let derived = Derived {
-            beyond,
-            mass_ratio,
-            per_length,
-            per_mass_length,
-        };
-        // `-0.0` is at least 0 and would be shown as such.
+        // `-0.0` is not negative, but would be shown as if it were.
         Self {
             lengths,
             masses,
             gravity: gravity.abs(),
-            derived,
+            rods,
         }
     }
 
@@ -195,5 +192,59 @@ impl<const N: usize> State<N> {
             .iter()
             .chain(&self.velocity)
             .all(|value| value.is_finite())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bad_parameter_is_named_with_its_value() {
+        let message = |lengths, masses, gravity| {
+            Arm::<2>::new(lengths, masses, gravity)
+                .unwrap_err()
+                .to_string()
+        };
+        let ok = [1.0; 2];
+        assert_eq!(
+            message(ok, [1.0, -2.0], 9.81),
+            "masses[1] must be greater than 0, got -2"
+        );
+        assert_eq!(
+            message([0.0, 1.0], ok, 9.81),
+            "lengths[0] must be greater than 0, got 0"
+        );
+        assert_eq!(
+            message([1.0, f64::NAN], ok, 9.81),
+            "lengths[1] must be finite, got NaN"
+        );
+        assert_eq!(
+            message(ok, [f64::INFINITY, 1.0], 9.81),
+            "masses[0] must be finite, got inf"
+        );
+        assert_eq!(message(ok, ok, -1.0), "gravity must be at least 0, got -1");
+        assert_eq!(
+            message(ok, ok, f64::NEG_INFINITY),
+            "gravity must be finite, got -inf"
+        );
+    }
+
+    #[test]
+    fn negative_zero_is_no_gravity() {
+        let arm = Arm::new([1.0; 2], [1.0; 2], -0.0).unwrap();
+        assert_eq!(arm.gravity().to_bits(), 0.0_f64.to_bits());
+    }
+
+    #[test]
+    fn the_reach_is_the_length_of_the_stretched_arm() {
+        // Powers of two: the sum is exact.
+        assert!((Arm::new([1.0, 0.5, 0.25], [1.0; 3], 0.0).unwrap().reach() - 1.75).abs() == 0.0);
+    }
+
+    #[test]
+    fn an_arm_starts_stretched_and_at_rest() {
+        let State { position, velocity } = State::<3>::rest();
+        assert_eq!((position, velocity), ([0.0; 3], [0.0; 3]));
     }
 }

@@ -36,15 +36,16 @@ use glam::DVec2;
 #[must_use]
 pub fn mass_matrix<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [[f64; N]; N] {
     let u = directions(q);
-    let mut m = [[0.0; N]; N];
-    for i in (0..N).rev() {
-        for j in (0..N).rev() {
-            // Sum over the links that joints i and j both move, one row and one column at a time.
-            let row: f64 = (j..N).map(|b| coupling(arm, i, b) * u[i].dot(u[b])).sum();
-            m[i][j] = row + if i + 1 < N { m[i + 1][j] } else { 0.0 };
-        }
-    }
-    m
+    // Joint i moves the links a >= i, joint j the links b >= j. Summed for i >= j only, so that M is symmetric to the bit.
+    let entry = |i: usize, j: usize| -> f64 {
+        let row = |a: usize| {
+            (j..N)
+                .map(|b| coupling(arm, a, b) * u[a].dot(u[b]))
+                .sum::<f64>()
+        };
+        (i..N).map(row).sum()
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i.max(j), i.min(j))))
 }
 
 /// Coriolis and centrifugal effort `C(q, q̇) q̇` \[N m\] at joint positions `q` \[rad\] and rates `qd` \[rad/s\].
@@ -123,12 +124,12 @@ pub fn energy<const N: usize>(arm: &Arm<N>, state: &State<N>) -> f64 {
 fn coupling<const N: usize>(arm: &Arm<N>, i: usize, j: usize) -> f64 {
     let outer = i.max(j);
     let own = arm.masses()[outer] / if i == j { 3.0 } else { 2.0 };
-    (own + arm.derived.beyond[outer]) * arm.lengths()[i] * arm.lengths()[j]
+    (own + arm.rods[outer].beyond) * arm.lengths()[i] * arm.lengths()[j]
 }
 
 /// `g γ_i l_i` \[N m\].
 fn weight_moment<const N: usize>(arm: &Arm<N>, i: usize) -> f64 {
-    arm.gravity() * (0.5 * arm.masses()[i] + arm.derived.beyond[i]) * arm.lengths()[i]
+    arm.gravity() * (0.5 * arm.masses()[i] + arm.rods[i].beyond) * arm.lengths()[i]
 }
 
 /// Unit vectors along the links. Rotations are composed joint by joint: the sum of wound joint angles would lose

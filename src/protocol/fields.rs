@@ -143,6 +143,7 @@ impl<'a> Fields<'a> {
             })
         };
         match args {
+            Arguments::Neither(raw) => return Err(not("an object or an array", raw)),
             Arguments::Object(raw) => {
                 let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
                 json::members_into(raw.get(), &names, &mut values)

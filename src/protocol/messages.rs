@@ -194,7 +194,9 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
 /// A message that a client sent, which only passes through; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
-    Line::op("publish")
+    // Exact: slow subscribers' outboxes keep these by the ten thousand, and count their text alone.
+    let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
+    Line::with_room("publish", head + topic.len() + msg.get().len())
         .text("topic", topic)
         .raw("msg", msg)
         .end()
@@ -273,7 +275,11 @@ struct Line {
 
 impl Line {
     fn op(op: &str) -> Self {
-        let mut text = Vec::with_capacity(USUAL_FRAME);
+        Self::with_room(op, USUAL_FRAME)
+    }
+
+    fn with_room(op: &str, bytes: usize) -> Self {
+        let mut text = Vec::with_capacity(bytes);
         text.extend_from_slice(b"{\"op\":\"");
         text.extend_from_slice(op.as_bytes());
         text.push(b'"');
@@ -304,8 +310,11 @@ impl Line {
 
     fn raw(mut self, key: &str, raw: &RawValue) -> Self {
         let strict = json::strict(raw.get());
-        self.text.reserve(strict.len() + USUAL_FRAME / 2);
         self.key(key);
+        // Where the room for it was not asked for at the start, there is to be some for what follows too.
+        if self.text.capacity() - self.text.len() < strict.len() + "}\n".len() {
+            self.text.reserve(strict.len() + USUAL_FRAME / 2);
+        }
         self.text.extend_from_slice(strict.as_bytes());
         self
     }

@@ -5,6 +5,7 @@
 pub mod catalog;
 pub mod fields;
 pub mod frame;
+pub mod goal_messages;
 pub mod json;
 pub mod messages;
 mod nesting;

@@ -143,6 +143,8 @@ pub enum Arguments {
     Object(Box<RawValue>),
     /// Fields in documented order.
     Positional(Box<RawValue>),
+    /// Something else, which whoever takes the call refuses: some services echo their values even then.
+    Neither(Box<RawValue>),
 }
 
 impl Arguments {
@@ -156,7 +158,7 @@ impl Arguments {
     #[must_use]
     pub fn raw(&self) -> &RawValue {
         match self {
-            Self::Object(raw) | Self::Positional(raw) => raw,
+            Self::Object(raw) | Self::Positional(raw) | Self::Neither(raw) => raw,
         }
     }
 }

@@ -5,9 +5,13 @@
 #![allow(
     dead_code,
     unreachable_pub,
-    reason = "a module of several test programs, each of which uses its own part"
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "each test file uses its own part of this, and a helper of a test fails by panicking"
 )]
-
 use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};

@@ -1,7 +1,8 @@
 //! The arm: steps the simulation against wall time, serves `/arm_sim/*` and `/pid_controller/*`, publishes its state.
 //!
 //! The actor only asks the clock and says who hears what. What is due is reckoned by `math::pacer`, what happens in a
-//! step by `math::simulation`, requests are read in [`services`], messages written in [`telemetry`].
+//! step by `math::simulation`, requests are read in [`services`], messages written in [`telemetry`], goals judged in
+//! [`goals`].
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
 //! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up after
@@ -10,6 +11,7 @@
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
 mod by_hand;
+mod goals;
 mod services;
 mod telemetry;
 
@@ -20,6 +22,8 @@ use actix::prelude::*;
 use tokio::time::Instant;
 
 pub use self::by_hand::MAX_STEPS;
+use self::goals::Goals;
+pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::telemetry::Telemetry;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
@@ -45,6 +49,12 @@ const BATCH: u64 = 64;
 /// Names of the joints, base first.
 const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
 
+/// The names of an arm's joints, base first.
+#[must_use]
+pub fn joint_names<const N: usize>() -> [&'static str; N] {
+    std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default())
+}
+
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The node `arm_sim` for an arm of `N` links.
@@ -60,6 +70,7 @@ pub struct ArmSim<const N: usize> {
     respond: Recipient<Respond>,
     telemetry: Telemetry,
     joint_names: [&'static str; N],
+    goals: Goals<N>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -82,7 +93,8 @@ impl<const N: usize> ArmSim<N> {
             epoch: Instant::now(),
             publish,
             respond,
-            joint_names: std::array::from_fn(|i| JOINT_NAMES.get(i).copied().unwrap_or_default()),
+            joint_names: joint_names(),
+            goals: Goals::default(),
         }
     }
 
@@ -134,7 +146,7 @@ impl<const N: usize> Handler<ServiceCall> for ArmSim<N> {
 
     fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
         self.advance_to_now(ctx);
-        self.serve(call);
+        self.serve(call, ctx);
     }
 }
 
@@ -144,6 +156,9 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
     /// A trajectory: its last point is the setpoint, from the next step on.
     fn handle(&mut self, message: TopicMessage, ctx: &mut Context<Self>) {
         self.advance_to_now(ctx);
+        if message.sender.is_none() && !self.is_valid_trajectory() {
+            return;
+        }
         match joint_trajectory(&message.msg, &self.joint_names) {
             Ok(request) => {
                 if let (Ok(position), Ok(velocity)) =
@@ -233,21 +248,14 @@ impl<const N: usize> ArmSim<N> {
         let started = std::time::Instant::now();
         let mut taken = 0;
         while taken < due && started.elapsed() < WAKE_UP_BUDGET {
-            let batch = BATCH.min(due - taken);
-            let advanced = self.advance(batch);
-            taken += advanced;
-            if advanced < batch {
+            taken += self.advance(BATCH.min(due - taken));
+            if self.simulation.divergence().is_some() {
                 break;
             }
         }
         self.telemetry
             .stepped(taken, started.elapsed(), self.simulation.timestep());
         taken
-    }
-
-    /// Takes up to so many steps, whatever they cost, and answers how many: fewer where the simulation diverges.
-    fn advance(&mut self, steps: u64) -> u64 {
-        self.simulation.advance(steps)
     }
 
     /// Tells of a divergence that has just happened.

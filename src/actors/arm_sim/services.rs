@@ -3,10 +3,11 @@
 //!
 //! **Invariant:** a request that changes nothing leaves the arm exactly as it was, down to the fraction of a step.
 
+use actix::prelude::*;
 use serde::Serialize;
 
-use super::ArmSim;
-use crate::actors::node::ServiceCall;
+use super::{ArmSim, GoalJudged};
+use crate::actors::node::{Reply, ServiceCall};
 use crate::math::arm::{Arm, ArmError};
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
@@ -48,7 +49,7 @@ struct GainsOf<'a> {
 
 impl<const N: usize> ArmSim<N> {
     /// Answers one call. The caller's next request waits until this has returned.
-    pub(super) fn serve(&mut self, call: ServiceCall) {
+    pub(super) fn serve(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
         let ServiceCall {
             service,
             arguments,
@@ -83,15 +84,12 @@ impl<const N: usize> ArmSim<N> {
             }
             Service::Reset => {
                 // A reset has no fields: what is rejected here is `args` itself.
-                if fields.accepted() {
-                    self.reset();
-                }
-                let state = self.simulation.state();
-                let pose = Pose {
-                    position: &state.position,
-                    velocity: &state.velocity,
+                let ended = if fields.accepted() {
+                    self.reset()
+                } else {
+                    None
                 };
-                reply.conclude(&pose, &fields.status());
+                self.answer_reset(reply, fields.status(), ended, ctx);
             }
             Service::Step => self.step_by_hand(&mut fields, reply),
             Service::Disturb => self.disturb(&mut fields, reply),
@@ -160,13 +158,41 @@ impl<const N: usize> ArmSim<N> {
         self.paused
     }
 
-    fn reset(&mut self) {
+    /// Gives the goal that ended by it, and who is to hear of that.
+    fn reset(&mut self) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
+        let ended = self.end_goal_for_reset();
         let diverged = self.simulation.divergence().is_some();
         self.simulation.reset();
         self.restart_pacer();
         self.restart_energy_drift();
         if diverged {
             self.publish_diagnostics();
+        }
+        ended
+    }
+
+    /// Answers with the pose after the reset, but not before the goal's owner has published how the goal ended.
+    fn answer_reset(
+        &self,
+        reply: Reply,
+        status: String,
+        ended: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
+        ctx: &mut Context<Self>,
+    ) {
+        let state = *self.simulation.state();
+        let answer = move || {
+            let pose = Pose {
+                position: &state.position,
+                velocity: &state.velocity,
+            };
+            reply.conclude(&pose, &status);
+        };
+        match ended {
+            None => answer(),
+            Some((owner, news)) => {
+                let heard = owner.send(news).into_actor(self);
+                ctx.spawn(heard.map(move |_, _, _| answer()));
+            }
         }
     }
 

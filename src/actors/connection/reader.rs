@@ -13,7 +13,7 @@ use tokio::time::{Instant, timeout, timeout_at};
 
 use super::gate::{HEAD_TIME, MAX_LOCKED};
 use super::transport::{CHUNK, Inbound};
-use super::{CALLS_OWED, Finish, Shared};
+use super::{ANSWERS_OWED, Finish, Shared};
 use crate::actors::ConnectionId;
 use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
@@ -134,13 +134,16 @@ impl Reader {
     /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
     /// answer or withdraw, and waits for the answers that it is owed.
     async fn settle(&self) {
-        let calls = self.registry.send(Retire(self.id)).await;
-        if let Ok(Handled(Some(answered))) = calls {
-            let _ = timeout(CALLS_OWED, answered).await;
-        }
-        // Bounded by what a connection may ask for; should the client be gone, the first answers show it.
-        while self.shared.is_computing() {
-            self.shared.room.notified().await;
+        let answered = async {
+            if let Ok(Handled(Some(calls))) = self.registry.send(Retire(self.id)).await {
+                let _ = calls.await;
+            }
+            while self.shared.is_computing() {
+                self.shared.room.notified().await;
+            }
+        };
+        if timeout(ANSWERS_OWED, answered).await.is_err() {
+            self.shared.abandon_computations();
         }
     }
 

@@ -21,7 +21,7 @@ use crate::actors::connection::Configure;
 use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Direction, Service, Topic};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::{CallService, MAX_NAME, Op, Subscribe};
+use crate::protocol::op::{Arguments, CallService, MAX_NAME, Op, Subscribe};
 
 /// How long a provider may take when its caller does not say.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -296,6 +296,9 @@ impl Registry {
         let Some((provider, client)) = provider else {
             return Err(Refusal::NoProvider(service.to_owned()));
         };
+        if matches!(call.args, Arguments::Neither(_)) {
+            return Err(Refusal::BadArguments);
+        }
         if self.services.waiting_for(origin.from) >= MAX_WAITING_CALLS {
             return Err(Refusal::TooManyWaiting);
         }

@@ -23,6 +23,8 @@ pub(super) enum Refusal {
     NotProvider(String),
     #[error("id: no call of {0} with this id waits for this connection")]
     StaleCall(String),
+    #[error("args must be an object or an array")]
+    BadArguments,
     #[error("no provider for service {0}")]
     NoProvider(String),
     #[error("the provider of {0} is gone")]

@@ -1,4 +1,33 @@
-//! Forward dynamics by a planar articulated-body recursion in sums of positive terms.
+//! Forward dynamics by an articulated-body recursion in which nothing cancels.
+//!
+//! A joint transmits a force and an effort, and the effort is known. So all that link `i` with everything beyond it is to the link
+//! before is a relation between the acceleration `p` of its joint and the force `f` through it: `f = A p + B`, with a symmetric positive
+//! definite 2×2 tensor `A`. One pass from the tip to the base finds every `A` and `B`, one pass back the accelerations.
+//!
+//! In the frame of link `i` (x along it, y across it) and in units of its mass, let its tip carry `A = (a b; b c)` and `B`. With
+//! `u = (τ_i - τ_{i+1}) / (m_i l_i)`, `w = l_i φ̇_i²`, `W = 1 + 3c`, `X = 1 + a + 3c + 3 det A` and `E = det A · A⁻¹ B`, Newton and Euler
+//! give for a uniform rod, whatever its length:
+//!
+//! | | |
+//! | --- | --- |
+//! | acceleration of its tip | `t_x = p_x - w`, `t_y = 3 (u - B_y - b t_x) / W - p_y / 2W` |
+//! | what it is to the link before | `A' = x v vᵀ + d y yᵀ`, `B' = x φ v + ψ y`, along `v = (1, k)` and `y = (0, 1)` |
+//! | stiff and soft part of `A'` | `x = X / W`, `d = ((1 + a) / 4 + c + det A) / X`, `k = -b / 2X` |
+//! | the same parts of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w`, `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
+//!
+//! Why so: the masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares when they are
+//! turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the same two directions, because a
+//! heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff part would bury the soft one. `E` comes
+//! from these parts too. Each of the two costs up to ten digits otherwise. Rotations are taken joint by joint, so that a
+//! joint wound up by 1e8 rad costs nothing either. Gravity is an upward acceleration of the base: two products, and so
+//! nothing that would be worth leaving out at gravity 0.
+//!
+//! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a heavy tip (`tests/math_dynamics.rs`). Known
+//! limit: where masses *and* lengths spread by many powers of ten at once, such as 1e7 kg in 0.1 mm at the end of 500 km of
+//! gram-light links, the joint of the tiny tip may lose eight.
+//!
+//! **Invariant:** one kernel for every arm and every n. Source of the method: Featherstone, *Rigid Body Dynamics Algorithms* (2008),
+//! ch. 7; the split into two directions is our own.
 
 #![allow(
     clippy::indexing_slicing,
@@ -9,80 +38,80 @@ use super::super::arm::Arm;
 use super::super::trig;
 use glam::DVec2;
 
-/// Joint accelerations \[rad/s²\] at `q` \[rad\], `qd` \[rad/s\] under the efforts `tau` \[N m\].
+/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
+///
+/// Never panics. The result is not finite where the input is not, or where an intermediate value leaves the range
+/// of `f64` (mass ratios of about 1e150 between neighbours).
 #[must_use]
-#[inline(always)]
+#[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
 pub fn forward_dynamics<const N: usize>(
     arm: &Arm<N>,
     q: &[f64; N],
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
+    let rods = &arm.rods;
     let (sin, cos) = trig::sin_cos(q);
-    let of = &arm.derived;
     let mut rate = 0.0;
     let w: [f64; N] = std::array::from_fn(|i| {
         rate += qd[i];
-        arm.lengths()[i] * rate * rate
+        rods[i].length * rate * rate
     });
+
+    // From the tip to the base: what each link carries, and how its tip will answer its joint.
+    let mut carried = Carried::NOTHING;
+    let mut hinges = [Hinge::default(); N];
     let mut outer = 0.0;
-    let mut hinges = [(0.0, 0.0, 0.0); N];
-    let mut load = Load {
-        a: 0.0,
-        b: 0.0,
-        c: 0.0,
-        det: 0.0,
-        bias: DVec2::ZERO,
-        e: DVec2::ZERO,
-    };
     for i in (0..N).rev() {
-        let u = (tau[i] - outer) * of.per_mass_length[i];
+        let u = (tau[i] - outer) * rods[i].per_mass_length;
         outer = tau[i];
-        let big_w = 1.0 + 3.0 * load.c;
+        let big_w = 1.0 + 3.0 * carried.c;
         let per_w = 1.0 / big_w;
-        hinges[i] = (
-            3.0 * per_w * (u - load.bias.y),
-            3.0 * per_w * load.b,
-            0.5 * per_w,
-        );
+        hinges[i] = Hinge {
+            free: 3.0 * per_w * (u - carried.bias.y),
+            along: 3.0 * per_w * carried.b,
+            across: 0.5 * per_w,
+        };
         if i > 0 {
-            let link = if i + 1 == N {
-                Link {
-                    x: 1.0,
-                    k: 0.0,
-                    d: 0.25,
-                    phi: -0.5 * w[i],
-                    psi: 1.5 * u,
-                }
+            let x_axis = DVec2::new(cos[i], sin[i]);
+            carried = if i + 1 == N {
+                Body::bare(u, w[i]).turned(rods[i].mass_ratio, x_axis, x_axis)
             } else {
-                load.inner(u, w[i], big_w, per_w)
-            };
-            let dir = DVec2::new(cos[i], sin[i]);
-            load = if i + 1 == N {
-                link.carry_straight(of.mass_ratio[i], dir)
-            } else {
-                link.carry(of.mass_ratio[i], dir)
+                let body = carried.with_rod(u, w[i], big_w, per_w);
+                let v = x_axis + body.k * x_axis.perp();
+                body.turned(rods[i].mass_ratio, x_axis, v)
             };
         }
     }
-    let mut p = DVec2::new(0.0, arm.gravity());
+
+    // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
+    let mut tip = DVec2::new(0.0, arm.gravity());
     let mut inner = 0.0;
     std::array::from_fn(|i| {
-        let dir = DVec2::new(cos[i], sin[i]);
-        p = DVec2::new(dir.dot(p), dir.perp_dot(p));
-        let (z, b, h) = hinges[i];
-        let tx = p.x - w[i];
-        let ty = (z - h * p.y) - b * tx;
-        let alpha = (ty - p.y) * of.per_length[i];
-        let qdd = alpha - inner;
-        inner = alpha;
-        p = DVec2::new(tx, ty);
-        qdd
+        let x_axis = DVec2::new(cos[i], sin[i]);
+        let joint = DVec2::new(x_axis.dot(tip), x_axis.perp_dot(tip));
+        let along = joint.x - w[i];
+        let across = (hinges[i].free - hinges[i].across * joint.y) - hinges[i].along * along;
+        tip = DVec2::new(along, across);
+        let link = (across - joint.y) * rods[i].per_length;
+        let relative = link - inner;
+        inner = link;
+        relative
     })
 }
 
+/// How the tip of a link accelerates across it: `t_y = free - along t_x - across p_y`.
+#[derive(Clone, Copy, Default)]
+struct Hinge {
+    free: f64,
+    along: f64,
+    across: f64,
+}
+
+/// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass:
+/// `A' = x v vᵀ + d y yᵀ` with `v = (1, k)`, and `B' = x φ v + ψ y`.
 #[derive(Clone, Copy)]
-struct Link {
+struct Body {
     x: f64,
     k: f64,
     d: f64,
@@ -90,54 +119,75 @@ struct Link {
     psi: f64,
 }
 
-impl Link {
+impl Body {
+    /// The outermost link, which carries nothing.
     #[inline(always)]
-    fn carry_straight(self, ratio: f64, u: DVec2) -> Load {
-        self.carry_along(ratio, u, u)
+    fn bare(u: f64, w: f64) -> Self {
+        Self {
+            x: 1.0,
+            k: 0.0,
+            d: 0.25,
+            phi: -0.5 * w,
+            psi: 1.5 * u,
+        }
     }
+
+    /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link and of
+    /// `v` in that frame.
     #[inline(always)]
-    fn carry(self, ratio: f64, u: DVec2) -> Load {
-        self.carry_along(ratio, u, u + self.k * u.perp())
-    }
-    #[inline(always)]
-    fn carry_along(self, ratio: f64, u: DVec2, v: DVec2) -> Load {
-        let x = ratio * self.x;
-        let d = ratio * self.d;
-        let psi = ratio * self.psi;
-        let w = u.perp();
-        Load {
-            a: x * v.x * v.x + d * w.x * w.x,
-            b: x * v.x * v.y + d * w.x * w.y,
-            c: x * v.y * v.y + d * w.y * w.y,
+    fn turned(self, mass_ratio: f64, x_axis: DVec2, v: DVec2) -> Carried {
+        let (x, d, psi) = (
+            mass_ratio * self.x,
+            mass_ratio * self.d,
+            mass_ratio * self.psi,
+        );
+        let y_axis = x_axis.perp();
+        Carried {
+            a: x * v.x * v.x + d * y_axis.x * y_axis.x,
+            b: x * v.x * v.y + d * y_axis.x * y_axis.y,
+            c: x * v.y * v.y + d * y_axis.y * y_axis.y,
             det: x * d,
-            bias: x * self.phi * v + psi * w,
-            e: x * (d * self.phi * u + psi * v.perp()),
+            bias: x * self.phi * v + psi * y_axis,
+            e: x * (d * self.phi * x_axis + psi * v.perp()),
         }
     }
 }
 
+/// What the tip of a link carries, in the frame of that link and per unit of its mass: `A = (a b; b c)` and `B`.
 #[derive(Clone, Copy)]
-struct Load {
+struct Carried {
     a: f64,
     b: f64,
     c: f64,
     det: f64,
     bias: DVec2,
+    /// `E = (c B_x - b B_y, a B_y - b B_x)`, without its cancellation.
     e: DVec2,
 }
 
-impl Load {
+impl Carried {
+    const NOTHING: Self = Self {
+        a: 0.0,
+        b: 0.0,
+        c: 0.0,
+        det: 0.0,
+        bias: DVec2::ZERO,
+        e: DVec2::ZERO,
+    };
+
+    /// Adds the rod that carries this and turns about its joint; `W` and `1 / W` are at hand.
     #[inline(always)]
-    fn inner(&self, u: f64, w: f64, big_w: f64, per_w: f64) -> Link {
+    fn with_rod(&self, u: f64, w: f64, big_w: f64, per_w: f64) -> Body {
         let big_x = 1.0 + self.a + 3.0 * (self.c + self.det);
         let per_x = 1.0 / big_x;
-        Link {
+        let along = self.bias.x + 3.0 * (self.e.x + self.b * u) + 0.5 * w * big_w;
+        let across = u * (1.0 + self.a) + 0.5 * self.b * w - self.bias.y - self.e.y;
+        Body {
             x: big_x * per_w,
             k: -0.5 * self.b * per_x,
             d: (0.25 * (1.0 + self.a) + self.c + self.det) * per_x,
-            phi: (self.bias.x + 3.0 * (self.e.x + self.b * u) + 0.5 * w * big_w) * per_x - w,
-            psi: u
-                + (u * (1.0 + self.a) + 0.5 * self.b * w - self.bias.y - self.e.y) * (0.5 * per_x),
+            phi: along * per_x - w,
+            psi: u + across * (0.5 * per_x),
         }
     }
 }

@@ -67,7 +67,7 @@ pub fn solve<const N: usize>(
         [l1, l2] => {
             let arm = Links::new(l1, l2, 0.0);
             let hand = target.position / arm.unit;
-            let hand = arm.checked(arm.wrist_reach(), hand, target)?;
+            arm.checked(arm.wrist_reach(), hand, target)?;
             Ok(arm.nearest_elbow(hand, 0.0, &present))
         }
         [l1, l2, l3] => {
@@ -129,16 +129,14 @@ impl Links {
         }
     }
 
-    /// The hand, brought onto the boundary of the whole arm's `reach` where it lies just outside.
-    fn checked(&self, reach: Reach, hand: DVec2, target: &Target) -> Result<DVec2, Unreachable> {
-        let distance = hand.x.hypot(hand.y);
+    /// Refuses a target whose hand is outside the whole arm's `reach`.
+    ///
+    /// One that is only just outside needs no moving: triangles that do not close are made flat by [`half_angle`], and
+    /// the flat one is the boundary.
+    fn checked(&self, reach: Reach, hand: DVec2, target: &Target) -> Result<(), Unreachable> {
         let DVec2 { x, y } = target.position;
-        match self.judged(reach, distance) {
-            Ok(()) if distance > reach.outer => Ok(hand * (reach.outer / distance)),
-            Ok(()) if 0.0 < distance && distance < reach.inner => {
-                Ok(reach.inner * DVec2::from_angle(hand.y.atan2(hand.x)))
-            }
-            Ok(()) => Ok(hand),
+        match self.judged(reach, hand.x.hypot(hand.y)) {
+            Ok(()) => Ok(()),
             Err(Outside::Beyond) => Err(Unreachable::Beyond {
                 x,
                 y,
@@ -194,7 +192,7 @@ impl Links {
         present: &[f64; N],
         target: &Target,
     ) -> Result<(DVec2, f64), Unreachable> {
-        let hand = self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
+        self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
         let present = heading(present);
         let present_phi = present.y.atan2(present.x);
 

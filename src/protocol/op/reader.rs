@@ -92,11 +92,10 @@ impl<'a> Reader<'a> {
     /// A call. As soon as its service is known it can be answered as a call, whatever else is wrong.
     fn call(&self) -> Result<Op, OpError> {
         let service = self.name("service").map_err(OpError::Status)?;
-        let rest = self.args().and_then(|args| Ok((args, self.timeout()?)));
-        match rest {
-            Ok((args, timeout)) => Ok(Op::CallService(CallService {
+        match self.timeout() {
+            Ok(timeout) => Ok(Op::CallService(CallService {
                 service,
-                args,
+                args: self.args(),
                 timeout,
             })),
             Err(problem) => Err(OpError::Call { service, problem }),
@@ -269,15 +268,15 @@ impl<'a> Reader<'a> {
             .clamp(1, MAX_QUEUE_LENGTH))
     }
 
-    fn args(&self) -> Result<Arguments, Problem> {
+    fn args(&self) -> Arguments {
         let Some(raw) = self.get("args") else {
-            return Ok(Arguments::none());
+            return Arguments::none();
         };
         match raw.get().as_bytes().first() {
-            Some(b'{') => Ok(Arguments::Object(raw.to_owned())),
-            Some(b'[') => Ok(Arguments::Positional(raw.to_owned())),
-            Some(b'n') => Ok(Arguments::none()),
-            _ => Err(self.mistyped("args", "an object or an array", raw)),
+            Some(b'{') => Arguments::Object(raw.to_owned()),
+            Some(b'[') => Arguments::Positional(raw.to_owned()),
+            Some(b'n') => Arguments::none(),
+            _ => Arguments::Neither(raw.to_owned()),
         }
     }
 

@@ -1,0 +1,185 @@
+//! What is accepted and what is rejected; what a new goal sets in motion.
+
+use super::*;
+
+#[test]
+fn a_goal_is_answered_with_its_id_and_then_its_trajectory_goes_out() {
+    in_virtual_time(async {
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        client.subscribe("/joint_trajectory").await;
+        client.heard.clear();
+        let values = client.ask(SEND, json!({"x": 1, "y": 1})).await;
+        assert_eq!(values.as_object().unwrap().len(), 1);
+        assert!(values["goal_id"].is_string());
+        let trajectory = client.message("/joint_trajectory").await;
+        assert_eq!(client.story(), [SEND, "/joint_trajectory"]);
+        assert_eq!(trajectory["joint_names"], json!(["joint1", "joint2"]));
+        assert_eq!(trajectory["points"].as_array().unwrap().len(), 1);
+        assert_eq!(trajectory["points"][0]["velocities"], json!([0.0, 0.0]));
+        let positions = numbers(&trajectory["points"][0]["positions"]);
+        let hand = forward(&[1.0, 1.0], &[positions[0], positions[1]]).position;
+        // A closed form loses a few units in the last place.
+        assert!((hand - glam::DVec2::ONE).length() < 1e-14);
+        client.settle().await;
+        let setpoint = *stage.simulation().await.pid().setpoint();
+        assert_eq!(setpoint.position, positions[..], "bit for bit, over JSON");
+        assert_eq!(setpoint.velocity, [0.0, 0.0]);
+    });
+}
+
+#[test]
+fn goal_ids_are_unique() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let mut ids = std::collections::BTreeSet::new();
+        for _ in 0..100 {
+            assert!(ids.insert(client.send_goal(elsewhere()).await));
+            client.refusal(SEND, json!({"x": 5, "y": 5})).await;
+        }
+    });
+}
+
+#[test]
+fn sending_a_goal_never_enables_the_controller() {
+    in_virtual_time(async {
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        client.send_goal(elsewhere()).await;
+        pass(ms(1000)).await;
+        let simulation = stage.simulation().await;
+        assert!(!simulation.pid().is_enabled());
+        assert_eq!(simulation.effort(), &[0.0, 0.0]);
+        assert_eq!(simulation.state().position, [0.0, 0.0]);
+    });
+}
+
+#[test]
+fn every_bad_field_is_named_and_the_values_are_empty() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<3>::with_a_floating_arm().await;
+        let response = client
+            .call(
+                SEND,
+                json!({"x": "1", "phi": [], "epsilon": 0, "success_hold": -1}),
+            )
+            .await;
+        assert_eq!(response["result"], false);
+        assert_eq!(response["values"], json!({}));
+        let why = response["status"].as_str().unwrap();
+        for sentence in [
+            "x must be a number",
+            "y is required",
+            "phi must be a number",
+            "epsilon must be greater than 0, got 0",
+            "success_hold must be at least 0, got -1",
+        ] {
+            assert!(why.contains(sentence), "{why}");
+        }
+    });
+}
+
+#[test]
+fn null_in_an_optional_field_means_absent() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<3>::with_a_floating_arm().await;
+        client.subscribe(RESULT).await;
+        client
+            .send_goal(json!({"x": 1, "y": 1, "phi": null, "epsilon": null, "success_hold": null}))
+            .await;
+        client.ask(CANCEL, json!({})).await;
+        let result = &client.messages(RESULT)[0];
+        assert_eq!(result["target"], json!({"x": 1.0, "y": 1.0}));
+        client.refusal(SEND, json!({"x": null, "y": 1})).await;
+    });
+}
+
+#[test]
+fn the_target_echoes_x_and_y_and_phi_where_one_was_asked_for() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<3>::with_a_floating_arm().await;
+        client.subscribe(RESULT).await;
+        client
+            .send_goal(json!({"x": 1, "y": 0.5, "phi": 0.75}))
+            .await;
+        client.send_goal(json!({"x": 1, "y": 0.5})).await;
+        client.ask(CANCEL, json!({})).await;
+        let targets: Vec<Value> = client
+            .messages(RESULT)
+            .iter()
+            .map(|result| result["target"].clone())
+            .collect();
+        assert_eq!(
+            targets,
+            [
+                json!({"x": 1.0, "y": 0.5, "phi": 0.75}),
+                json!({"x": 1.0, "y": 0.5})
+            ]
+        );
+    });
+}
+
+#[test]
+fn two_links_ignore_phi_in_a_goal_too() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        client.subscribe(RESULT).await;
+        client
+            .send_goal(json!({"x": 1, "y": 0.5, "phi": "north"}))
+            .await;
+        client.ask(CANCEL, json!({})).await;
+        let result = &client.messages(RESULT)[0];
+        assert_eq!(result["target"], json!({"x": 1.0, "y": 0.5}));
+    });
+}
+
+/// An arm that has wound up by two turns and more gets there without unwinding.
+#[test]
+fn a_goals_joints_are_within_pi_of_the_present_positions() {
+    in_virtual_time(async {
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        client.subscribe("/joint_trajectory").await;
+        client.enable().await;
+        client.publish_trajectory(json!([14.0, -9.0])).await;
+        pass(ms(8000)).await;
+        client.heard.clear();
+        for (x, y) in [(1.0, 1.0), (-1.5, 0.1), (-1.5, -0.1), (0.0, -0.5)] {
+            let present = stage.simulation().await.state().position;
+            assert!(present[0] > 9.0 && present[1] < -5.0, "{present:?}");
+            client.send_goal(json!({"x": x, "y": y})).await;
+            let trajectory = client.message("/joint_trajectory").await;
+            let positions = numbers(&trajectory["points"][0]["positions"]);
+            for (joint, present) in positions.iter().zip(present) {
+                assert!((joint - present).abs() <= std::f64::consts::PI);
+            }
+        }
+    });
+}
+
+#[test]
+fn a_rejected_goal_changes_nothing() {
+    in_virtual_time(async {
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        client.subscribe(RESULT).await;
+        client.subscribe(FEEDBACK).await;
+        client.subscribe("/joint_trajectory").await;
+        let goal_id = client.send_goal(elsewhere()).await;
+        client.message("/joint_trajectory").await;
+        client.settle().await;
+        let setpoint = *stage.simulation().await.pid().setpoint();
+        client.heard.clear();
+        for args in [
+            json!({"x": 2.1, "y": 0}),
+            json!({"x": 1}),
+            json!({"x": 1, "y": 0, "epsilon": -1}),
+            json!({"x": 1, "y": 0, "success_hold": "long"}),
+        ] {
+            client.refusal(SEND, args).await;
+        }
+        let feedback = client.messages_for(ms(500), FEEDBACK).await;
+        assert!(feedback.iter().all(|message| message["goal_id"] == goal_id));
+        // Its clock went on from where it was: no new goal under the old name.
+        assert!(number(&feedback.last().unwrap()["elapsed"]) > 0.4);
+        assert!(client.messages("/joint_trajectory").is_empty());
+        assert!(client.messages(RESULT).is_empty());
+        assert_eq!(*stage.simulation().await.pid().setpoint(), setpoint);
+    });
+}

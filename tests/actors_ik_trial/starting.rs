@@ -1,0 +1,195 @@
+//! `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`.
+
+use super::*;
+
+#[test]
+fn start_answers_with_the_settings_in_force_and_keeps_what_is_not_named() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        let defaults = json!({"duration": 60.0, "epsilon": 0.02, "success_hold": 0.5});
+        assert_eq!(client.ask(START, json!({})).await, defaults);
+        let values = client.ask(START, json!({"epsilon": 0.1})).await;
+        assert_eq!(values["epsilon"], 0.1);
+        let values = client
+            .ask(
+                START,
+                json!({"duration": 30, "success_hold": 0, "epsilon": null}),
+            )
+            .await;
+        let kept = json!({"duration": 30.0, "epsilon": 0.1, "success_hold": 0.0});
+        assert_eq!(values, kept);
+        assert_eq!(client.ask(START, json!({})).await, kept);
+    });
+}
+
+#[test]
+fn start_with_an_invalid_field_is_rejected_and_changes_nothing_a_running_trial_included() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        let defaults = json!({"duration": 60.0, "epsilon": 0.02, "success_hold": 0.5});
+        let response = client.call(START, json!({"duration": 0})).await;
+        assert_eq!(response["result"], false);
+        assert_eq!(response["values"], defaults);
+        assert_eq!(response["status"], "duration must be greater than 0, got 0");
+        let quiet = client.messages_for(ms(500), STATUS).await;
+        assert!(quiet.is_empty(), "no trial exists");
+
+        let values = client.ask(START, hard(50.0)).await;
+        let before = status(&mut client).await;
+        for (args, field) in [
+            (json!({"duration": 5, "epsilon": -1}), "epsilon"),
+            (json!({"duration": 5, "success_hold": "x"}), "success_hold"),
+            (json!({"duration": true, "epsilon": 1}), "duration"),
+        ] {
+            let response = client.call(START, args).await;
+            assert_eq!(response["result"], false);
+            assert_eq!(response["values"], values);
+            assert!(response["status"].as_str().unwrap().starts_with(field));
+        }
+        let after = status(&mut client).await;
+        assert_eq!(after["target"], before["target"]);
+        assert_eq!(after["duration"], before["duration"]);
+        assert!(number(&after["elapsed"]) > number(&before["elapsed"]));
+        assert!(client.messages(RESULT).is_empty());
+    });
+}
+
+/// The sum of such lengths is beyond the number range, and with it every target.
+#[test]
+fn start_without_any_reachable_target_is_rejected_and_says_so() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        client
+            .ask(
+                "/arm_sim/set_params",
+                json!({"lengths": [1.5e308, 1.5e308]}),
+            )
+            .await;
+        let response = client.call(START, json!({"duration": 5})).await;
+        assert_eq!(response["result"], false, "{response}");
+        assert!(response["status"].as_str().unwrap().contains("target"));
+        assert_eq!(response["values"]["duration"], 60.0, "nothing has changed");
+    });
+}
+
+#[test]
+fn start_begins_afresh_and_cancels_the_goal_that_was_left_over() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        client.ask(START, easy(60.0, 0.1)).await;
+        client.messages_for(ms(1000), STATUS).await;
+        let before = status(&mut client).await;
+        assert!(number(&before["targets_reached"]) > 5.0);
+        client.heard.clear();
+        client.ask(START, hard(60.0)).await;
+        let results = client.messages(RESULT);
+        assert_eq!(results.len(), 1);
+        assert_eq!(results[0]["outcome"], "preempted");
+        let first = &client.messages(STATUS)[0];
+        assert_eq!(first["running"], true);
+        assert_eq!(first["targets_reached"], 0);
+        assert_eq!(first["elapsed"], 0.0);
+        assert_ne!(first["target"], before["target"]);
+    });
+}
+
+#[test]
+fn the_goal_is_under_way_when_start_is_answered_and_what_follows_finds_it() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        for (service, args) in [(START, hard(60.0)), (CANCEL, json!({})), (SKIP, json!({}))] {
+            client
+                .send(&json!({"op": "call_service", "service": service, "args": args}))
+                .await;
+        }
+        client.send_goal(json!({"x": 1, "y": 1})).await;
+        let results: Vec<bool> = client
+            .heard
+            .iter()
+            .filter_map(|frame| frame["result"].as_bool())
+            .collect();
+        assert_eq!(results, [true; 4], "{:?}", client.heard);
+        assert_eq!(client.messages(RESULT).len(), 2);
+    });
+}
+
+#[test]
+fn skip_and_stop_are_rejected_when_no_trial_runs() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        for service in [SKIP, STOP] {
+            let response = client.call(service, json!({})).await;
+            assert_eq!(response["result"], false);
+            assert_eq!(response["values"], json!({}));
+            assert_eq!(response["status"], "no trial is running");
+        }
+        client.ask(START, easy(0.5, 0.1)).await;
+        pass(ms(501)).await;
+        client.refusal(SKIP, json!({})).await;
+        client.refusal(STOP, json!({})).await;
+    });
+}
+
+#[test]
+fn skip_abandons_the_target_uncounted_and_goes_for_another_at_once() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        client.ask(START, hard(60.0)).await;
+        let before = status(&mut client).await;
+        client.heard.clear();
+        assert_eq!(client.ask(SKIP, json!({})).await, json!({}));
+        let results = client.messages(RESULT);
+        assert_eq!(results.len(), 1);
+        assert_eq!(results[0]["outcome"], "preempted");
+        assert_eq!(results[0]["target"], before["target"]);
+        let after = client.messages(STATUS).pop().unwrap();
+        assert_eq!(after["action_status"], "active");
+        assert_eq!(after["targets_reached"], 0);
+        assert_ne!(after["target"], before["target"]);
+        assert!(number(&after["elapsed"]) > 0.0, "the clock goes on");
+    });
+}
+
+#[test]
+fn stop_ends_the_trial_and_leaves_nothing_in_flight() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        client.ask(START, hard(60.0)).await;
+        let before = status(&mut client).await;
+        assert!(before["error"].is_number());
+        client.heard.clear();
+        assert_eq!(client.ask(STOP, json!({})).await, json!({}));
+        assert_eq!(client.messages(RESULT).len(), 1);
+        client.refusal(CANCEL, json!({})).await;
+        for after in client.messages_for(ms(1000), STATUS).await {
+            assert_eq!(after["running"], false);
+            assert_nothing_in_flight(&after);
+            // Its clock has stopped.
+            assert!(number(&after["elapsed"]) - number(&before["elapsed"]) < 0.11);
+        }
+        assert_eq!(client.messages(RESULT).len(), 1, "and no replacement");
+    });
+}
+
+#[test]
+fn args_with_more_entries_than_the_service_has_fields_are_rejected_and_change_nothing() {
+    in_virtual_time(async {
+        let (_stage, mut client) = floating_and_watched().await;
+        let values = client.ask(START, json!([60, 1e-9, 0])).await;
+        assert_eq!(
+            values,
+            json!({"duration": 60.0, "epsilon": 1e-9, "success_hold": 0.0})
+        );
+        let before = status(&mut client).await;
+        let response = client.call(START, json!([5, 1, 1, 1])).await;
+        assert_eq!(response["values"], values);
+        assert!(response["status"].as_str().unwrap().starts_with("args "));
+        for service in [SKIP, STOP] {
+            let why = client.refusal(service, json!([1])).await;
+            assert!(why.starts_with("args "), "{why}");
+        }
+        let after = status(&mut client).await;
+        assert_eq!(after["target"], before["target"]);
+        assert_eq!(after["running"], true);
+    });
+}
