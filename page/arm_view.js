@@ -135,6 +135,7 @@ function drawTrail() {
   const { data, length } = trail;
   context.strokeStyle = colors.accent;
   context.lineWidth = 2;
+  context.lineCap = "butt"; // round ends would show where two pieces meet
   for (let piece = 0; piece < TRAIL_PIECES; piece += 1) {
     const from = Math.floor((piece * length) / TRAIL_PIECES);
     const to = Math.min(length - 1, Math.floor(((piece + 1) * length) / TRAIL_PIECES));
@@ -147,6 +148,7 @@ function drawTrail() {
     }
     context.stroke();
   }
+  context.lineCap = "round";
   context.globalAlpha = 1;
 }
 

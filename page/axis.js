@@ -40,7 +40,8 @@ export class Axis {
       min = 0;
       max = 0;
     }
-    const missing = this.least - (max - min);
+    // A span that rounding would swallow is none.
+    const missing = Math.max(this.least, 1e-9 * Math.max(-min, max)) - (max - min);
     if (missing > 0) {
       min -= missing / 2;
       max += missing / 2;

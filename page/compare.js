@@ -24,11 +24,11 @@ let go;
 export function startCompare() {
   sides = [side("first", "euler"), side("second", "rk4")];
   seconds = option({ label: "duration", unit: "s", value: 5 });
-  from = select("start", [["now", "the arm as it is"], ["rest", "rest, stretched out"]]);
-  servo = select("servo", [["off", "off"], ["on", "on, present gains"]]);
+  from = select("start", [["now", "as it is"], ["rest", "stretched out"]]);
+  servo = select("servo", [["off", "off"], ["on", "on"]]);
   go = el("button", { type: "submit", class: "primary" }, "Compare");
   said = refusal(go);
-  byId("compare-form").append(...sides.map((one) => one.element), el("div", { class: "options" }, seconds.element, from.element, servo.element), el("div", { class: "buttons" }, go), said.element);
+  byId("compare-form").append(el("div", { class: "compare-row" }, ...sides.map((one) => one.element), seconds.element, from.element, servo.element, go), said.element);
   byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
   view = new CompareView(byId("compare-arm"), byId("compare-chart"), byId("compare-scrub"), byId("compare-play"));
   watch("links", () => { byId("compare-result").hidden = true; });
@@ -43,7 +43,7 @@ function side(name, method) {
   const choice = select(`${name} integrator`, METHODS);
   choice.input.value = method;
   const timestep = option({ label: "timestep", unit: "s", placeholder: "as the arm", value: 0.01 });
-  return { name, choice, timestep, element: el("div", { class: `options ${name}` }, choice.element, timestep.element) };
+  return { name, choice, timestep, element: el("div", { class: `side ${name}` }, choice.element, timestep.element) };
 }
 
 function timestepOf(one) {

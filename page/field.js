@@ -43,6 +43,8 @@ export function numberField({ label, short = label, unit, low, high, log = false
   nextId += 1;
   const input = el("input", { type: "number", step: "any", id, inputmode: "decimal", autocomplete: "off" });
   const slider = el("input", { type: "range", min: "0", max: String(SLIDER_STEPS), step: "1", "aria-label": `${label}, slider`, class: className });
+  slider.value = String(SLIDER_STEPS / 2);
+  input.placeholder = "–"; // until the runtime has said
   const said = refusal(input);
   let accepted = NaN;
   let pending = 0;
@@ -86,7 +88,6 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
   input.addEventListener("change", typed);
   input.addEventListener("keydown", (event) => {
-    if (event.key === "Enter") typed();
     if (event.key !== "Escape") return;
     show();
     said.show("");

@@ -16,7 +16,7 @@ export function significant(value, digits) {
   const size = Math.abs(value);
   if (size >= 1e6 || size < 1e-4) {
     const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
-    return `${mantissa}e${Number(exponent)}`.replace(/-/g, MINUS);
+    return `${Number(mantissa)}e${Number(exponent)}`.replace(/-/g, MINUS);
   }
   return String(Number(value.toPrecision(digits))).replace("-", MINUS);
 }

@@ -16,6 +16,7 @@ const SWITCH = "pendularm-shortcuts";
 
 let stoppedByZero = false;
 let lastPush = -Infinity;
+let lastSign = 0;
 
 const shortcuts = [
   ["0", "no integrator: pause", () => { stoppedByZero = true; setPaused(true); }],
@@ -47,8 +48,9 @@ async function useMethod(method, name) {
 
 function pushNow(sign) {
   const now = performance.now();
-  if (now - lastPush < PUSH_MS) return;
+  if (sign === lastSign && now - lastPush < PUSH_MS) return;
   lastPush = now;
+  lastSign = sign;
   push(sign);
 }
 

@@ -37,7 +37,7 @@ startAim(byId("arm"));
 
 // On a small screen what is not needed at once is folded away.
 if (matchMedia("(max-width: 779px)").matches) {
-  for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3), #compare > details")) one.open = false;
+  for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 2), #tasks > details:nth-of-type(n + 2), #compare > details")) one.open = false;
 }
 
 function forget() {

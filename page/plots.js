@@ -44,7 +44,7 @@ export function togglePlots() {
   frozenAt = paused ? newest() : NaN;
   const button = byId("plot-pause");
   button.setAttribute("aria-pressed", String(paused));
-  setText(button, paused ? "Resume plots" : "Pause plots");
+  setText(button, paused ? "Resume" : "Pause");
   announce(paused ? "Plots paused." : "Plots running.");
   redraw();
 }

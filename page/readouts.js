@@ -34,7 +34,7 @@ export function showReadouts() {
   setText(byId("run-state"), runState());
   byId("run-state").className = `state ${diagnostics?.state === "diverged" ? "diverged" : state.paused ? "paused" : "running"}`;
   const factor = diagnostics?.real_time_factor ?? NaN;
-  setText(byId("out-rtf"), `${fixed(factor, 2)}×`);
+  setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
   byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < 0.95);
   setText(byId("out-method"), methodName(state.integrator?.method).replace("Runge–Kutta 4", "RK 4"));
   setText(byId("out-timestep"), duration(state.integrator?.timestep ?? NaN));

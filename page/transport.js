@@ -10,6 +10,9 @@ import { nobodyProvides } from "./rosbridge.js";
 import { pause, reset, setIntegrator, step } from "./runtime.js";
 import { state, watch } from "./store.js";
 
+/** Below this real-time factor a warning of the runtime is about its pace. */
+const SLOW = 0.95;
+
 let said;
 let shownNotice = "";
 
@@ -96,6 +99,9 @@ function choose() {
   if (exceedsLimit()) {
     return { key: "limit", kind: "warn", text: `Timestep ${duration(integrator.timestep)} is above the predicted stability limit ${duration(limit())}.`, buttons: calm };
   }
+  if (diagnostics?.level === 1 && diagnostics.real_time_factor < SLOW) {
+    return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: calm };
+  }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
     return { key: "servo", kind: "calm", text: "The servo is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the servo on", () => switchServo(true)]] };
   }
@@ -107,6 +113,6 @@ function choose() {
 
 /** "diverged: step 12 was ...; reset clears this" as a sentence of its own. */
 function sentence(message) {
-  const text = message.replace(/^diverged:\s*/, "").replace(/;.*$/, "");
+  const text = message.replace(/^diverged:\s*/, "").replace(/;.*$/, "").replace(/\d+\.\d{5,}/g, (digits) => String(Number(Number(digits).toPrecision(6))));
   return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
 }

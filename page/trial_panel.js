@@ -9,9 +9,9 @@ import { trialSkip, trialStart, trialStop } from "./runtime.js";
 import { state, watch } from "./store.js";
 
 const fields = {
-  duration: option({ label: "duration", unit: "s", placeholder: "as before" }),
-  epsilon: option({ label: "tolerance", unit: "m", placeholder: "as before" }),
-  success_hold: option({ label: "hold", unit: "s", placeholder: "as before" }),
+  duration: option({ label: "duration", unit: "s", placeholder: "default" }),
+  epsilon: option({ label: "tolerance", unit: "m", placeholder: "default" }),
+  success_hold: option({ label: "hold", unit: "s", placeholder: "default" }),
 };
 let said;
 let wasRunning = false;
