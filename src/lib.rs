@@ -1,7 +1,8 @@
 //! pendularm: a real-time planar robot arm that any rosbridge client can drive.
 //!
 //! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), [`protocol`] (pure: bytes
-//! and JSON) and [`actors`] (joins the two, one actor per node). `math` and `protocol` do not know each other.
+//! and JSON) and [`actors`] (joins the two, one actor per node). `math` and `protocol` do not know each other. Beside
+//! `protocol` stands `web`, the door for browsers, in builds that have the feature of that name.
 
 pub mod actors;
 pub mod logging;

@@ -158,6 +158,7 @@ fn the_readme_lists_every_service_with_its_fields_in_order() {
     }
 }
 
+#[cfg(feature = "web")]
 #[test]
 fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
     let help = Command::new(env!("CARGO_BIN_EXE_pendularm"))

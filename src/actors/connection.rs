@@ -1,6 +1,6 @@
 //! One client: bytes in, ops to the registry; messages and answers back, through a bounded outbox.
 //!
-//! A session judges the client by its first bytes. From then on three parts on one thread share one [`Shared`]: the
+//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
 //! reading task hands one op at a time to the registry and waits until it has taken effect; the actor moves what it is
 //! sent into the outbox; the writing task drains the outbox. A client that reads slowly fills its own outbox and nothing else.
 //!

@@ -97,9 +97,15 @@ impl Response {
         self
     }
 
-    /// The answer as bytes, and nothing after it: the connection is closed.
+    /// What is answered about.
     #[must_use]
-    pub fn encode(&self) -> Vec<u8> {
+    pub fn body(&self) -> &[u8] {
+        &self.body
+    }
+
+    /// What comes before the body; nothing comes after it, the connection is closed.
+    #[must_use]
+    pub fn head(&self) -> String {
         let Self {
             status,
             kind,
@@ -120,8 +126,6 @@ impl Response {
             let _ = write!(head, "{name}: {value}\r\n");
         }
         head.push_str("\r\n");
-        let mut bytes = head.into_bytes();
-        bytes.extend_from_slice(body);
-        bytes
+        head
     }
 }

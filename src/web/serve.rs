@@ -18,6 +18,8 @@ use super::{Door, page, report, upgrade};
 
 /// How long a client may take no byte of an answer.
 pub const TAKE_TIME: Duration = Duration::from_secs(10);
+/// How long an answer may take in all: the largest file over a slow line.
+pub const ANSWER_TIME: Duration = Duration::from_secs(120);
 /// Bytes of an answer that are offered at a time.
 const PIECE: usize = 64 * 1024;
 /// How long, and how many bytes, of what follows a request are swallowed so that the answer can still be read: closing a
@@ -66,8 +68,8 @@ pub async fn serve<S: AsyncRead + AsyncWrite + Unpin>(
         Outcome::Answer(response) => response,
         Outcome::Report(name, cookie) => with_cookie(read_report(name, door).await, cookie),
         Outcome::Upgrade(head) => {
-            let sent = timeout(TAKE_TIME, stream.write_all(&head)).await;
-            return matches!(sent, Ok(Ok(()))).then(|| behind.freeze());
+            let sent = take(stream.write_all(&head)).await;
+            return sent.map(|()| behind.freeze());
         }
     };
     answer(stream, &response).await;
@@ -197,15 +199,14 @@ async fn read_report(name: report::Name, door: &Door) -> Response {
 
 /// Sends an answer and ends the stream, within bounds of time.
 async fn answer<S: AsyncRead + AsyncWrite + Unpin>(stream: &mut S, response: &Response) {
-    for piece in response.encode().chunks(PIECE) {
-        if !matches!(
-            timeout(TAKE_TIME, stream.write_all(piece)).await,
-            Ok(Ok(()))
-        ) {
-            return;
+    let send = async {
+        take(stream.write_all(response.head().as_bytes())).await?;
+        for piece in response.body().chunks(PIECE) {
+            take(stream.write_all(piece)).await?;
         }
-    }
-    if !matches!(timeout(TAKE_TIME, stream.shutdown()).await, Ok(Ok(()))) {
+        take(stream.shutdown()).await
+    };
+    if !matches!(timeout(ANSWER_TIME, send).await, Ok(Some(()))) {
         return;
     }
     let swallow = async {
@@ -221,4 +222,9 @@ async fn answer<S: AsyncRead + AsyncWrite + Unpin>(stream: &mut S, response: &Re
         }
     };
     let _ = timeout(DISCARD_TIME, swallow).await;
+}
+
+/// Waits until a piece has been taken; `None` if the client does not take it.
+async fn take(writing: impl Future<Output = std::io::Result<()>>) -> Option<()> {
+    timeout(TAKE_TIME, writing).await.ok()?.ok()
 }

@@ -1,8 +1,8 @@
 //! The arm: steps the simulation against wall time, serves `/arm_sim/*` and `/pid_controller/*`, publishes its state.
 //!
 //! The actor only asks the clock and says who hears what. What is due is reckoned by `math::pacer`, what happens in a
-//! step by `math::simulation`, requests are read in [`services`], messages written in [`telemetry`], goals judged in
-//! [`goals`].
+//! step by `math::simulation`, requests are read in `services`, messages written in `telemetry`, goals judged in
+//! `goals`.
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
 //! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up after

@@ -18,8 +18,11 @@ use super::transport::{CHUNK, Inbound, Outbound, Plain, read_some};
 use super::{Finish, LINGER, Shared, writer};
 use crate::actors::ConnectionId;
 use crate::actors::registry::{Disconnect, Refused, Registry};
-use crate::protocol::frame::{Foreign, Opening, opening};
+#[cfg(feature = "web")]
+use crate::protocol::frame::Foreign;
+use crate::protocol::frame::{Opening, opening};
 use crate::protocol::messages::{self, Level};
+use crate::protocol::token::Token;
 
 /// What one connection's tasks need to know of the rest.
 pub(super) struct Session {
@@ -75,11 +78,8 @@ impl Session {
         }
     }
 
-    pub(super) fn reader(
-        &self,
-        id: ConnectionId,
-        locked: Option<crate::protocol::token::Token>,
-    ) -> Reader {
+    /// The reading half for client `id`; `locked` is what it has to show first.
+    pub(super) fn reader(&self, id: ConnectionId, locked: Option<Token>) -> Reader {
         let shared = Rc::clone(&self.shared);
         let (registry, finish) = (self.registry.clone(), self.finish.clone());
         Reader::new(id, shared, registry, finish, locked)
@@ -113,7 +113,7 @@ impl Session {
                 Opening::Foreign(Foreign::Http) if first.starts_with(b"GET ") => {
                     return Greeting::Web;
                 }
-                Opening::Foreign(foreign) => return Greeting::Foreign(explanation(foreign)),
+                Opening::Foreign(foreign) => return Greeting::Foreign(foreign.explanation()),
             }
         }
     }
@@ -148,9 +148,4 @@ impl Session {
             reading.abort();
         }
     }
-}
-
-/// What a client of another protocol is told.
-fn explanation(foreign: Foreign) -> &'static str {
-    foreign.explanation()
 }

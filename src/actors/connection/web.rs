@@ -71,6 +71,7 @@ impl Session {
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,
+            shared: Rc::clone(&self.shared),
             in_message: false,
         };
         // Whoever got here has shown the token already, if there is one.
@@ -199,10 +200,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
             match self.next().await? {
                 Some(Ok(Message::Text(text))) => message::append_line(text.as_bytes(), chunk),
                 Some(Ok(Message::Binary(bytes))) => message::append_line(&bytes, chunk),
-                // Pings are answered by the library; raw frames never come out of it.
-                Some(Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_))) => {}
-                // A peer that closes takes no answers any more; reading on sends the close frame that it is owed.
-                Some(Ok(Message::Close(_))) => {}
+                // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of it.
+                Some(Ok(_)) => {}
+                // The peer has closed, and takes no answers any more.
                 None => return Err(io::ErrorKind::ConnectionAborted.into()),
                 Some(Err(error)) => {
                     self.link.farewell.set(farewell(&error));
@@ -240,6 +240,7 @@ fn farewell(error: &Error) -> (CloseCode, &'static str) {
 /// The sending half.
 struct Output<S> {
     link: Rc<Link<S>>,
+    shared: Rc<Shared>,
     /// The first frame of the next write goes on with a message that has begun.
     in_message: bool,
 }
@@ -291,7 +292,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         let gone = || io::Error::from(io::ErrorKind::ConnectionAborted);
         let close = Message::Close(Some(CloseFrame { code, reason }));
         self.link.put(close).ok_or_else(gone)?;
-        self.link.flush().await.ok_or_else(gone)
+        self.link.flush().await.ok_or_else(gone)?;
+        if !self.shared.refusing.get() {
+            return Ok(());
+        }
+        // Nothing that it sends is looked at any more, a close frame included: the stream's own end has to do.
+        poll_fn(|cx| Pin::new(self.link.socket.borrow_mut().get_mut()).poll_shutdown(cx)).await
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
 
+mod messages;
 mod ops;
 mod refusal;
 mod services;
@@ -9,24 +10,29 @@ mod topics;
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
+use self::messages::TimedOut;
+pub use self::messages::{
+    Attach, Connect, Disconnect, FinishAll, Handled, Outlets, Publish, RefuseCalls, Refused,
+    Request, Respond, Retire,
+};
 use self::refusal::Refusal;
 use self::services::{Forwarded, Services};
 pub use self::topics::Throttle;
 use self::topics::{Subscription, Topics};
 use super::ConnectionId;
-use super::connection::{Answer, Configure, Deliver, Finish, MAX_RESPONSES_WAITING};
+use super::connection::{Answer, Deliver, Finish, MAX_RESPONSES_WAITING};
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::{self, Level};
-use crate::protocol::op::{Op, Verbosity};
+use crate::protocol::messages::{self as frames, Level};
+use crate::protocol::op::Verbosity;
 
 /// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
 /// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
@@ -98,116 +104,6 @@ impl Registry {
         }
     }
 }
-
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// The runtime's nodes. From the runtime, once, before any client is accepted.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Attach(pub Nodes);
-
-/// A new client. From its connection; the answer is its id.
-#[derive(Message)]
-#[rtype(result = "Result<ConnectionId, Refused>")]
-pub struct Connect(pub Outlets);
-
-/// The ways to a connection; one mailbox behind all of them, so order is kept between them.
-#[derive(Clone)]
-pub struct Outlets {
-    /// Topic messages.
-    pub deliver: Recipient<Deliver>,
-    /// Responses and statuses.
-    pub answer: Recipient<Answer>,
-    /// Throttling of topics.
-    pub configure: Recipient<Configure>,
-    /// The end.
-    pub finish: Recipient<Finish>,
-    /// Set when the client is gone: heavy computations for it stop.
-    pub gone: Arc<AtomicBool>,
-    /// Bytes of responses that wait to be written; kept by the connection.
-    pub backlog: Arc<AtomicUsize>,
-}
-
-/// Why a client was not taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Refused {
-    /// The limit is reached.
-    #[error("too many connections: this runtime serves {MAX_CONNECTIONS} clients at once")]
-    Full,
-    /// The runtime is ending.
-    #[error("shutting down")]
-    Closed,
-}
-
-/// The client has stopped sending: all that it registered is withdrawn. From its connection; the receiver, if there is
-/// one, ends when the calls that it made have been answered.
-#[derive(Message)]
-#[rtype(result = "Handled")]
-pub struct Retire(pub ConnectionId);
-
-/// The client is gone: all that it registered is withdrawn. From its connection; repeating is harmless.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Disconnect(pub ConnectionId);
-
-/// One op of a client. From its connection, which waits for [`Handled`] before it reads on.
-#[derive(Message)]
-#[rtype(result = "Handled")]
-pub struct Request {
-    /// The client.
-    pub from: ConnectionId,
-    /// The frame's `id`, if it had one.
-    pub id: Option<Box<RawValue>>,
-    /// What it asks.
-    pub op: Op,
-}
-
-/// The op has been routed; if it went to a node, the receiver ends when it has taken effect there.
-#[derive(MessageResponse)]
-pub struct Handled(pub Option<oneshot::Receiver<()>>);
-
-/// A message on a topic. From the node that owns it.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Publish {
-    /// The topic.
-    pub topic: Topic,
-    /// The whole `publish` frame, encoded once.
-    pub frame: Bytes,
-    /// The message alone, for the runtime's own listener, on topics that it also subscribes to.
-    pub msg: Option<Box<RawValue>>,
-}
-
-/// A frame for one client: an answer or a status. From a node.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Respond {
-    /// The client.
-    pub connection: ConnectionId,
-    /// The whole frame.
-    pub frame: Bytes,
-    /// The service that it answers, if it is the runtime's own.
-    pub service: Option<Service>,
-    /// The level, if it is a status: sent only if the client wants such.
-    pub status: Option<Level>,
-    /// Dropped once the frame is on its way, where that is also the end of the call.
-    pub done: Option<oneshot::Sender<()>>,
-}
-
-/// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct RefuseCalls(pub &'static str);
-
-/// Every connection sends what it has and ends. From the runtime, when it ends.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct FinishAll;
-
-/// A forwarded call has waited as long as its caller allowed. From the registry's own timers.
-#[derive(Message)]
-#[rtype(result = "()")]
-struct TimedOut(u64);
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
@@ -429,7 +325,7 @@ impl Registry {
         if let Some(client) = self.clients.get(&to)
             && client.verbosity.wants(level)
         {
-            client.send(messages::status(level, msg, id), None);
+            client.send(frames::status(level, msg, id), None);
         }
     }
 
@@ -451,7 +347,7 @@ impl Registry {
     /// Answers a call with `result: false`.
     fn send_response(&self, to: ConnectionId, service: &str, id: Option<&RawValue>, why: &Refusal) {
         if let Some(client) = self.clients.get(&to) {
-            let frame = messages::failure(service, id, &why.to_string());
+            let frame = frames::failure(service, id, &why.to_string());
             client.send(frame, Service::from_name(service));
         }
     }

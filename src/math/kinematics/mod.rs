@@ -5,7 +5,7 @@
 //!
 //! | question | function | file |
 //! | --- | --- | --- |
-//! | where is the hand? | [`forward`], [`joints`], [`heading`] | `forward.rs` |
+//! | where is the hand? | [`forward()`], [`joints`], [`heading`] | `forward.rs` |
 //! | how must the joints stand? | [`solve`] | `inverse.rs` |
 //! | which of all equal angles is meant? | [`wrap`], [`turn`], [`nearest_turn`] | `angle.rs` |
 //!
