@@ -64,9 +64,18 @@ function drawGrid(context, width, height, scale) {
       if (i % every !== 0 || edge) continue;
       context.textAlign = vertical ? "center" : "left";
       context.textBaseline = vertical ? "alphabetic" : "middle";
-      context.fillText(vertical && i === most - (most % every) ? `${label} m` : label, vertical ? at : 6, vertical ? height - 6 : at);
+      write(context, vertical && i === most - (most % every) ? `${label} m` : label, vertical ? at : 6, vertical ? height - 6 : at);
     }
   }
+}
+
+/** Text with a rim of the background, so that lines behind it do not cross it out. */
+function write(context, text, x, y) {
+  context.strokeStyle = colors.page;
+  context.lineWidth = 4;
+  context.strokeText(text, x, y);
+  context.fillText(text, x, y);
+  context.lineWidth = 1;
 }
 
 function drawGravity(context, width, gravity) {

@@ -114,7 +114,7 @@ function showTable(runs, apart) {
   const rows = [
     ["timestep", (one) => duration(one.timestep)],
     ["energy gained", (one) => `${significant(lastOf(one.energy) - one.energy[0], 3)} J`],
-    ["error", (one) => significant(worst(one.error), 3)],
+    ["largest error", (one) => `${significant(worst(one.error), 3)} rad`],
     ["evaluations", (one) => significant(one.evaluations, 6)],
     ["reckoned in", (one) => duration(one.wall_time)],
   ];

@@ -85,12 +85,13 @@ export function showValues() {
     }
   }
   setText(byId("legend-energy-value"), fixed(record.data[row + ENERGY], 3));
-  setText(byId("legend-drift"), significant(drift(), 3));
+  setText(byId("legend-drift"), significant(record.data[row + ENERGY] - reference(), 3));
 }
 
-/** Energy since the last reset, change of parameters or switching of PID [J]. */
-function drift() {
-  return state.diagnostics?.energy_drift ?? NaN;
+/** Energy at the last reset, change of parameters or switching of PID [J]: what the drift is measured from. */
+function reference() {
+  const { diagnostics } = state;
+  return diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;
 }
 
 /** At every frame; half of the charts each time, which is smooth enough and half the work. */
@@ -98,8 +99,7 @@ export function drawPlots(frame) {
   if (!stale && drawnVersion === state.version) return;
   const now = Number.isNaN(frozenAt) ? newest() : frozenAt;
   if (stale || Number.isNaN(frozenAt)) {
-    const { diagnostics } = state;
-    charts[3].reference = diagnostics ? diagnostics.energy - diagnostics.energy_drift : NaN;
+    charts[3].reference = reference();
     for (let i = 0; i < charts.length; i += 1) {
       if (stale || (i + frame) % 2 === 0) charts[i].draw(now, span, state.links, shown);
     }

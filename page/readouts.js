@@ -55,26 +55,26 @@ function runState() {
 
 /** The limit beside the timestep, and how much of it is used as a bar. */
 function showLimit() {
-  const known = Number.isFinite(limit());
-  const text = known ? duration(limit()) : state.stabilityMissing ? "not offered" : state.enabled === false ? "none (servo off)" : "–";
+  const most = limit();
+  const known = Number.isFinite(most) && most > 0;
+  const text = known ? duration(most) : most === 0 ? "no timestep" : most === Infinity ? "any timestep" : state.stabilityMissing ? "not offered" : "–";
   setText(byId("out-limit"), text);
   byId("out-limit").title = state.stabilityMissing ? "This runtime has no /study/stability (no provider)." : "Largest stable timestep, predicted at the present setpoint with the control held over each step.";
   byId("out-limit").classList.toggle("bad", exceedsLimit());
   const bar = byId("limit-bar");
   bar.hidden = !known || state.integrator == null;
-  const used = state.integrator ? state.integrator.timestep / limit() : 0;
+  const used = state.integrator ? state.integrator.timestep / most : 0;
   bar.style.setProperty("--used", `${Math.min(100, 100 * used)}%`);
   bar.className = `limit-bar ${used > 1 ? "bad" : used > 0.7 ? "warn" : "good"}`;
   bar.setAttribute("aria-label", `timestep is ${fixed(100 * used, 0)} percent of the stability limit`);
   const { stability, estimate } = state;
   const advice = [];
-  if (stability) {
-    advice.push(`Over all poses: ${duration(stability.minimum_over_poses_held ?? NaN)}.`);
-    advice.push(`With control in every stage: ${duration(stability.timestep_limit_continuous ?? NaN)}.`);
-    if (Number.isFinite(stability.advised_timestep)) advice.push(`Advised: ${duration(stability.advised_timestep)}.`);
-  }
+  if (most === 0) advice.push("Grows at every timestep, by prediction.");
+  if (stability?.minimum_over_poses_held > 0) advice.push(`Over all poses: ${duration(stability.minimum_over_poses_held)}.`);
+  if (stability?.timestep_limit_continuous > 0) advice.push(`With control in every stage: ${duration(stability.timestep_limit_continuous)}.`);
+  if (stability?.advised_timestep > 0) advice.push(`Advised: ${duration(stability.advised_timestep)}.`);
   setText(byId("limit-text"), advice.join(" "));
-  setText(byId("out-error"), estimate ? `${significant(estimate.error_per_second, 2)}/s` : "–");
+  setText(byId("out-error"), estimate ? `${significant(estimate.error_per_second, 2)} rad/s` : "–");
 }
 
 /** The arm in a sentence, for those who can't see it; read when the view has the focus. */

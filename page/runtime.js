@@ -15,6 +15,7 @@ let bridge;
 let arrived = 0; // joint states since the last reckoning of the rate
 let counted = performance.now();
 let missingPolls = 0;
+let answeredQuestion = "";
 let onReset = () => {};
 
 export function start(whenReset) {
@@ -37,6 +38,8 @@ function connection(now) {
   set("connection", now);
   if (now === "open") {
     missingPolls = 0;
+    answeredQuestion = "";
+    set("stabilityMissing", false);
     set("goal", null);
     set("trial", null);
     set("estimate", null);
@@ -188,10 +191,19 @@ export function sendSetpoint(positions) {
   });
 }
 
+/** What the limit depends on; the timestep is not among it. Reckoning it takes a while, so it is asked for only when this changes. */
+function stabilityQuestion() {
+  const { integrator, gains, params, enabled, setpoint, setpointKnown } = state;
+  return JSON.stringify([integrator?.method, gains, params, enabled, setpointKnown && Array.from(setpoint)]);
+}
+
 async function askStability() {
   if (state.stabilityMissing && (missingPolls += 1) % MISSING_POLLS !== 0) return;
+  const question = stabilityQuestion();
+  if (question === answeredQuestion) return;
   const answer = await bridge.call("/study/stability");
   const missing = nobodyProvides(answer);
+  if (answer.result) answeredQuestion = question;
   if (missing !== state.stabilityMissing) set("stabilityMissing", missing);
   keep("stability", answer.result ? answer.values : null);
 }

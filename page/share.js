@@ -20,7 +20,8 @@ function list(values) {
   return values.map(plain).join(",");
 }
 
-function address() {
+/** The page's address with the present settings behind the #. */
+export function address() {
   const { integrator, params, gains } = state;
   const parts = [
     ["links", state.links], ["method", integrator.method], ["timestep", plain(integrator.timestep)], ["gravity", plain(params.gravity)],

@@ -184,9 +184,16 @@ class Page:
         self.mouse("mouseReleased", x, y)
 
     def place(self, selector):
-        box = self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}});"
-                       " const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
-        return box[0], box[1]
+        """The middle of the element, once it has come to rest."""
+        before = None
+        for _ in range(50):
+            box = self.run(f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.scrollIntoView({{block: 'center'}});"
+                           " const b = e.getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()")
+            if box == before:
+                return box[0], box[1]
+            before = box
+            time.sleep(0.05)
+        raise AssertionError(f"{selector} does not come to rest")
 
     def mouse(self, kind, x, y, shift=False):
         held = kind != "mouseReleased"

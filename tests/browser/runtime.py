@@ -9,6 +9,7 @@ import os
 import signal
 import socket
 import subprocess
+import threading
 
 BINARY = os.environ.get("PENDULARM", "target/debug/pendularm")
 
@@ -84,3 +85,34 @@ class Runtime:
 
     def tip(self):
         return self.joints()[-1]
+
+
+class Provider:
+    """A client that provides services, each a function from arguments to values; use it with `with`."""
+
+    def __init__(self, port, services):
+        self.tcp = socket.create_connection(("127.0.0.1", port), 5)
+        self.tcp.settimeout(None)
+        self.lines = self.tcp.makefile("rw")
+        self.services = services
+        for name in services:
+            self.lines.write(json.dumps({"op": "advertise_service", "service": name}) + "\n")
+        self.lines.flush()
+        threading.Thread(target=self._answer, daemon=True).start()
+
+    def _answer(self):
+        for line in self.lines:
+            call = json.loads(line)
+            if call["op"] != "call_service":
+                continue
+            values = self.services[call["service"]](call["args"])
+            answer = {"op": "service_response", "service": call["service"], "id": call["id"], "values": values, "result": True}
+            self.lines.write(json.dumps(answer) + "\n")
+            self.lines.flush()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.tcp.shutdown(socket.SHUT_RDWR)
+        self.tcp.close()

@@ -4,6 +4,7 @@ import http.server
 import json
 import threading
 
+from runtime import Runtime
 from stage import FOREIGN, PageTest, browser
 
 # Tries everything that a page can do to another address; none of it throws, all of it is told.
@@ -47,6 +48,25 @@ class Reconnecting(PageTest):
         self.runtime.restart(links=3)
         self.connected(links=3)
         self.page.until("document.querySelectorAll('#masses-fields .field').length === 3")
+
+
+class Token(PageTest):
+    options = ("--token", "open-sesame-and-some-more")
+
+    def setUp(self):
+        self.runtime = Runtime(*self.options)
+        self.addCleanup(self.runtime.__exit__)
+
+    def test_a_page_opened_with_the_token_connects_and_shares_links_without_it(self):
+        page = self.open(f"?token={self.options[1]}")
+        page.click("#share")
+        page.until("location.hash !== ''")
+        self.assertNotIn("sesame", page.run("import('/share.js').then((share) => share.address())"))
+
+    def test_a_page_opened_without_it_is_turned_away(self):
+        page = browser().page(self.runtime.url)
+        self.addCleanup(page.close)
+        self.assertEqual(page.run("document.querySelector('#arm')"), None)
 
 
 class Foreigners(PageTest):

@@ -2,9 +2,32 @@
 
 import math
 
+from runtime import Provider
 from stage import PageTest
 
 NUMBER = "input[type=number]"
+
+
+def stability(_):
+    """Limits as the study would answer them; the numbers are made up."""
+    return {"timestep_limit_held": 0.018, "timestep_limit_continuous": 0.024, "minimum_over_poses_held": 0.009,
+            "minimum_over_poses_continuous": 0.012, "advised_timestep": 0.004}
+
+
+def rollout(args):
+    """A swing as the study would answer it, made up; Euler's grows."""
+    count = round(args["duration"] / args["timestep"])
+    times = [k * args["timestep"] for k in range(0, count + 1, max(1, count // (args["samples"] - 1)))]
+    growth = 0.2 if args["integrator"] == "euler" else 0.0
+    joints = range(len(args["q0"]))
+    phase = [[(2 + i) * t for i in joints] for t in times]
+    return {
+        "times": times,
+        "positions": [[math.exp(growth * t) * math.cos(a) - 1.5 for a in p] for t, p in zip(times, phase)],
+        "velocities": [[math.exp(growth * t) * (growth * math.cos(a) - (2 + i) * math.sin(a)) for i, a in enumerate(p)] for t, p in zip(times, phase)],
+        "efforts": [[0 for _ in joints] for _ in times], "energy": [growth * t for t in times],
+        "evaluations": count, "wall_time": 1e-3, "error": growth,
+    }
 
 
 class Controls(PageTest):
@@ -124,18 +147,31 @@ class Controls(PageTest):
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
         self.page.until("!document.querySelector('#stage').classList.contains('diverged')")
 
-    def test_a_timestep_above_the_stability_limit_is_warned_of(self):
+    def study(self):
+        """The study's services: the runtime's own, or a stand-in's of the same fields where it has none."""
         if not self.runtime.offers("/study/stability"):
             self.assertEqual(self.page.until("document.querySelector('#out-limit').textContent"), "not offered")
-            return
+            self.page.click("#compare-form button")
+            self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('no provider')")
+            provider = Provider(self.runtime.port, {"/study/stability": stability, "/study/rollout": rollout})
+            self.addCleanup(provider.__exit__)
+            self.page.go(self.runtime.url)  # a page asks again only now and then
+            self.connected()
+
+    def test_a_timestep_above_the_stability_limit_is_warned_of(self):
+        self.study()
         self.page.click("#servo")
+        self.page.until("document.querySelector('#out-servo').textContent === 'on'")
         limit = self.runtime.call("/study/stability")["values"]["timestep_limit_held"]
         self.runtime.call("/arm_sim/pause", data=True)
+        self.page.until("document.querySelector('#limit-bar').className === 'limit-bar good'")
         self.runtime.call("/arm_sim/set_integrator", timestep=2 * limit)
         self.page.until("document.querySelector('#notice').textContent.includes('above the predicted stability limit')")
         self.assertTrue(self.page.run("document.querySelector('#out-limit').classList.contains('bad')"))
+        self.keep("limit")
         self.page.click("#notice button")
         self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] < limit, "the advised timestep")
+        self.page.until("document.querySelector('#notice').hidden")
 
     # Trial
 
@@ -163,18 +199,28 @@ class Controls(PageTest):
     # Comparison
 
     def test_two_integrators_are_compared(self):
+        self.study()
         self.page.click("#compare-form button")
-        if not self.runtime.offers("/study/rollout"):
-            self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('no provider')")
-            return
         self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
         self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 20, "played to its end")
         picture = self.image("#compare-arm")
         for side in ("first", "second"):
             self.assertGreater(picture.count(self.color(side)), 200, side)
         self.assertGreater(self.image("#compare-chart").count(self.color("ink"), 60), 50)
-        self.assertRegex(self.page.text("#compare-text"), r"^At the end the tips are [\d.]+")
-        self.keep("compare")
+        self.assertRegex(self.page.text("#compare-text"), r"^At the end the tips are [\d.e\u2212]+ m apart")
+        rows = self.page.run("[...document.querySelectorAll('#compare-table tbody th')].map((one) => one.textContent)")
+        self.assertEqual(rows, ["timestep", "energy gained", "largest error", "evaluations", "reckoned in"])
+        self.keep("compare", whole=True)
+
+    def test_runs_of_different_timesteps_meet_at_common_instants(self):
+        common = "import('/resample.js').then(({ commonSamples }) => commonSamples(%s))"
+        # 5 s in 500 steps of 10 ms, which 1 ms divides; 4 s in 400; nothing fits both 10 ms and 7 ms in 5 s.
+        self.assertEqual(self.page.run(common % "5, [0.01, 0.001]"), 501)
+        self.assertEqual(self.page.run(common % "4, [0.01, 0.005]"), 401)
+        self.assertEqual(self.page.run(common % "5, [0.01, 0.007]"), 601)
+        # Between samples a cubic is met exactly, by its values and slopes at both ends: t^3 at 0.25.
+        value = self.page.run("import('/resample.js').then(({ resample }) => resample({ times: [0, 1], positions: [[0], [1]], velocities: [[0], [3]] }, [0.25, 1, 2]))")
+        self.assertEqual(value, [[0.25 ** 3], [1], None])
 
     # Keys
 
@@ -193,8 +239,9 @@ class Controls(PageTest):
 
     def test_q_and_e_move_the_setpoint_of_the_chosen_joint(self):
         self.page.click("#servo")
+        self.wait(lambda: self.time() > 1, "a second")
         self.page.click("#reset")
-        self.wait(lambda: self.time() < 1, "reset")
+        self.page.until("document.querySelector('#announce-polite').textContent.startsWith('Reset')")
         self.page.key("j")
         for _ in range(3):
             self.page.key("e")

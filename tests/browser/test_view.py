@@ -48,7 +48,24 @@ class View:
             self.assertEqual((width, height), (shown_width * self.view.get("density", 1), shown_height * self.view.get("density", 1)))
 
 
-class TwoLinks(View, PageTest):
+class Sums:
+    """What the page reckons for its plots, against the runtime."""
+
+    def test_energy_and_gravity_load_are_those_of_the_runtime(self):
+        self.settle(self.pose())
+        self.page.until("import('/store.js').then(({ state }) => state.paused && state.diagnostics?.state === 'paused')")
+        load, energy, told = self.page.run("""Promise.all([import('/recorder.js'), import('/store.js')]).then(([r, { state }]) => {
+            const row = r.record.last();
+            return [[...r.record.data.slice(row + r.LOAD, row + r.LOAD + state.links)], r.record.data[row + r.ENERGY], state.diagnostics.energy];
+        })""")
+        # The same state and the same formula: all digits but the last few.
+        self.assertAlmostEqual(energy, told, delta=1e-9 * max(1, abs(told)))
+        # At rest the effort is the gravity load; the arm is within 2 mrad and slower than a crawl.
+        for effort, held in zip(self.runtime.next("/joint_states")["effort"], load):
+            self.assertAlmostEqual(effort, held, delta=1.0)
+
+
+class TwoLinks(View, Sums, PageTest):
     def test_a_goal_shows_its_target_and_says_when_it_is_reached(self):
         self.assertLess(self.image("#arm").count(self.color("target")), 5)
         self.runtime.call("/ik_action/send_goal", x=0.4, y=1.1)
@@ -86,7 +103,19 @@ class TwoLinks(View, PageTest):
         self.assertTrue(self.page.run("window.saved[1].startsWith('blob:')"))
 
 
-class ThreeLinks(View, PageTest):
+    def test_an_hour_would_take_no_more_than_ten_megabytes(self):
+        # Warm first: what is compiled and cached once is no growth. Then half a minute, at 10 MB an hour, is 83 kB.
+        def heap():
+            self.page.run("gc()")
+            return self.page.run("performance.memory.usedJSHeapSize")
+
+        self.page.run("new Promise((done) => setTimeout(done, 15000))")
+        before = heap()
+        self.page.run("new Promise((done) => setTimeout(done, 30000))")
+        self.assertLess(heap() - before, 83_000)
+
+
+class ThreeLinks(View, Sums, PageTest):
     links = 3
 
 
