@@ -50,15 +50,19 @@ function drawGrid(context, width, height, scale) {
   context.font = LABEL;
   context.fillStyle = colors.muted;
   context.lineWidth = 1;
-  for (const [size, vertical] of [[width, true], [height, false]]) {
+  // All lines first, so that none crosses out a label.
+  for (const [labels, size, vertical] of [[false, width, true], [false, height, false], [true, width, true], [true, height, false]]) {
     const most = Math.floor(size / 2 / scale / metres);
     for (let i = -most; i <= most; i += 1) {
       const at = Math.round(size / 2 + (vertical ? i : -i) * metres * scale) + 0.5;
-      context.strokeStyle = i === 0 ? colors.line : colors.grid;
-      context.beginPath();
-      context.moveTo(vertical ? at : 0, vertical ? 0 : at);
-      context.lineTo(vertical ? at : width, vertical ? height : at);
-      context.stroke();
+      if (!labels) {
+        context.strokeStyle = i === 0 ? colors.line : colors.grid;
+        context.beginPath();
+        context.moveTo(vertical ? at : 0, vertical ? 0 : at);
+        context.lineTo(vertical ? at : width, vertical ? height : at);
+        context.stroke();
+        continue;
+      }
       const label = fixed(i * metres, digits);
       const edge = at < 24 || at > size - 24;
       if (i % every !== 0 || edge) continue;

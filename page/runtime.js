@@ -131,7 +131,8 @@ function goalResult(msg) {
 
 function poll() {
   const now = performance.now();
-  set("rate", (arrived * 1000) / Math.max(1, now - counted));
+  const rate = (arrived * 1000) / Math.max(1, now - counted);
+  set("rate", state.rate > 0 && arrived > 0 ? (state.rate + rate) / 2 : rate); // timers come and go by some milliseconds
   arrived = 0;
   counted = now;
   if (!bridge.open || document.hidden) return;

@@ -93,22 +93,22 @@ class Provider:
     def __init__(self, port, services):
         self.tcp = socket.create_connection(("127.0.0.1", port), 5)
         self.tcp.settimeout(None)
-        self.lines = self.tcp.makefile("rw")
+        # For reading only: writing through the same object would drop the lines that it has read ahead.
+        self.lines = self.tcp.makefile("r")
         self.services = services
         for name in services:
-            self.lines.write(json.dumps({"op": "advertise_service", "service": name}) + "\n")
-        self.lines.flush()
+            self._send({"op": "advertise_service", "service": name})
         threading.Thread(target=self._answer, daemon=True).start()
+
+    def _send(self, frame):
+        self.tcp.sendall(json.dumps(frame).encode() + b"\n")
 
     def _answer(self):
         for line in self.lines:
             call = json.loads(line)
-            if call["op"] != "call_service":
-                continue
-            values = self.services[call["service"]](call["args"])
-            answer = {"op": "service_response", "service": call["service"], "id": call["id"], "values": values, "result": True}
-            self.lines.write(json.dumps(answer) + "\n")
-            self.lines.flush()
+            if call["op"] == "call_service":
+                values = self.services[call["service"]](call["args"])
+                self._send({"op": "service_response", "service": call["service"], "id": call["id"], "values": values, "result": True})
 
     def __enter__(self):
         return self
