@@ -27,6 +27,7 @@ lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --no-default-features -- -D warnings
 
 # Private items are documented too, for whoever reads the source, so links to them are as good as any.
 doc: ## Build the documentation; any warning fails
