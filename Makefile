@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test lint doc report clean vendor submission test-submission
+.PHONY: help build run test test-browser lint doc report clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -19,14 +19,19 @@ run: build ## Build, then serve clients in the foreground until SIGINT or SIGTER
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
-test: ## Run every test
+test: ## Run every test but those of the page
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) test --locked
+
+test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
+	@echo "make test-browser: the page in headless Chromium"
+	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --no-default-features -- -D warnings
 
 # Private items are documented too, for whoever reads the source, so links to them are as good as any.
 doc: ## Build the documentation; any warning fails

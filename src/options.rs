@@ -7,24 +7,24 @@
 //!
 //! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
 
+mod report;
 mod usage;
 #[cfg(feature = "web")]
 mod web;
 
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-use std::path::PathBuf;
 
 use clap::builder::{OsStringValueParser, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Arg, ArgAction, ArgMatches, Command};
+use clap::{Arg, ArgMatches, Command};
 use tracing::level_filters::LevelFilter;
 
 pub use self::usage::{Origin, UsageError};
 #[cfg(feature = "web")]
 pub use self::web::WebOptions;
 use crate::protocol::token::Token;
-use crate::report::{self, ReportOptions};
+use crate::report::ReportOptions;
 
 /// Where the runtime listens unless told otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
@@ -40,8 +40,6 @@ const LEVELS: [(&str, LevelFilter); 6] = [
     ("trace", LevelFilter::TRACE),
 ];
 
-/// The subcommand that makes the study's report, and the directory that it writes to unless told otherwise.
-const REPORT: &str = "report";
 /// What this build has, as the version says it.
 const BUILD: &str = if cfg!(feature = "web") {
     concat!(env!("CARGO_PKG_VERSION"), " (web)")
@@ -217,14 +215,14 @@ impl Options {
             Ok(matches) => matches,
             Err(error) => return told(&error),
         };
-        if let Some(report) = matches.subcommand_matches(REPORT) {
+        if let Some(report) = matches.subcommand_matches(report::NAME) {
             // What serving is told means nothing to a report.
             if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
                 return Err(UsageError::UnknownArgument {
                     argument: format!("--{}", stray.option),
                 });
             }
-            return Ok(Parsed::Report(read_report(report)));
+            return Ok(Parsed::Report(report::read(report)));
         }
         let given = |setting: &Setting| given(setting, &matches, &environment);
         let token = given(&TOKEN).map(read_token).transpose()?;
@@ -283,53 +281,7 @@ fn command() -> Command {
         .after_help(format!("{DOORS}\n{AFTER_HELP}"))
         .args(options)
         .disable_help_subcommand(true)
-        .subcommand(report_command())
-}
-
-fn report_command() -> Command {
-    let option = |name: &'static str, value: &'static str, about: String| {
-        Arg::new(name).long(name).value_name(value).help(about)
-    };
-    Command::new(REPORT)
-        .about("Measure error against run time and stability, and write a page about it")
-        .arg(
-            option(
-                "out",
-                "DIRECTORY",
-                "Where to write it [default: report]".to_owned(),
-            )
-            .value_parser(OsStringValueParser::new()),
-        )
-        .arg(
-            option(
-                "only",
-                "NAMES",
-                format!(
-                    "Make these sections anew, keep the others: {}",
-                    report::names()
-                ),
-            )
-            .value_delimiter(','),
-        )
-        .arg(
-            Arg::new("quick")
-                .long("quick")
-                .action(ArgAction::SetTrue)
-                .help("Coarser and shorter: a look in seconds"),
-        )
-}
-
-fn read_report(matches: &ArgMatches) -> ReportOptions {
-    ReportOptions {
-        out: matches
-            .get_one::<OsString>("out")
-            .map_or_else(|| PathBuf::from(REPORT), PathBuf::from),
-        only: matches
-            .get_many::<String>("only")
-            .map(|names| names.cloned().collect())
-            .unwrap_or_default(),
-        quick: matches.get_flag("quick"),
-    }
+        .subcommand(report::command())
 }
 
 /// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
