@@ -73,7 +73,7 @@ impl<const N: usize> Setting<N> {
         })
     }
 
-    /// Whether a small deviation from the equilibrium has less energy at the end of [`STEPS`] steps of `timestep` \[s\] than
+    /// Whether a small deviation from the equilibrium has less energy at the end of 4000 steps of `timestep` \[s\] than
     /// soon after their beginning.
     #[must_use]
     pub fn decays(&self, timestep: f64) -> bool {
