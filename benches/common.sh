@@ -32,7 +32,7 @@ environment() {
     echo "date:      $(date -u +%FT%TZ)"
     echo "commit:    $(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)"
     echo "processor: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1), $(getconf _NPROCESSORS_ONLN) cores"
-    echo "system:    $(uname -sr)"
+    echo "system:    $(uname -s) $(uname -r | cut -d- -f1)"
     echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the release profile"
     echo "load:      $(cut -d' ' -f1-3 /proc/loadavg 2>/dev/null || uptime) (1, 5, 15 minutes, at the start)"
 }

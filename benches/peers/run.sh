@@ -59,6 +59,13 @@ folder=$(results_folder)/peers
 rm -rf "$folder"
 mkdir -p "$folder"
 cd "$folder"
+{
+    environment "make bench-peers"
+    echo "compilers: $("$cc" --version | head -n 1); $("$cxx" --version | head -n 1)"
+    echo "peers:     $(sed -n '/^libpinocchio\|^cmeel-eigen\|^mujoco/p' "$here/requirements.txt" | paste -sd ' ')"
+    echo "flags:     wheel: -O3; native, mujoco: -O3 -march=native; the wheels' libraries as they come"
+    echo "passes:    $passes, one pinned core, every program in turn"
+} >environment.txt
 
 # Runs a system by its name in the tables: $1 name, $2 links, $3 check or time.
 system() {
@@ -92,10 +99,7 @@ for ((pass = 1; pass <= passes; pass++)); do
     done
 done
 {
-    environment "make bench-peers"
-    echo "compilers: $("$cc" --version | head -n 1); $("$cxx" --version | head -n 1)"
-    echo "peers:     $(sed -n '/^libpinocchio\|^cmeel-eigen\|^mujoco/p' "$here/requirements.txt" | tr '\n' ' ')"
-    echo "passes:    $passes, one pinned core, every program in turn"
+    cat environment.txt
     echo
     "$built/peers" compare .
 } | tee summary.txt
