@@ -96,7 +96,11 @@ fn main() {
         "{:28}{:>26}{:>26}{:>26}",
         "ms", "alone", "a core spins", "a client computes"
     );
-    println!("{:28}{}", "", "     p50     p99     max  ".repeat(3));
+    println!(
+        "{:28}{}",
+        "",
+        "     p50     p99     max  ".repeat(3).trim_end()
+    );
     show("call, every 2 ms", &mut phases, |phase| &mut phase.calls);
     show("/joint_states, delay", &mut phases, |phase| {
         &mut phase.states
@@ -108,7 +112,7 @@ fn main() {
         let cells = phases
             .each_ref()
             .map(|phase| format!("{:24.4}  ", of(phase)));
-        println!("{what:28}{}", cells.concat());
+        println!("{what:28}{}", cells.concat().trim_end());
     };
     line("longest step, /diagnostics", |phase| phase.step_time * 1e3);
     line("least real-time factor", |phase| phase.real_time);
@@ -133,13 +137,13 @@ fn quantile(samples: &mut [f64], part: f64) -> f64 {
 }
 
 fn show(what: &str, phases: &mut [Phase], samples: fn(&mut Phase) -> &mut Vec<f64>) {
-    print!("{what:28}");
+    let mut line = format!("{what:28}");
     for phase in phases {
         let samples = samples(phase);
         let [half, most, all] = [0.5, 0.99, 1.0].map(|part| quantile(samples, part));
-        print!("{half:8.3}{most:8.3}{all:8.3}  ");
+        line += &format!("{half:8.3}{most:8.3}{all:8.3}  ");
     }
-    println!();
+    println!("{}", line.trim_end());
 }
 
 fn watch(program: &str, length: Duration, beside: Beside) -> Phase {
