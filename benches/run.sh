@@ -46,8 +46,8 @@ roundtrips() {
 # Figures next to what they should be. "Missed" may be the machine's doing: see the load, and what fairness measures alone.
 summary() {
     awk -v folder="$folder" '
-        function verdict(name, figure, bar, good) { printf "%-46s %10s   %-22s %s\n", name, figure, bar, good ? "" : "MISSED" }
-        function past(name) { file = folder "/" name ".txt" }
+        function verdict(name, figure, bar, good) { printf "%-62s %10s   %-18s  %s\n", name, figure, bar, good ? "held" : "MISSED" }
+        function past(name) { file = folder "/" name ".txt" } # a part that has run
         BEGIN {
             past("roundtrip"); least = 1e9
             while ((getline line < file) > 0) if (split(line, x, " ") && line ~ /^ratio of medians/) {
