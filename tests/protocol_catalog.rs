@@ -176,13 +176,14 @@ fn one_service_computes_and_six_take_all_or_nothing() {
 fn a_name_leads_back_to_what_it_names() {
     for topic in Topic::ALL {
         assert_eq!(Topic::from_name(topic.name()), Some(topic));
+        assert_eq!(Topic::from_name(topic.short_name()), Some(topic));
         assert_eq!(Service::from_name(topic.name()), None);
     }
     for service in Service::ALL {
         assert_eq!(Service::from_name(service.name()), Some(service));
         assert_eq!(Topic::from_name(service.name()), None);
     }
-    for other in ["", "/", "joint_states", "/joint_states/", "/arm_sim"] {
+    for other in ["", "/", "//joint_states", "/joint_states/", "/arm_sim"] {
         assert_eq!(Topic::from_name(other), None);
         assert_eq!(Service::from_name(other), None);
     }
@@ -228,7 +229,14 @@ fn every_node_has_a_name_of_its_own() {
     let names: HashSet<&str> = Node::ALL.iter().map(|node| node.name()).collect();
     assert_eq!(
         names,
-        HashSet::from(["arm_sim", "ik", "ik_action", "ik_trial", "gateway"])
+        HashSet::from([
+            "arm_sim",
+            "ik",
+            "ik_action",
+            "ik_trial",
+            "gateway",
+            "rosapi"
+        ])
     );
     assert_eq!(Topic::JointStates.owner(), Node::ArmSim);
     assert_eq!(Service::TrialStop.owner(), Node::IkTrial);

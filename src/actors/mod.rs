@@ -6,7 +6,7 @@
 //!  listener ───────────▶ connection ───────────────────────▶ registry ──────────────────────────────────────▶ nodes
 //!                        (one per client)                     (one)                                       arm_sim (own thread)
 //!                            ▲     Deliver, Answer, Finish      │ ▲         Publish, Respond             integration (worker pool)
-//!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial
+//!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial, rosapi
 //! ```
 //!
 //! | message | from | to | meaning |
@@ -24,6 +24,8 @@
 //! | [`arm_sim::GoalJudged`] | `arm_sim` | `ik_action` | progress of a goal, or how it ended |
 //! | [`ik_action::SendGoal`] / [`ik_action::CancelGoal`] | `ik_trial` | `ik_action` | what clients ask by services |
 //! | [`ik_action::GoalNews`] | `ik_action` | `ik_trial` | what clients hear by topics |
+//! | [`registry::TakeCensus`] | rosapi | registry | which topics and services clients have |
+//! | [`arm_sim::SimulationTime`] | rosapi | `arm_sim` | the time |
 //! | [`connection::Deliver`] / [`connection::Answer`] / [`connection::Finish`] | registry | connection | bytes to send; the end |
 //!
 //! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
@@ -39,6 +41,7 @@ pub mod integration;
 pub mod listener;
 pub mod node;
 pub mod registry;
+pub mod rosapi;
 pub mod runtime;
 pub mod workers;
 

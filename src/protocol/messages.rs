@@ -202,6 +202,26 @@ pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
         .end()
 }
 
+/// A frame that [`publish`] has made for `topic`, for those who know it by another spelling.
+#[must_use]
+pub fn respelled(topic: &str, spelling: &str, frame: &[u8]) -> Bytes {
+    let msg = message_text(topic, frame);
+    let mut line = Line::with_room("publish", frame.len()).text("topic", spelling);
+    line.key("msg");
+    line.text.extend_from_slice(msg);
+    line.end()
+}
+
+/// The message within a frame that [`publish`] has made for `topic`, as JSON.
+#[must_use]
+pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
+    // Names of ours have nothing to be escaped.
+    let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":".len() + topic.len();
+    let msg = frame.get(head..frame.len().saturating_sub("}\n".len()));
+    debug_assert!(msg.is_some(), "{topic} is not what this frame is about");
+    msg.unwrap_or(b"null")
+}
+
 /// The answer to a service call; `values` is an object, `status` empty on success.
 #[must_use]
 pub fn response(

@@ -117,6 +117,11 @@ impl<const N: usize> ArmSim<N> {
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
+/// What time it is in the simulation \[s\]. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "f64")]
+pub struct SimulationTime;
+
 /// Which simulation an offline observer would have to run to get the present state. From tests and tools.
 #[derive(Message)]
 #[rtype(result = "Snapshot<N>")]
@@ -190,6 +195,15 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
 
     fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
         self.telemetry.set_wanted(interest.topic, interest.wanted);
+    }
+}
+
+impl<const N: usize> Handler<SimulationTime> for ArmSim<N> {
+    type Result = f64;
+
+    fn handle(&mut self, _: SimulationTime, ctx: &mut Context<Self>) -> f64 {
+        self.advance_to_now(ctx);
+        self.simulation.time()
     }
 }
 

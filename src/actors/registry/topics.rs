@@ -11,6 +11,7 @@ use actix::prelude::*;
 
 use crate::actors::ConnectionId;
 use crate::actors::connection::Deliver;
+use crate::protocol::names;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -48,14 +49,14 @@ pub(super) struct Subscriber {
     pub(super) outlet: Recipient<Deliver>,
 }
 
-/// Every topic that somebody subscribes to.
+/// Every topic that somebody subscribes to, by the spelling that the subscriber used.
 #[derive(Default)]
 pub(super) struct Topics {
     subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
 }
 
 impl Topics {
-    /// Adds a subscriber. Gives the topic's shared name, and whether it is the topic's first.
+    /// Adds a subscriber under its spelling of the topic. Gives the spelling, shared, and whether that is new to this subscriber.
     pub(super) fn add(
         &mut self,
         topic: &str,
@@ -67,27 +68,30 @@ impl Topics {
             .get_key_value(topic)
             .map_or_else(|| Arc::from(topic), |(name, _)| Arc::clone(name));
         let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
-        let first = subscribers.is_empty();
-        if !subscribers.iter().any(|one| one.connection == connection) {
+        let new = !subscribers.iter().any(|one| one.connection == connection);
+        if new {
             subscribers.push(Subscriber { connection, outlet });
         }
-        (name, first)
+        (name, new)
     }
 
-    /// Removes a subscriber; true if it was the topic's last.
-    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) -> bool {
+    /// Removes a subscriber.
+    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
         let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
-            return false;
+            return;
         };
         entry.get_mut().retain(|one| one.connection != connection);
-        let last = entry.get().is_empty();
-        if last {
+        if entry.get().is_empty() {
             entry.remove();
         }
-        last
     }
 
-    /// The topic's shared name and its subscribers, if it has any.
+    /// Whether anybody subscribes to the topic of that absolute name, under whichever spelling.
+    pub(super) fn has_subscribers(&self, topic: &str) -> bool {
+        names::spellings(topic).any(|spelling| self.subscribers.contains_key(spelling))
+    }
+
+    /// A spelling, shared, and those who subscribed with it, if there are any.
     pub(super) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
         self.subscribers
             .get_key_value(topic)

@@ -3,6 +3,7 @@
 //! **Invariant:** a topic without an entry does not compile.
 
 use super::{Direction, Field, Node, optional, required};
+use crate::protocol::names;
 
 /// A topic of the runtime's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -53,9 +54,16 @@ impl Topic {
         self.entry().name
     }
 
-    /// The topic of that name, if it is the runtime's own.
+    /// The same without its leading slash, as some clients spell it.
+    #[must_use]
+    pub const fn short_name(self) -> &'static str {
+        self.entry().name.split_at(1).1
+    }
+
+    /// The topic of that name, if it is the runtime's own; the leading slash may be left out.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
+        let name = names::absolute(name);
         Self::ALL.into_iter().find(|topic| topic.name() == name)
     }
 
