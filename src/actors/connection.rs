@@ -53,13 +53,15 @@ pub const LINGER: Duration = Duration::from_secs(5);
 pub const ANSWERS_OWED: Duration = Duration::from_secs(15);
 
 /// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
-const ARM_STATE: [&str; 6] = [
+const ARM_STATE: [&str; 8] = [
     Topic::JointStates.name(),
     Topic::JointStates.short_name(),
     Topic::Clock.name(),
     Topic::Clock.short_name(),
     Topic::Diagnostics.name(),
     Topic::Diagnostics.short_name(),
+    Topic::Tf.name(),
+    Topic::Tf.short_name(),
 ];
 
 // ---- state ----------------------------------------------------------------------------------------------------------

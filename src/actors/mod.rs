@@ -25,7 +25,7 @@
 //! | [`ik_action::SendGoal`] / [`ik_action::CancelGoal`] | `ik_trial` | `ik_action` | what clients ask by services |
 //! | [`ik_action::GoalNews`] | `ik_action` | `ik_trial` | what clients hear by topics |
 //! | [`registry::TakeCensus`] | rosapi | registry | which topics and services clients have |
-//! | [`arm_sim::SimulationTime`] | rosapi | `arm_sim` | the time |
+//! | [`arm_sim::SimulationTime`] | rosapi, rosout | `arm_sim` | the time |
 //! | [`connection::Deliver`] / [`connection::Answer`] / [`connection::Finish`] | registry | connection | bytes to send; the end |
 //!
 //! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
@@ -42,6 +42,7 @@ pub mod listener;
 pub mod node;
 pub mod registry;
 pub mod rosapi;
+pub mod rosout;
 pub mod runtime;
 pub mod workers;
 

@@ -26,6 +26,7 @@ use super::integration::Integration;
 use super::listener::{Listener, StopListening};
 use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
 use super::rosapi::Rosapi;
+use super::rosout::Rosout;
 use super::workers::WorkerPool;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -163,6 +164,8 @@ fn start_nodes<const N: usize>(
         &joint_names::<N>(),
     );
     Rosapi::attach(&introspection.start(), nodes);
+    let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
+    Rosout::attach(&rosout.start(), nodes);
 
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();

@@ -204,7 +204,10 @@ pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
 
 /// A frame that [`publish`] has made for `topic`, for those who know it by another spelling.
 #[must_use]
-pub fn respelled(topic: &str, spelling: &str, frame: &[u8]) -> Bytes {
+pub fn respelled(topic: &str, spelling: &str, frame: &Bytes) -> Bytes {
+    if topic == spelling {
+        return frame.clone();
+    }
     let msg = message_text(topic, frame);
     let mut line = Line::with_room("publish", frame.len()).text("topic", spelling);
     line.key("msg");

@@ -15,6 +15,7 @@ pub mod opening;
 pub mod outbox;
 pub mod parameters;
 pub mod rosapi;
+pub mod scene_messages;
 pub mod streamed;
 mod text;
 mod throttle;

@@ -60,6 +60,8 @@ pub struct Registry {
     topics: Topics,
     services: Services,
     nodes: Nodes,
+    /// The last message of each latched topic that has subscribers.
+    latched: HashMap<Topic, Bytes>,
     /// What clients use and provide, for those who ask what there is.
     tally: Tally,
     gauges: Arc<Gauges>,
@@ -103,6 +105,7 @@ impl Registry {
             topics: Topics::default(),
             services: Services::default(),
             nodes: Nodes::default(),
+            latched: HashMap::new(),
             tally: Tally::default(),
             gauges,
             connections_made: 0,
@@ -191,12 +194,11 @@ impl Handler<Publish> for Registry {
     fn handle(&mut self, message: Publish, _: &mut Context<Self>) {
         let topic = message.topic.name();
         self.fan_out(topic, |spelling| {
-            if spelling == topic {
-                message.frame.clone()
-            } else {
-                frames::respelled(topic, spelling, &message.frame)
-            }
+            frames::respelled(topic, spelling, &message.frame)
         });
+        if message.topic.is_latched() && self.topics.has_subscribers(topic) {
+            self.latched.insert(message.topic, message.frame);
+        }
         if let Some(msg) = message.msg
             && let Some(listener) = self.nodes.listeners.get(&message.topic)
         {
@@ -332,6 +334,9 @@ impl Registry {
         self.topics.remove(topic, connection);
         self.tally.remove(&name, Use::Subscribed);
         if !self.topics.has_subscribers(&name) {
+            if let Some(topic) = Topic::from_name(topic) {
+                self.latched.remove(&topic);
+            }
             self.tell_owner(topic, false);
         }
     }

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -18,7 +19,7 @@ use super::{
     Registry, Request, TimedOut,
 };
 use crate::actors::ConnectionId;
-use crate::actors::connection::Configure;
+use crate::actors::connection::{Configure, Deliver};
 use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Direction, Service, Topic};
 use crate::protocol::messages::{self, Level};
@@ -196,6 +197,7 @@ impl Registry {
             queue_length: subscribe.queue_length,
         });
         let throttle = Throttle::of(subscriptions);
+        let shared = Arc::clone(&name);
         client.outlets.configure.do_send(Configure {
             topic: name,
             throttle,
@@ -205,8 +207,22 @@ impl Registry {
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_deref());
         if first {
             self.tell_owner(topic, true);
+        } else if new {
+            self.deliver_latched(&shared, origin.from);
         }
         Ok(())
+    }
+
+    /// A topic's last message, if that is kept, to a subscriber who came after it.
+    fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
+        let latched = Topic::from_name(spelling)
+            .and_then(|topic| Some((topic, self.latched.get(&topic)?, self.clients.get(&to)?)));
+        if let Some((topic, frame, client)) = latched {
+            client.outlets.deliver.do_send(Deliver {
+                topic: Arc::clone(spelling),
+                frame: messages::respelled(topic.name(), spelling, frame),
+            });
+        }
     }
 
     fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
