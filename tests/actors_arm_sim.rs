@@ -173,6 +173,7 @@ where
                 connection: ConnectionId(0),
                 frame: "null".into(),
                 service: None,
+                status: None,
                 done: None,
             })
             .await

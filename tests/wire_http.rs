@@ -3,6 +3,14 @@
 //! **Invariant:** whatever is sent over HTTP, the arm's parameters stay as they were.
 
 #![cfg(feature = "web")]
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does; it reads best called with a value"
+)]
 
 mod common;
 mod web_client;

@@ -2,6 +2,15 @@
 //!
 //! **Invariant:** what the arm does is compared bit for bit with the offline stepper; no test looks at the wall clock.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does; it reads best called with a value"
+)]
+
 mod common;
 
 use common::{Client, Runtime};

@@ -2,6 +2,15 @@
 //!
 //! **Invariant:** without the token nothing is done, whatever is sent and however.
 
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does; it reads best called with a value"
+)]
+
 mod common;
 #[cfg(feature = "web")]
 mod web_client;

@@ -7,10 +7,11 @@
 )]
 #![allow(
     clippy::expect_used,
-    clippy::unwrap_used,
-    clippy::panic,
     clippy::indexing_slicing,
-    reason = "a helper of a test fails by panicking, as a test does"
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does; it reads best called with a value"
 )]
 
 use std::io::{ErrorKind, Read, Write};
