@@ -39,10 +39,9 @@ fn every_question_is_answered_under_both_prefixes_with_the_fields_of_the_catalog
             Rosapi::ServiceRequestDetails | Rosapi::ServiceResponseDetails => {
                 "pendularm_interfaces/srv/SetParams"
             }
-            // There is no action yet: their types are asked for elsewhere.
             Rosapi::ActionGoalDetails
             | Rosapi::ActionResultDetails
-            | Rosapi::ActionFeedbackDetails => continue,
+            | Rosapi::ActionFeedbackDetails => "pendularm_interfaces/action/MoveTo",
             _ => "/x",
         };
         let mut args = json!({});

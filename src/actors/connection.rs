@@ -95,6 +95,8 @@ struct Shared {
     refusing: Cell<bool>,
     /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
     unbatched: Cell<bool>,
+    /// Whether frames may be binary: over raw TCP they are text.
+    binary: Cell<bool>,
     /// Bytes of responses in the outbox, for the registry to look at.
     backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
@@ -131,6 +133,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             finishing: Cell::new(false),
             refusing: Cell::new(false),
             unbatched: Cell::new(false),
+            binary: Cell::new(false),
             backlog: Arc::default(),
             gauges,
         });

@@ -16,6 +16,8 @@
 //! | [`registry::Request`] | connection | registry | one rosbridge op of that client |
 //! | [`node::ServiceCall`] | registry | the node that serves it | answered exactly once, through its [`node::Reply`] |
 //! | [`node::TopicMessage`] | registry | the node that subscribes | a message on a topic the runtime listens to |
+//! | [`follower::ActionRequest`] | registry | `ik_action` | a goal of the action, or its end; the client follows by its [`follower::Follower`] |
+//! | [`registry::Progress`] | `ik_action` | registry | feedback of a goal, for the client that sent it |
 //! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: no encoding without |
 //! | [`registry::Publish`] / [`registry::Respond`] | nodes | registry | a topic message; an answer |
 //! | [`arm_sim::ArmPose`] | ik, `ik_trial` | `arm_sim` | lengths, positions and time, asked for every time |
@@ -33,6 +35,7 @@
 
 pub mod arm_sim;
 pub mod connection;
+pub mod follower;
 pub mod gauges;
 pub mod ik;
 pub mod ik_action;

@@ -5,11 +5,13 @@
 //!
 //! **Invariant:** what is listed is served, and what is served is listed: the enums make the compiler ask.
 
+mod actions;
 pub mod rosapi;
 mod services;
 mod topics;
 pub mod types;
 
+pub use actions::Action;
 pub use rosapi::Rosapi;
 pub use services::Service;
 pub use topics::Topic;

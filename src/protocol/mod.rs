@@ -3,7 +3,10 @@
 //! **Invariant:** no sockets, no clock, no physics in here; whatever depends on time is told the time.
 
 pub mod catalog;
+pub mod cbor;
+pub mod cdr;
 pub mod fields;
+pub mod fragments;
 pub mod frame;
 pub mod goal_messages;
 pub mod json;

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use super::catalog::rosapi::{PREFIX, PRIVATE_PREFIX};
 use super::catalog::types::{self, Count, Type};
-use super::catalog::{Direction, Field, Node, Rosapi, Service, Topic};
+use super::catalog::{Action, Direction, Field, Node, Rosapi, Service, Topic};
 use super::fields::Fields;
 use super::names;
 use super::op::Arguments;
@@ -120,8 +120,10 @@ pub fn answer(question: Rosapi, args: &Arguments, census: &Census) -> Result<Val
         | Rosapi::ActionFeedbackDetails => {
             json!({"typedefs": details(question, &asked).ok_or_else(unknown)?})
         }
-        Rosapi::ActionServers => json!({"action_servers": []}),
-        Rosapi::ActionType => json!({"type": ""}),
+        Rosapi::ActionServers => json!({"action_servers": Action::ALL.map(Action::name)}),
+        Rosapi::ActionType => {
+            json!({"type": Action::from_name(&asked).map_or("", Action::type_name)})
+        }
         Rosapi::Interfaces => json!({"interfaces": interfaces()}),
         Rosapi::GetRosVersion => json!({"version": ROS_VERSION, "distro": DISTRO}),
         Rosapi::GetParam
@@ -139,6 +141,10 @@ pub fn answer(question: Rosapi, args: &Arguments, census: &Census) -> Result<Val
 /// A type of that name, field by field; `None` if the runtime knows none.
 fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
     let service = || service_of_type(name);
+    let action = || {
+        let mut all = Action::ALL.into_iter();
+        all.find(|action| names::same_type(action.type_name(), name))
+    };
     Some(match question {
         Rosapi::MessageDetails => typedefs(types::find(name)?),
         Rosapi::ServiceRequestDetails => {
@@ -148,6 +154,17 @@ fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
             service()?.type_name(),
             "Response",
             service()?.response_fields(),
+        ),
+        Rosapi::ActionGoalDetails => {
+            part_typedefs(action()?.type_name(), "Goal", action()?.goal_fields())
+        }
+        Rosapi::ActionResultDetails => {
+            part_typedefs(action()?.type_name(), "Result", action()?.result_fields())
+        }
+        Rosapi::ActionFeedbackDetails => part_typedefs(
+            action()?.type_name(),
+            "Feedback",
+            action()?.feedback_fields(),
         ),
         _ => return None,
     })
@@ -343,9 +360,9 @@ fn publishing_nodes(topic: Topic) -> Vec<Node> {
 /// Every type that the runtime knows, each once.
 fn interfaces() -> BTreeSet<&'static str> {
     let messages = types::all().map(|one| one.name);
-    messages
-        .chain(own_services().map(Service::type_name))
-        .collect()
+    let services = own_services().map(Service::type_name);
+    let actions = Action::ALL.into_iter().map(Action::type_name);
+    messages.chain(services).chain(actions).collect()
 }
 
 /// A type and all types in it.

@@ -65,6 +65,11 @@ impl Tally {
         }
     }
 
+    /// The type of a topic that clients use, if one has named it.
+    pub(super) fn type_of(&self, topic: &str) -> Option<&str> {
+        self.topics.get(topic)?.type_name.as_deref()
+    }
+
     /// A client provides a service.
     pub(super) fn provide(&mut self, service: &str, type_name: Option<&str>) {
         self.services

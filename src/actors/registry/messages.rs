@@ -111,6 +111,18 @@ pub struct Respond {
     pub done: Option<oneshot::Sender<()>>,
 }
 
+/// Progress of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the goal.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Progress {
+    /// The client.
+    pub connection: ConnectionId,
+    /// The action, as the client spells it.
+    pub action: Arc<str>,
+    /// The whole frame.
+    pub frame: Bytes,
+}
+
 /// Which topics and services clients have. From `rosapi`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Census")]

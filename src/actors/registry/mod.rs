@@ -2,13 +2,16 @@
 //!
 //! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
 
+mod actions;
 mod census;
+mod fan_out;
 mod messages;
 mod ops;
 mod refusal;
 mod services;
 mod topics;
 
+use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -21,18 +24,19 @@ use tokio::sync::oneshot;
 use self::census::{Tally, Use};
 use self::messages::TimedOut;
 pub use self::messages::{
-    Attach, Connect, Disconnect, FinishAll, Handled, Outlets, Publish, RefuseCalls, Refused,
-    Request, Respond, Retire, TakeCensus,
+    Attach, Connect, Disconnect, FinishAll, Handled, Outlets, Progress, Publish, RefuseCalls,
+    Refused, Request, Respond, Retire, TakeCensus,
 };
 use self::refusal::Refusal;
 use self::services::{Forwarded, Services};
 pub use self::topics::Throttle;
 use self::topics::{Subscription, Topics};
 use super::ConnectionId;
-use super::connection::{Answer, Deliver, Finish, MAX_RESPONSES_WAITING};
+use super::connection::{Answer, Finish, MAX_RESPONSES_WAITING};
+use super::follower::ActionRequest;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
-use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::{self as frames, Level};
 use crate::protocol::names;
 use crate::protocol::op::Verbosity;
@@ -62,6 +66,8 @@ pub struct Registry {
     nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     latched: HashMap<Topic, Bytes>,
+    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    fragmented: Cell<u64>,
     /// What clients use and provide, for those who ask what there is.
     tally: Tally,
     gauges: Arc<Gauges>,
@@ -90,6 +96,8 @@ struct Client {
 pub struct Nodes {
     /// The node that answers each service.
     pub services: HashMap<Service, Recipient<ServiceCall>>,
+    /// The node that pursues the goals of each action.
+    pub actions: HashMap<Action, Recipient<ActionRequest>>,
     /// The node that listens to each topic the runtime subscribes to.
     pub listeners: HashMap<Topic, Recipient<TopicMessage>>,
     /// The node that publishes each of the runtime's topics.
@@ -106,6 +114,7 @@ impl Registry {
             services: Services::default(),
             nodes: Nodes::default(),
             latched: HashMap::new(),
+            fragmented: Cell::new(0),
             tally: Tally::default(),
             gauges,
             connections_made: 0,
@@ -287,24 +296,6 @@ impl Client {
 }
 
 impl Registry {
-    /// Delivers a message to everybody who subscribes to `topic`, an absolute name, under whichever spelling; `encode` makes
-    /// the frame for a spelling, which all its subscribers share. Without subscribers nothing is encoded.
-    fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) {
-        for spelling in names::spellings(topic) {
-            let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
-                continue;
-            };
-            let frame = encode(spelling);
-            for subscriber in subscribers {
-                let message = Deliver {
-                    topic: Arc::clone(name),
-                    frame: frame.clone(),
-                };
-                subscriber.outlet.do_send(message);
-            }
-        }
-    }
-
     /// Withdraws all that a client has registered, and fails the calls that wait for it as provider.
     fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {

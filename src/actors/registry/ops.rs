@@ -13,18 +13,18 @@ use tokio::sync::oneshot;
 use super::census::Use;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Provider, Services};
-use super::topics::{Subscription, Throttle};
+use super::topics::{Subscription, Throttle, encoding_of};
 use super::{
     Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
     Registry, Request, TimedOut,
 };
 use crate::actors::ConnectionId;
-use crate::actors::connection::{Configure, Deliver};
+use crate::actors::connection::Configure;
 use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
-use crate::protocol::catalog::{Direction, Service, Topic};
+use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{Arguments, CallService, MAX_NAME, Op, Subscribe};
+use crate::protocol::op::{Arguments, CallService, Compression, MAX_NAME, Op, Subscribe};
 
 /// How long a provider may take when its caller does not say.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -45,6 +45,12 @@ impl Registry {
         let refusal = match request.op {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg),
             Op::CallService(call) => return self.call(origin, call, ctx),
+            Op::SendActionGoal(goal) => {
+                return self.send_action_goal(origin.from, origin.id, goal, ctx);
+            }
+            Op::CancelActionGoal { action } => {
+                return self.cancel_action_goal(origin.from, origin.id, &action, ctx);
+            }
             Op::Advertise { topic, type_name } => {
                 self.advertise(&origin, &topic, type_name.as_deref())
             }
@@ -67,6 +73,8 @@ impl Registry {
                 }
                 Ok(())
             }
+            // Put together before it gets here.
+            Op::Fragment(_) => Ok(()),
             // Asked of a client before it gets here; where nothing is asked, anything shown will do.
             Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
@@ -181,6 +189,15 @@ impl Registry {
             return Err(Refusal::TooManySubscriptions);
         }
         let absolute = names::absolute(topic);
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
+            if type_name.and_then(types::find).is_none() {
+                return Err(Refusal::UnknownType);
+            }
+        }
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
         let first = !self.topics.has_subscribers(&absolute);
         let (name, new) = self
             .topics
@@ -195,8 +212,11 @@ impl Registry {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
+            encoding: subscribe.encoding,
         });
         let throttle = Throttle::of(subscriptions);
+        let encoding = encoding_of(subscriptions);
+        self.topics.set_encoding(&name, origin.from, encoding);
         let shared = Arc::clone(&name);
         client.outlets.configure.do_send(Configure {
             topic: name,
@@ -211,18 +231,6 @@ impl Registry {
             self.deliver_latched(&shared, origin.from);
         }
         Ok(())
-    }
-
-    /// A topic's last message, if that is kept, to a subscriber who came after it.
-    fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
-        let latched = Topic::from_name(spelling)
-            .and_then(|topic| Some((topic, self.latched.get(&topic)?, self.clients.get(&to)?)));
-        if let Some((topic, frame, client)) = latched {
-            client.outlets.deliver.do_send(Deliver {
-                topic: Arc::clone(spelling),
-                frame: messages::respelled(topic.name(), spelling, frame),
-            });
-        }
     }
 
     fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
@@ -246,6 +254,8 @@ impl Registry {
         if left.is_empty() {
             self.drop_subscriber(&name, origin.from);
         } else {
+            let encoding = encoding_of(&left);
+            self.topics.set_encoding(&name, origin.from, encoding);
             client.subscriptions.insert(name, left);
         }
     }

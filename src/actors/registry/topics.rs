@@ -12,6 +12,7 @@ use actix::prelude::*;
 use crate::actors::ConnectionId;
 use crate::actors::connection::Deliver;
 use crate::protocol::names;
+use crate::protocol::op::Encoding;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,6 +20,7 @@ pub(super) struct Subscription {
     pub(super) id: Option<Box<str>>,
     pub(super) throttle: Duration,
     pub(super) queue_length: usize,
+    pub(super) encoding: Encoding,
 }
 
 /// What a connection's subscriptions to one topic come to: the smallest of each value.
@@ -47,6 +49,14 @@ impl Throttle {
 pub(super) struct Subscriber {
     pub(super) connection: ConnectionId,
     pub(super) outlet: Recipient<Deliver>,
+    /// What its subscriptions come to.
+    pub(super) encoding: Encoding,
+}
+
+/// What a connection's subscriptions to one topic come to.
+pub(super) fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
+    let all = subscriptions.iter().map(|one| one.encoding);
+    all.reduce(Encoding::merged).unwrap_or_default()
 }
 
 /// Every topic that somebody subscribes to, by the spelling that the subscriber used.
@@ -70,9 +80,26 @@ impl Topics {
         let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
         let new = !subscribers.iter().any(|one| one.connection == connection);
         if new {
-            subscribers.push(Subscriber { connection, outlet });
+            subscribers.push(Subscriber {
+                connection,
+                outlet,
+                encoding: Encoding::default(),
+            });
         }
         (name, new)
+    }
+
+    /// Sets how a subscriber's messages are written.
+    pub(super) fn set_encoding(
+        &mut self,
+        topic: &Arc<str>,
+        connection: ConnectionId,
+        encoding: Encoding,
+    ) {
+        let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
+        for subscriber in subscribers.filter(|one| one.connection == connection) {
+            subscriber.encoding = encoding;
+        }
     }
 
     /// Removes a subscriber.
