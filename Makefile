@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test lint doc clean vendor submission test-submission
+.PHONY: help build run test lint doc report clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -27,11 +27,17 @@ lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --no-default-features -- -D warnings
 
 # Private items are documented too, for whoever reads the source, so links to them are as good as any.
 doc: ## Build the documentation; any warning fails
 	@echo "make doc: $(TARGET_DIR)/doc/pendularm/index.html"
 	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --locked --no-deps --document-private-items
+
+report: build ## Measure error against run time and stability, and write report/index.html; ARGS="--quick" or "--only error"
+	@echo "make report: report/index.html"
+	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
+	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
 
 clean: ## Remove what was built and packed; vendored sources stay
 	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"

@@ -9,6 +9,7 @@ use std::process::ExitCode;
 use pendularm::actors::runtime;
 use pendularm::logging;
 use pendularm::options::{Options, Parsed};
+use pendularm::report;
 
 /// Exit status for a bad option or a bad environment variable.
 const BAD_USAGE: u8 = 2;
@@ -16,6 +17,13 @@ const BAD_USAGE: u8 = 2;
 fn main() -> ExitCode {
     match Options::parse(std::env::args_os(), |variable| std::env::var_os(variable)) {
         Ok(Parsed::Serve(options)) => serve(&options),
+        Ok(Parsed::Report(options)) => match report::run(&options) {
+            Ok(_) => ExitCode::SUCCESS,
+            Err(error) => {
+                complain(&error);
+                ExitCode::FAILURE
+            }
+        },
         Ok(Parsed::Show(text)) => {
             // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
             let _ = io::stdout().write_all(text.as_bytes());

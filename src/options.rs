@@ -7,6 +7,7 @@
 //!
 //! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
 
+mod report;
 mod usage;
 #[cfg(feature = "web")]
 mod web;
@@ -23,6 +24,7 @@ pub use self::usage::{Origin, UsageError};
 #[cfg(feature = "web")]
 pub use self::web::WebOptions;
 use crate::protocol::token::Token;
+use crate::report::ReportOptions;
 
 /// Where the runtime listens unless told otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
@@ -192,6 +194,8 @@ impl Default for Options {
 pub enum Parsed {
     /// To serve clients, with these options.
     Serve(Options),
+    /// To make the study's report.
+    Report(ReportOptions),
     /// To show this text on standard output, and no more: the help or the version.
     Show(String),
 }
@@ -211,6 +215,15 @@ impl Options {
             Ok(matches) => matches,
             Err(error) => return told(&error),
         };
+        if let Some(report) = matches.subcommand_matches(report::NAME) {
+            // What serving is told means nothing to a report.
+            if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
+                return Err(UsageError::UnknownArgument {
+                    argument: format!("--{}", stray.option),
+                });
+            }
+            return Ok(Parsed::Report(report::read(report)));
+        }
         let given = |setting: &Setting| given(setting, &matches, &environment);
         let token = given(&TOKEN).map(read_token).transpose()?;
         let bind = given(&BIND)
@@ -267,6 +280,8 @@ fn command() -> Command {
         .about(env!("CARGO_PKG_DESCRIPTION"))
         .after_help(format!("{DOORS}\n{AFTER_HELP}"))
         .args(options)
+        .disable_help_subcommand(true)
+        .subcommand(report::command())
 }
 
 /// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
@@ -276,12 +291,17 @@ fn told(error: &clap::Error) -> Result<Parsed, UsageError> {
         _ => String::new(),
     };
     // The argument as the user gave it, and the option as the help shows it, share this place.
-    let argument = context(ContextKind::InvalidArg);
+    let argument = match error.kind() {
+        ErrorKind::InvalidSubcommand => context(ContextKind::InvalidSubcommand),
+        _ => context(ContextKind::InvalidArg),
+    };
     Err(match error.kind() {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
             return Ok(Parsed::Show(error.to_string()));
         }
-        ErrorKind::UnknownArgument => UsageError::UnknownArgument { argument },
+        ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand => {
+            UsageError::UnknownArgument { argument }
+        }
         ErrorKind::InvalidValue => UsageError::MissingValue { option: argument },
         ErrorKind::ArgumentConflict => UsageError::Repeated { option: argument },
         ErrorKind::TooManyValues => UsageError::UnexpectedValue {

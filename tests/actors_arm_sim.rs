@@ -632,7 +632,7 @@ fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
 fn a_bad_trajectory_is_answered_to_its_sender_alone_with_the_frames_id() {
     in_virtual_time(|| async {
         let bench = Bench::<2>::new(Arm::default());
-        let held = bench.snapshot().await.pid().setpoint().clone();
+        let held = *bench.snapshot().await.pid().setpoint();
         let id = json!({"my": [1, "id"]});
         bench
             .trajectory(json!({"points": []}), Some(id.clone()))

@@ -216,6 +216,25 @@ fn arguments_that_do_not_exist_are_refused_by_name() {
 }
 
 #[test]
+fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
+    let report = |arguments: &[&str]| {
+        let all = ["pendularm", "report"].iter().chain(arguments);
+        match Options::parse(all, |_| None) {
+            Ok(Parsed::Report(report)) => report,
+            other => panic!("no report: {other:?}"),
+        }
+    };
+    let plain = report(&[]);
+    assert_eq!((plain.out.to_str(), plain.quick), (Some("report"), false));
+    assert!(plain.only.is_empty());
+    let all = report(&["--out", "here", "--only", "error,budget", "--quick"]);
+    assert_eq!((all.out.to_str(), all.quick), (Some("here"), true));
+    assert_eq!(all.only, ["error", "budget"]);
+    assert!(refusal(&["--links", "2", "report"], &[]).starts_with("unknown argument \"--links\""));
+    assert!(refusal(&["report", "--speed"], &[]).starts_with("unknown argument \"--speed\""));
+}
+
+#[test]
 fn an_option_without_its_value_or_given_twice_is_refused_by_name() {
     assert_eq!(refusal(&["--links"], &[]), "--links <N> needs a value");
     assert_eq!(

@@ -1,4 +1,4 @@
-//! One goal at a time, one result each: preemption, cancellation, reset.
+//! One goal at a time, one result each: preemption and cancellation.
 
 use super::*;
 
@@ -205,151 +205,62 @@ fn goals_outlive_the_client_that_made_them() {
     });
 }
 
-#[test]
-fn a_reset_preempts_the_goal_before_it_is_answered() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.subscribe(RESULT).await;
-        client.subscribe(FEEDBACK).await;
-        for paused in [false, true] {
-            client.ask("/arm_sim/pause", json!({"data": paused})).await;
-            let goal_id = client.send_goal(elsewhere()).await;
-            client.settle().await;
-            client.heard.clear();
-            let pose = client.ask("/arm_sim/reset", json!({})).await;
-            assert_eq!(
-                pose,
-                json!({"position": [0.0, 0.0], "velocity": [0.0, 0.0]})
-            );
-            let expected = [
-                format!("{RESULT} {goal_id} preempted"),
-                "/arm_sim/reset".to_owned(),
-            ];
-            assert_eq!(client.story(), expected);
-            let distance = number(&client.messages(RESULT)[0]["final_distance"]);
-            assert!((distance - std::f64::consts::SQRT_2).abs() < ROUNDING);
-            client.heard.clear();
-            let later = client.messages_for(ms(500), FEEDBACK).await;
-            assert!(later.is_empty(), "no goal is left to report on");
-            let setpoint = *stage.simulation().await.pid().setpoint();
-            assert_eq!(setpoint.position, [0.0, 0.0]);
-        }
-    });
-}
+/// Notes what reaches it; trajectories only after a while, as if the registry had much to do.
+struct Slow(UnboundedSender<&'static str>);
 
-/// Hears of a goal in a goal's owner's place.
-struct Owner(UnboundedSender<GoalJudged<2>>);
-
-impl Actor for Owner {
+impl Actor for Slow {
     type Context = Context<Self>;
 }
 
-impl Handler<GoalJudged<2>> for Owner {
-    type Result = ();
+impl Handler<Publish> for Slow {
+    type Result = AtomicResponse<Self, ()>;
 
-    fn handle(&mut self, judged: GoalJudged<2>, _: &mut Context<Self>) {
-        self.0.send(judged).unwrap();
+    fn handle(&mut self, _: Publish, _: &mut Context<Self>) -> Self::Result {
+        let while_busy = async { pass(ms(10)).await }.into_actor(self);
+        AtomicResponse::new(Box::pin(while_busy.map(|(), slow, _| {
+            slow.0.send("trajectory").unwrap();
+        })))
     }
 }
 
-/// Between the announcement of a goal and its trajectory another client's reset may come. Then the reset counts as the
-/// later of the two, and the trajectory must not pull the arm out of its starting pose.
-#[test]
-fn a_reset_that_overtakes_a_goals_trajectory_makes_it_void() {
-    in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        let (sender, mut news) = unbounded_channel();
-        let owner = Owner(sender).start();
-        let announce = |number| {
-            stage.arm.send(TrackGoal {
-                number,
-                target: glam::DVec2::ONE,
-                criteria: Criteria::default(),
-                solution: [0.0, 1.5],
-                owner: owner.clone().recipient(),
-            })
-        };
-        let trajectory = || TopicMessage {
-            msg: to_raw_value(&json!({"points": [{"positions": [0.0, 1.5]}]})).unwrap(),
-            sender: None,
-        };
-        announce(1).await.unwrap();
-        client.ask("/arm_sim/reset", json!({})).await;
-        assert_eq!(news.recv().await.unwrap().outcome, Some(Outcome::Preempted));
-        stage.arm.send(trajectory()).await.unwrap();
-        let setpoint = *stage.simulation().await.pid().setpoint();
-        assert_eq!(setpoint.position, [0.0, 0.0]);
-        // The next goal is none the worse for it.
-        announce(2).await.unwrap();
-        stage.arm.send(trajectory()).await.unwrap();
-        let setpoint = *stage.simulation().await.pid().setpoint();
-        assert_eq!(setpoint.position, [0.0, 1.5]);
-        assert_eq!(news.recv().await.unwrap().number, 2);
-    });
+impl Handler<TrackGoal<2>> for Slow {
+    type Result = Tracking<2>;
+
+    fn handle(&mut self, goal: TrackGoal<2>, _: &mut Context<Self>) -> Tracking<2> {
+        self.0.send("announced").unwrap();
+        Tracking {
+            positions: goal.solution,
+            before: None,
+        }
+    }
 }
 
+/// Else the arm would take the old goal's trajectory for the new goal's.
 #[test]
-fn a_goal_is_not_judged_before_its_trajectory_has_come() {
+fn a_goal_is_announced_only_when_the_trajectory_of_the_one_before_is_on_its_way() {
     in_virtual_time(async {
-        let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
-        let (sender, mut news) = unbounded_channel();
-        let tracking = stage
-            .arm
-            .send(TrackGoal {
-                number: 1,
-                target: glam::dvec2(2.0, 0.0),
-                criteria: Criteria {
-                    epsilon: 0.1,
-                    success_hold: 0.0,
+        let (sender, mut noted) = unbounded_channel();
+        let (registry, arm) = (Slow(sender.clone()).start(), Slow(sender).start());
+        let silent = SilentArm.start();
+        let tracker = GoalTracker {
+            track: arm.recipient(),
+            end: silent.clone().recipient(),
+        };
+        let ik = Ik::<2>::new(silent.recipient()).start();
+        let action = IkAction::new(ik.recipient(), tracker, registry.recipient()).start();
+        for _ in 0..3 {
+            action.do_send(SendGoal {
+                target: Target {
+                    position: glam::DVec2::ONE,
+                    orientation: None,
                 },
-                solution: [0.0, 0.0],
-                owner: Owner(sender).start().recipient(),
-            })
-            .await
-            .unwrap();
-        assert_eq!(tracking.positions, [0.0, 0.0]);
-        pass(ms(100)).await;
-        assert!(news.try_recv().is_err());
-        let msg = to_raw_value(&json!({"points": [{"positions": [0.0, 0.0]}]})).unwrap();
-        stage.arm.do_send(TopicMessage { msg, sender: None });
-        let first = news.recv().await.unwrap();
-        assert!((first.elapsed - STEP).abs() < ROUNDING);
-    });
-}
-
-/// Euler with a timestep of half a second, at the default gains: each step multiplies the error by more than 100.
-async fn diverge(stage: &Stage<2>, client: &mut Client) {
-    client
-        .ask(
-            "/arm_sim/set_integrator",
-            json!({"method": "euler", "timestep": 0.5}),
-        )
-        .await;
-    client.enable().await;
-    while stage.simulation().await.divergence().is_none() {
-        pass(ms(500)).await;
-    }
-}
-
-#[test]
-fn while_diverged_a_goal_stays_active_until_the_reset() {
-    in_virtual_time(async {
-        let stage = Stage::<2>::start().await;
-        let mut client = stage.connect();
-        client.subscribe(RESULT).await;
-        client.subscribe(FEEDBACK).await;
-        let goal_id = client.send_goal(elsewhere()).await;
-        diverge(&stage, &mut client).await;
-        client.settle().await;
-        client.heard.clear();
-        let meanwhile = client.messages_for(Duration::from_secs(60), FEEDBACK);
-        assert!(meanwhile.await.is_empty(), "its clock stands");
-        assert!(client.messages(RESULT).is_empty());
-        // A goal that comes now is taken, and as active.
-        let later = client.send_goal(elsewhere()).await;
-        assert_eq!(client.messages(RESULT)[0]["goal_id"], goal_id);
-        client.ask("/arm_sim/reset", json!({})).await;
-        assert_eq!(client.messages(RESULT)[1]["goal_id"], later);
-        assert_eq!(client.messages(RESULT)[1]["outcome"], "preempted");
+                criteria: Criteria::default(),
+                owner: None,
+            });
+        }
+        for _ in 0..3 {
+            assert_eq!(noted.recv().await, Some("announced"));
+            assert_eq!(noted.recv().await, Some("trajectory"));
+        }
     });
 }

@@ -16,16 +16,18 @@ mod accepting;
 mod ending;
 mod feedback;
 mod reaching;
+mod reset;
 #[path = "../stage/mod.rs"]
 mod stage;
 
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::arm_sim::{ArmPose, GoalJudged, TrackGoal};
+use pendularm::actors::arm_sim::{ArmPose, GoalJudged, TrackGoal, Tracking};
 use pendularm::actors::ik::Ik;
-use pendularm::actors::ik_action::{IkAction, SendGoal};
+use pendularm::actors::ik_action::{GoalTracker, IkAction, SendGoal};
 use pendularm::actors::node::{Interest, TopicMessage};
+use pendularm::actors::registry::Publish;
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::{Target, forward};
 use pendularm::protocol::catalog::Topic;

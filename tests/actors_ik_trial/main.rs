@@ -15,6 +15,7 @@ mod duration;
 mod others;
 #[path = "../stage/mod.rs"]
 mod stage;
+mod stand_ins;
 mod starting;
 mod status;
 mod whole;

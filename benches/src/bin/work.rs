@@ -1,0 +1,58 @@
+//! One kind of work, so many times: what `scripts/measure-work.sh` counts the instructions of.
+//!
+//! `cargo run --release --bin work -- VARIANT COUNT`
+//!
+//! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. `step-LINKS-METHOD-WHAT` is a step of
+//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges.
+
+use std::hint::black_box;
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::expression::Expression;
+use pendularm::math::integrator::Method;
+use pendularm::math::particle::Particle;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation;
+
+fn step<const N: usize>(method: Method, what: &str, count: u64)
+where
+    Gains<N>: Default,
+{
+    let gravity = if what.contains("weightless") { 0.0 } else { 9.81 };
+    let arm = Arm::<N>::new([1.0; N], [1.0; N], gravity).expect("an arm");
+    let mut gains = Gains::<N>::default();
+    if what.contains("pd") {
+        gains.ki = [0.0; N];
+    }
+    let mut simulation = Simulation::new(arm, gains);
+    simulation.set_method(method);
+    // Angles stay small enough for one path through sine and cosine.
+    simulation.set_state(State { position: [0.4; N], velocity: [0.0; N] });
+    simulation.set_setpoint(Setpoint { position: [0.4; N], velocity: [0.0; N] });
+    simulation.enable(what.contains("pd") || what.contains("pid"));
+    assert_eq!(simulation.advance(count), count);
+    black_box(simulation.state());
+}
+
+fn particle(method: Method, function: &str, count: u64) {
+    let function = Expression::parse(function).expect("a function");
+    let mut particle = Particle::new(function, 0.5, -0.25, 1e-4, count, method).expect("a particle");
+    particle.advance(usize::MAX);
+    black_box(particle.positions());
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [variant, count] = arguments.as_slice() else {
+        panic!("usage: work VARIANT COUNT");
+    };
+    let count: u64 = count.parse().expect("a number");
+    let parts: Vec<&str> = variant.splitn(4, '-').collect();
+    match parts.as_slice() {
+        ["step", "2", method, what] => step::<2>(method.parse().expect("a method"), what, count),
+        ["step", "3", method, what] => step::<3>(method.parse().expect("a method"), what, count),
+        ["particle", method, "constant"] => particle(method.parse().expect("a method"), "1", count),
+        ["particle", method, "cosine"] => particle(method.parse().expect("a method"), "cos(2*t)", count),
+        _ => panic!("unknown variant {variant}"),
+    }
+}

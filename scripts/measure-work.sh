@@ -1,0 +1,80 @@
+#!/usr/bin/env bash
+# Counts instructions and allocations of the work that a scene does or leaves out, and the server's own with nobody and
+# somebody listening. Writes DIRECTORY/work.csv for `pendularm report --only work`. Needs valgrind; a minute.
+# usage: scripts/measure-work.sh DIRECTORY
+set -euo pipefail
+
+out=${1:?usage: scripts/measure-work.sh DIRECTORY}
+root=$(cd "$(dirname "$0")/.." && pwd)
+command -v valgrind >/dev/null || { echo "measure-work: valgrind is not installed; instruction counts stay unmeasured" >&2; exit 0; }
+mkdir -p "$out"
+target=${CARGO_TARGET_DIR:-$root/target}/benches
+scratch=$(mktemp -d)
+server=
+trap 'if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; fi; rm -rf "$scratch"' EXIT
+
+(cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work --bin allocations)
+(cd "$root" && cargo build --release --locked --quiet)
+program=${CARGO_TARGET_DIR:-$root/target}/release/pendularm
+
+instructions() { # command...: instructions executed
+    valgrind --tool=callgrind --callgrind-out-file=/dev/null "$@" 2>&1 >/dev/null | awk '/Collected/ { print $NF }'
+}
+
+echo "name,value,unit" >"$scratch/work.csv"
+put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
+
+count=20000
+for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd,pid,weightless-pd} \
+    step-3-rk4-{free,weightless,pd,pid} particle-rk4-{constant,cosine}; do
+    once=$(instructions "$target/release/work" "$variant" $count)
+    twice=$(instructions "$target/release/work" "$variant" $((2 * count)))
+    put "$variant" "$(awk "BEGIN { print ($twice - $once) / $count }")" "instructions per step"
+done
+
+# The counting allocator's own words: "2 links, rk4 PID true 1000000 steps 0 allocations".
+"$target/release/allocations" >"$scratch/allocations"
+put allocations-in-steps "$(awk '/steps/ { sum += $(NF - 1) } END { print sum }' "$scratch/allocations")" allocations
+put steps-counted "$(awk '/steps/ { sum += $(NF - 3) } END { printf "%d", sum }' "$scratch/allocations")" steps
+put allocations-per-subscriber "$(awk '/^200 bytes/ { print $3 }' "$scratch/allocations")" "allocations per message"
+
+# The server under callgrind for some seconds of real time: simulated steps keep pace with the clock, so counts are per second.
+seconds=4
+serve() { # name, frames to send first, clients subscribed to /joint_states
+    local name=$1 first=$2 clients=$3 counts="$scratch/counts" client pids=()
+    valgrind --tool=callgrind --callgrind-out-file="$counts" "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
+    server=$!
+    for _ in $(seq 100); do grep -q listening "$scratch/address" && break || sleep 0.1; done
+    local port
+    port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$scratch/address")
+    exec 3<>"/dev/tcp/127.0.0.1/$port"
+    printf '%s' "$first" >&3
+    for ((client = 0; client < clients; client++)); do
+        (exec 4<>"/dev/tcp/127.0.0.1/$port"; printf '{"op":"subscribe","topic":"/joint_states"}\n' >&4; exec cat <&4 >/dev/null) &
+        pids+=($!)
+    done
+    sleep 1
+    callgrind_control --zero "$server" >/dev/null 2>&1
+    sleep $seconds
+    callgrind_control --dump "$server" >/dev/null 2>&1
+    sleep 0.5
+    local total
+    total=$(cat "$counts".1 2>/dev/null | awk '/^(summary|totals):/ { print $2; exit }')
+    kill "$server"; wait "$server" 2>/dev/null || true
+    server=
+    exec 3>&-
+    for client in "${pids[@]}"; do kill "$client" 2>/dev/null || true; wait "$client" 2>/dev/null || true; done
+    rm -f "$counts"*
+    put "$name" "$(awk "BEGIN { printf \"%.0f\", ${total:-0} / $seconds }")" "instructions per second"
+}
+if command -v callgrind_control >/dev/null; then
+    serve server-running "" 0
+    serve server-paused '{"op":"call_service","service":"/arm_sim/pause","args":{"data":true}}
+' 0
+    serve server-1-subscriber "" 1
+    serve server-11-subscribers "" 11
+fi
+
+put program-size "$(stat -c %s "$program")" bytes
+mv "$scratch/work.csv" "$out/work.csv"
+echo "measure-work: $out/work.csv"

@@ -1,0 +1,154 @@
+//! The three figures: error against evaluations, time and timestep.
+//!
+//! **Invariant:** the same error axis in every panel.
+
+use super::super::super::section::Figure;
+use super::super::super::svg::{Axis, Key, Mark, Plot, Point, Series, Unit, scientific, seconds};
+use super::words::{headline_evaluations, headline_time, headline_timestep};
+use super::{Data, Run, in_f64};
+use crate::math::integrator::Method;
+use crate::study::error::Outcome;
+
+/// All panels share this, so that scenes can be compared. An exact hit is drawn on the lower edge.
+fn error_axis() -> Axis {
+    Axis::log_between("largest error [rad]", Unit::Number, 1e-17, 10.0)
+}
+
+fn told(data: &Data, run: &Run) -> String {
+    let Outcome {
+        timestep,
+        evaluations,
+        error,
+        ..
+    } = run.outcome;
+    let outcome = if error.is_finite() {
+        format!("error {} {}", scientific(error), data.unit())
+    } else {
+        "diverged".to_owned()
+    };
+    format!(
+        "{}: dt {}, {evaluations} evaluations, {}: {outcome}",
+        run.method,
+        seconds(timestep),
+        seconds(run.timing.minimum)
+    )
+}
+
+fn panels(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
+    data.iter()
+        .map(|data| {
+            let mut plot = Plot::new(data.scene.title(), x.clone(), error_axis());
+            if data.scene.links() == 0 {
+                plot.y.label = "largest error [m]";
+            }
+            for method in Method::ALL {
+                let points = data.of(method).map(|run| {
+                    // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
+                    let error = run.outcome.error.max(1e-17);
+                    Point::new(of(run), error, told(data, run))
+                });
+                plot.series.push(Series::of(method, points.collect()));
+            }
+            plot
+        })
+        .collect()
+}
+
+pub(super) fn against_evaluations(data: &[Data]) -> Figure {
+    let all = data.iter().flat_map(|data| &data.runs);
+    let x = Axis::log(
+        "evaluations of the dynamics",
+        Unit::Number,
+        all.map(|run| in_f64(run.outcome.evaluations)),
+    );
+    let mut plots = panels(data, &x, |run| in_f64(run.outcome.evaluations));
+    for plot in &mut plots {
+        plot.marks.push(Mark::Slopes {
+            x: x.min * 1.3,
+            y: 1e-10,
+            decades: 0.9,
+            orders: vec![-1.0, -2.0, -4.0],
+        });
+        plot.marks.push(floor());
+    }
+    Figure::new(
+        "work-precision",
+        headline_evaluations(data),
+        "Down and left is better. One mark per timestep, halved from mark to mark; every method takes the same timesteps. \
+         Crosses at the top edge are runs that diverged. The three strokes show orders 1, 2 and 4; the dotted line is one unit in \
+         the last place of 1 rad.",
+        &Key::methods(),
+        &plots,
+    )
+}
+
+fn floor() -> Mark {
+    Mark::Horizontal {
+        y: f64::EPSILON,
+        class: "soft",
+        label: "rounding".to_owned(),
+        right: false,
+    }
+}
+
+pub(super) fn against_time(data: &[Data]) -> Figure {
+    let all = data.iter().flat_map(|data| &data.runs);
+    let x = Axis::log(
+        "time for the whole run",
+        Unit::Seconds,
+        all.map(|run| run.timing.minimum),
+    );
+    let mut plots = panels(data, &x, |run| run.timing.minimum);
+    for (plot, data) in plots.iter_mut().zip(data) {
+        plot.above = Some(("real-time factor", data.scene.duration()));
+        let points = plot.series.iter_mut().flat_map(|series| &mut series.points);
+        let runs = Method::ALL.into_iter().flat_map(|method| data.of(method));
+        for (point, run) in points.zip(runs) {
+            point.spread = Some(run.timing.quartiles);
+        }
+        plot.marks.push(floor());
+    }
+    Figure::new(
+        "work-precision-time",
+        headline_time(data),
+        "As above, with the clock instead of the count: the minimum of repeats, whiskers from first to third quartile. The scale at \
+         the top is the real-time factor, simulated time over computing time.",
+        &Key::methods(),
+        &plots,
+    )
+}
+
+pub(super) fn against_timestep(data: &[Data]) -> Figure {
+    let all = data.iter().flat_map(|data| &data.runs);
+    let x = Axis::log(
+        "timestep",
+        Unit::Seconds,
+        all.map(|run| run.outcome.timestep),
+    );
+    let mut plots = panels(data, &x, |run| run.outcome.timestep);
+    for (plot, data) in plots.iter_mut().zip(data) {
+        for method in Method::ALL {
+            if let Some(limit) = data.scene.predicted_limit(method) {
+                plot.marks.push(Mark::Vertical {
+                    x: limit,
+                    class: method.name(),
+                    told: format!("{method}: predicted stability limit {}", seconds(limit)),
+                });
+            }
+        }
+        plot.marks.push(Mark::Slopes {
+            x: x.max / 60.0,
+            y: 1e-14,
+            decades: 1.0,
+            orders: vec![1.0, 2.0, 4.0],
+        });
+        plot.marks.push(floor());
+    }
+    Figure::new(
+        "convergence",
+        headline_timestep(data),
+        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep at the setpoint, one per method.",
+        &Key::methods(),
+        &plots,
+    )
+}

@@ -1,0 +1,132 @@
+//! The tables: cheapest methods, orders, real-time factors, scenes.
+//!
+//! **Invariant:** what no run reached is called not reached.
+
+use super::super::super::section::{Cell, Table};
+use super::super::super::svg::{number, power, scientific, seconds};
+use super::{Data, TARGETS, best};
+use crate::math::integrator::Method;
+
+pub(super) fn cheapest(data: &[Data]) -> Table {
+    let mut head = vec!["Scene".to_owned()];
+    head.extend(TARGETS.map(|target| format!("{} rad", power(target.log10().round()))));
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = Table::new(
+        "cheapest",
+        "At a glance: the cheapest method for each error",
+        "Fewest evaluations; under it the timestep, and evaluations and computing time for one simulated second; last how \
+         many times more evaluations the next best method needs. Between two measured timesteps the values are interpolated. \
+         The particle's errors are in m.",
+        &head,
+    );
+    for data in data {
+        let mut row = vec![Cell::new(data.scene.title())];
+        for target in TARGETS {
+            row.push(match best(data, target) {
+                None => Cell::new("not reached").class("soft"),
+                Some((method, cost, next)) => {
+                    let per_second = cost.evaluations / data.scene.duration();
+                    let time = seconds(cost.wall / data.scene.duration());
+                    let next = next.map_or_else(String::new, |(next, other)| {
+                        format!("; {next} ×{}", number(other.evaluations / cost.evaluations))
+                    });
+                    Cell::method(method).detail(format!(
+                        "dt {}; {} evaluations, {time} per s{next}",
+                        seconds(cost.timestep),
+                        number(per_second.round())
+                    ))
+                }
+            });
+        }
+        table.rows.push(row);
+    }
+    table
+}
+
+pub(super) fn orders(data: &[Data]) -> Table {
+    let mut table = Table::new(
+        "orders",
+        "Fitted orders",
+        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the smallest error that any timestep gave.",
+        &["Scene", "euler", "midpoint", "verlet", "rk4"],
+    );
+    for data in data {
+        let mut row = vec![Cell::new(data.scene.title())];
+        for method in Method::ALL {
+            let least = data
+                .of(method)
+                .map(|run| run.outcome.error)
+                .fold(f64::INFINITY, f64::min);
+            let order = data
+                .order(method)
+                .map_or_else(|| "too few points".to_owned(), |o| format!("{o:.2}"));
+            let least = if least > 0.0 {
+                format!("down to {}", scientific(least))
+            } else {
+                "down to 0, bit for bit".to_owned()
+            };
+            row.push(Cell::new(order).detail(least));
+        }
+        table.rows.push(row);
+    }
+    table
+}
+
+/// Scenes whose speed is listed: one of each kind.
+const SHOWN: [&str; 3] = ["swing-2", "swing-3", "reach-held"];
+
+pub(super) fn real_time(data: &[Data]) -> Table {
+    let mut table = Table::new(
+        "real-time",
+        "Faster than the clock",
+        "Time of one step, the least of all runs of a thousand steps and more; simulated over computing time at three timesteps; and what share of a 1 kHz loop \
+         (1 ms per cycle, one step each) the step itself takes. Stepping only: no messages.",
+        &[
+            "Scene",
+            "Method",
+            "One step",
+            "dt 1 ms",
+            "dt 100 µs",
+            "dt 10 µs",
+            "Share of a 1 kHz loop",
+        ],
+    );
+    for data in data
+        .iter()
+        .filter(|data| SHOWN.contains(&data.scene.name()))
+    {
+        for method in Method::ALL {
+            let Some(step) = data.step_time(method) else {
+                continue;
+            };
+            let factor = |timestep: f64| format!("{}×", number(timestep / step));
+            table.rows.push(vec![
+                Cell::new(data.scene.title()),
+                Cell::method(method),
+                Cell::new(seconds(step)),
+                Cell::new(factor(1e-3)),
+                Cell::new(factor(1e-4)),
+                Cell::new(factor(1e-5)),
+                Cell::new(format!("{} %", number(100.0 * step / 1e-3))),
+            ]);
+        }
+    }
+    table
+}
+
+pub(super) fn scene_list(data: &[Data]) -> Table {
+    let mut table = Table::new(
+        "scenes",
+        "The scenes",
+        "Uncertainty: how far the reference itself may be off.",
+        &["Scene", "Parameters", "Uncertainty"],
+    );
+    for data in data {
+        table.rows.push(vec![
+            Cell::new(data.scene.title()),
+            Cell::new(data.scene.about()),
+            Cell::new(scientific(data.scene.uncertainty())),
+        ]);
+    }
+    table
+}

@@ -1,0 +1,288 @@
+//! Separation from the reference in a chaotic swing, the horizon of each method and timestep, and the Lyapunov time.
+//!
+//! **Invariant:** an error is shown only where the reference is known better.
+
+use super::super::Desk;
+use super::super::csv::Csv;
+use super::super::section::{Block, Cell, Figure, Section, Table, Verdict};
+use super::super::svg::{Axis, Key, Mark, Plot, Series, Unit, number, seconds};
+use crate::math::arm::{Arm, State};
+use crate::math::integrator::Method;
+use crate::study::chaos::{HORIZON_ERROR, horizon, lyapunov_rate, separation};
+use crate::study::reference::{Law, Reference};
+
+/// Time between samples \[s\], a multiple of every timestep.
+const SPACING: f64 = 1.0 / 16.0;
+
+/// Steps per sample: timesteps of 1/64, 1/256, … s.
+const EVERY: [u64; 5] = [4, 16, 64, 256, 1024];
+
+/// What is shown over time.
+const SHOWN: u64 = 64;
+
+struct Swing {
+    links: usize,
+    /// Samples for which the reference is known to 1 % of the horizon's error.
+    known: usize,
+    /// Lyapunov rate, whole and by halves \[1/s\].
+    rate: [f64; 3],
+    /// Method, steps per sample, errors.
+    runs: Vec<(Method, u64, Vec<f64>)>,
+}
+
+pub(super) fn make(desk: &mut Desk<'_>) -> Section {
+    let samples = desk.choose(640, 192);
+    let swings = [swing::<2>(desk, samples, 0), swing::<3>(desk, samples, 1)];
+    let mut csv = Csv::new("links,method,dt,t,err_rad");
+    for swing in &swings {
+        for (method, every, errors) in &swing.runs {
+            for (index, error) in errors.iter().enumerate() {
+                csv.row(&[
+                    (swing.links as u64).into(),
+                    method.name().into(),
+                    timestep(*every).into(),
+                    time(index).into(),
+                    (*error).into(),
+                ]);
+            }
+        }
+    }
+    desk.keep("separation", csv);
+    let mut section = Section {
+        findings: swings.iter().filter_map(finding).collect(),
+        verdicts: swings.iter().map(verdict).collect(),
+        ..Section::default()
+    };
+    section.blocks.push(Block::Figure(figure(&swings)));
+    section.blocks.push(Block::Table(table(&swings)));
+    section
+}
+
+fn swing<const N: usize>(desk: &mut Desk<'_>, samples: usize, before: usize) -> Swing {
+    let (arm, start) = (Arm::<N>::default(), State::rest());
+    let reference = Reference::of(&arm, &start, &Law::FREE, SPACING, samples);
+    let known = reference
+        .uncertainty()
+        .iter()
+        .position(|own| *own > 0.01 * HORIZON_ERROR)
+        .unwrap_or(samples);
+    let parts = EVERY.len() + 1;
+    let mut runs = Vec::new();
+    for (index, every) in EVERY.into_iter().enumerate() {
+        for method in Method::ALL {
+            let h = timestep(every);
+            let mut errors = separation(&arm, &start, method, h, every, &reference);
+            errors.truncate(known);
+            runs.push((method, every, errors));
+        }
+        desk.at(before * parts + index + 1, 2 * parts);
+    }
+    let rate = lyapunov_rate(&arm, &start, desk.choose(600.0, 60.0));
+    desk.at((before + 1) * parts, 2 * parts);
+    Swing {
+        links: N,
+        known,
+        rate,
+        runs,
+    }
+}
+
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "counts of samples are far below 2^53"
+)]
+fn time(index: usize) -> f64 {
+    (index + 1) as f64 * SPACING
+}
+
+#[allow(clippy::cast_precision_loss, reason = "steps per sample are few")]
+fn timestep(every: u64) -> f64 {
+    SPACING / every as f64
+}
+
+impl Swing {
+    fn horizon(&self, method: Method, every: u64) -> Option<f64> {
+        let run = self
+            .runs
+            .iter()
+            .find(|run| run.0 == method && run.1 == every)?;
+        horizon(&run.2, SPACING)
+    }
+
+    fn known_until(&self) -> f64 {
+        time(self.known.saturating_sub(1))
+    }
+
+    fn lyapunov_time(&self) -> f64 {
+        1.0 / self.rate[0]
+    }
+}
+
+fn figure(swings: &[Swing]) -> Figure {
+    let plots: Vec<Plot> = swings
+        .iter()
+        .map(|swing| {
+            let x = Axis::linear("simulated time [s]", 0.0, swing.known_until().ceil());
+            let y = Axis::log_between("distance to the reference [rad]", Unit::Number, 1e-17, 1e3);
+            let mut plot = Plot::new(
+                format!(
+                    "{} links, steps of {}",
+                    swing.links,
+                    seconds(timestep(SHOWN))
+                ),
+                x,
+                y,
+            );
+            plot.marks.push(Mark::Horizontal {
+                y: HORIZON_ERROR,
+                class: "soft",
+                label: "horizon".to_owned(),
+                right: true,
+            });
+            for (method, _, errors) in swing.runs.iter().filter(|run| run.1 == SHOWN) {
+                let points = errors
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, error)| **error > 0.0 && error.is_finite())
+                    .map(|(index, error)| (time(index), *error));
+                plot.series.push(Series::line(method.name(), points));
+                if let Some(at) = swing.horizon(*method, SHOWN) {
+                    plot.marks.push(Mark::Vertical {
+                        x: at,
+                        class: method.name(),
+                        told: format!("{method}: horizon {} s", number(at)),
+                    });
+                }
+            }
+            // e-fold per Lyapunov time, as far as the paper goes.
+            let from = 0.25 * swing.known_until();
+            let to =
+                (from + 9.0 * std::f64::consts::LN_10 / swing.rate[0]).min(swing.known_until());
+            let growth = [from, to].map(|t| (t, 1e-15 * (swing.rate[0] * (t - from)).exp()));
+            plot.series.push(Series {
+                dashed: true,
+                ..Series::line("soft", growth)
+            });
+            plot
+        })
+        .collect();
+    let mut keys: Vec<Key> = Method::ALL
+        .iter()
+        .map(|method| Key::line(method.name(), method.name()))
+        .collect();
+    keys.push(Key {
+        dashed: true,
+        ..Key::line("soft", "growth at the Lyapunov rate")
+    });
+    Figure::new(
+        "separation",
+        headline(swings),
+        "Free swing from the horizontal. An error of 0.01 rad is the horizon (dotted upright lines); past it a swing and the true one have only \
+         their energy in common. The panel ends where the reference itself is no longer known, or where it was not taken further.",
+        &keys,
+        &plots,
+    )
+}
+
+fn headline(swings: &[Swing]) -> String {
+    let words: Vec<String> = swings
+        .iter()
+        .map(|swing| {
+            let last = EVERY
+                .into_iter()
+                .filter_map(|every| swing.horizon(Method::Rk4, every))
+                .fold(0.0, f64::max);
+            format!("{} links: {} s", swing.links, number(last))
+        })
+        .collect();
+    format!(
+        "Doubles end every comparison: the latest horizon of RK4 at any timestep here is, with {}",
+        words.join(", with ")
+    )
+}
+
+fn table(swings: &[Swing]) -> Table {
+    let mut head = vec!["Swing".to_owned(), "Method".to_owned()];
+    head.extend(EVERY.map(|every| format!("dt {}", seconds(timestep(every)))));
+    head.push("Lyapunov time".to_owned());
+    let head: Vec<&str> = head.iter().map(String::as_str).collect();
+    let mut table = Table::new(
+        "horizon",
+        "Horizon: when the error passes 0.01 rad [s]",
+        "The Lyapunov time is how long an error takes to grow by e, from two neighbouring swings followed for minutes; in brackets from each half alone.",
+        &head,
+    );
+    for swing in swings {
+        for method in Method::ALL {
+            let mut row = vec![
+                Cell::new(format!("{} links", swing.links)),
+                Cell::method(method),
+            ];
+            for every in EVERY {
+                row.push(match swing.horizon(method, every) {
+                    Some(at) => Cell::new(number(at)),
+                    None => Cell::new(format!("after {}", number(swing.known_until())))
+                        .detail("where the reference ends"),
+                });
+            }
+            let [_, first, second] = swing.rate;
+            row.push(if method == Method::Euler {
+                Cell::new(format!("{} s", number(swing.lyapunov_time()))).detail(format!(
+                    "{} s, {} s",
+                    number(1.0 / first),
+                    number(1.0 / second)
+                ))
+            } else {
+                Cell::default()
+            });
+            table.rows.push(row);
+        }
+    }
+    table
+}
+
+fn finding(swing: &Swing) -> Option<String> {
+    let coarse = swing.horizon(Method::Rk4, 64)?;
+    let fine = swing.horizon(Method::Rk4, 1024)?;
+    Some(format!(
+        "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every {} s, so sixteen times the work \
+         buys {} s.",
+        swing.links,
+        number(coarse),
+        seconds(timestep(64)),
+        number(fine),
+        seconds(timestep(1024)),
+        number(swing.lyapunov_time()),
+        number(fine - coarse)
+    ))
+}
+
+fn verdict(swing: &Swing) -> Verdict {
+    let horizons: Vec<f64> = Method::ALL
+        .into_iter()
+        .map(|method| swing.horizon(method, SHOWN).unwrap_or(f64::INFINITY))
+        .collect();
+    let told = |at: &f64| {
+        if at.is_finite() {
+            format!("{} s", number(*at))
+        } else {
+            format!("after {} s", number(swing.known_until()))
+        }
+    };
+    let text: Vec<String> = horizons.iter().map(told).collect();
+    let holds = match horizons.as_slice() {
+        &[euler, midpoint, verlet, rk4] => {
+            euler < midpoint.min(verlet) && midpoint.max(verlet) < rk4
+        }
+        _ => false,
+    };
+    Verdict {
+        claim: format!(
+            "{} links: a method of higher order has a later horizon at {}",
+            swing.links,
+            seconds(timestep(SHOWN))
+        ),
+        seen: text.join(", "),
+        holds,
+    }
+}

@@ -1,0 +1,191 @@
+//! The map: does a nudge of the arm die out or grow, by timestep and stiffness, under the predicted line.
+//!
+//! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
+
+use super::super::super::Desk;
+use super::super::super::csv::Csv;
+use super::super::super::section::Figure;
+use super::super::super::svg::{Axis, Heat, Key, Marker, Plot, Point, Series, Unit, seconds};
+use super::{Meter, setting};
+use crate::math::integrator::Method;
+use crate::study::linear::Linear;
+use crate::study::matrix::Matrix;
+use crate::study::stability::{Sampling, largest_timestep, step_matrix};
+
+/// Ends of the axes: timestep \[s\], factor on the shipped gains.
+const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
+const FACTORS: (f64, f64) = (1e-2, 1e2);
+
+/// Steps that a measurement of `study::measure` watches.
+const WATCHED: f64 = 4000.0;
+
+/// The map as it is made.
+pub(super) struct Map {
+    pub(super) csv: Csv,
+    /// Cells judged, and those whose verdict is not the predicted one.
+    pub(super) cells: usize,
+    pub(super) disagreeing: usize,
+    /// Cells not judged: see [`undecided`].
+    pub(super) undecided: usize,
+    /// Edges of the cells.
+    timesteps: Vec<f64>,
+    factors: Vec<f64>,
+    plots: Vec<Plot>,
+}
+
+/// Measures `columns` timesteps at three quarters as many stiffnesses, for every method and kind of control.
+pub(super) fn map(desk: &mut Desk<'_>, meter: &mut Meter, columns: usize) -> Map {
+    let mut map = Map {
+        csv: Csv::new("control,method,dt,gain_factor,growth,predicted_limit"),
+        cells: 0,
+        disagreeing: 0,
+        undecided: 0,
+        timesteps: edges_between(TIMESTEPS, columns),
+        factors: edges_between(FACTORS, columns * 3 / 4),
+        plots: Vec::new(),
+    };
+    for sampling in Sampling::ALL {
+        for method in Method::ALL {
+            map.panel(desk, meter, method, sampling);
+        }
+    }
+    map
+}
+
+impl Map {
+    fn panel(
+        &mut self,
+        desk: &mut Desk<'_>,
+        meter: &mut Meter,
+        method: Method,
+        sampling: Sampling,
+    ) {
+        let mut plot = Plot::new(
+            format!("{method}, {}", sampling.name()),
+            Axis::log_between("timestep", Unit::Seconds, TIMESTEPS.0, TIMESTEPS.1),
+            Axis::log_between(
+                "stiffness, times the shipped gains",
+                Unit::Number,
+                FACTORS.0,
+                FACTORS.1,
+            ),
+        );
+        let (mut rows, mut line, mut disagreeing) = (Vec::new(), Vec::new(), Vec::new());
+        for factor in centres(&self.factors) {
+            let (limit, row) = self.row(factor, method, sampling, &mut disagreeing);
+            line.push((limit, factor));
+            rows.push(row);
+            meter.add(desk, 1);
+        }
+        self.disagreeing += disagreeing.len();
+        plot.heat = Some(Heat {
+            x: self.timesteps.clone(),
+            y: self.factors.clone(),
+            rows,
+        });
+        plot.series.push(Series::line("ink", line));
+        plot.series.push(Series {
+            class: "ink",
+            marker: Marker::Circle,
+            line: false,
+            dashed: false,
+            points: disagreeing,
+        });
+        self.plots.push(plot);
+    }
+
+    /// Predicted limit and measured levels of one stiffness.
+    fn row(
+        &mut self,
+        factor: f64,
+        method: Method,
+        sampling: Sampling,
+        disagreeing: &mut Vec<Point>,
+    ) -> (f64, Vec<i8>) {
+        let setting = setting(factor, method, sampling);
+        let linear = Linear::at_setpoint(&setting.arm, &setting.gains, &setting.setpoint);
+        let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
+        let mut row = Vec::new();
+        for h in centres(&self.timesteps) {
+            let growth = setting.growth(h);
+            self.csv.row(&[
+                sampling.name().into(),
+                method.name().into(),
+                h.into(),
+                factor.into(),
+                growth.into(),
+                limit.into(),
+            ]);
+            let agrees = growth.is_some_and(|growth| growth < 1.0) == (h < limit);
+            if !agrees && undecided(&step_matrix(&linear, method, sampling, h)) {
+                self.undecided += 1;
+                row.push(0);
+                continue;
+            }
+            row.push(level(growth));
+            self.cells += 1;
+            if !agrees {
+                let told = format!("predicted limit {}", seconds(limit));
+                disagreeing.push(Point::new(h, factor, told));
+            }
+        }
+        (limit, row)
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        Figure::new(
+            "stability-map",
+            format!(
+                "Predicted and measured stability agree in {} of {} cells; {} change too slowly to judge",
+                self.cells - self.disagreeing,
+                self.cells,
+                self.undecided
+            ),
+            "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power of 3/2: \
+             the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows (orange), the darker \
+             the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: cells that \
+             the watch of some thousand steps is too short to judge, by the prediction itself. In the lowest rows the gains are too \
+             weak to carry the arm against gravity: no timestep is stable.",
+            &[Key::line("ink", "predicted limit")],
+            &self.plots,
+        )
+    }
+}
+
+/// Whether the watch of some thousand steps is too short to tell: by the prediction itself the slowest mode changes its energy by
+/// less than a factor e meanwhile, so that where in its swing it is looked at decides.
+fn undecided(step: &Matrix) -> bool {
+    2.0 * WATCHED * step.spectral_radius().ln().abs() < 1.0
+}
+
+/// Colour of a growth of energy over a few thousand steps.
+fn level(growth: Option<f64>) -> i8 {
+    match growth {
+        None => 4,
+        Some(growth) if growth > 1e4 => 3,
+        Some(growth) if growth > 10.0 => 2,
+        Some(growth) if growth >= 1.0 => 1,
+        Some(growth) if growth > 0.1 => -1,
+        Some(growth) if growth > 1e-4 => -2,
+        Some(growth) if growth > 0.0 => -3,
+        Some(_) => -4,
+    }
+}
+
+fn edges_between((low, high): (f64, f64), count: usize) -> Vec<f64> {
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "counts of cells are far below 2^53"
+    )]
+    let part = |index: usize| index as f64 / count as f64;
+    (0..=count)
+        .map(|index| low * (high / low).powf(part(index)))
+        .collect()
+}
+
+fn centres(edges: &[f64]) -> Vec<f64> {
+    edges
+        .windows(2)
+        .map(|pair| pair.iter().product::<f64>().sqrt())
+        .collect()
+}

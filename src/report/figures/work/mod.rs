@@ -1,0 +1,263 @@
+//! Work that a scene does not need, and whether it is left out.
+//!
+//! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be unmeasured.
+//!
+//! **Invariant:** no number in here that was not measured for this report.
+
+mod tables;
+
+use std::collections::HashMap;
+use std::hint::black_box;
+
+use tables::{steps_table, table};
+
+use super::super::Desk;
+use super::super::csv::Csv;
+use super::super::section::{Block, Section, Verdict};
+use super::super::svg::{number, seconds};
+use super::super::timing::{Effort, Timing, time};
+use crate::math::arm::{Arm, State};
+use crate::math::expression::Expression;
+use crate::math::integrator::Method;
+use crate::math::particle::Particle;
+use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::Simulation;
+
+const STEPS: u64 = 20_000;
+
+/// One kind of step, by the name that `benches/src/bin/work.rs` knows it by.
+struct Kind {
+    name: &'static str,
+    timing: Timing,
+}
+
+impl Kind {
+    /// Time of one step \[s\].
+    fn step_time(&self) -> f64 {
+        self.timing.minimum / in_f64(STEPS)
+    }
+}
+
+/// Counts by name, as the script left them.
+type Counts = HashMap<String, f64>;
+
+pub(super) fn make(desk: &mut Desk<'_>) -> Section {
+    let counts = read(desk);
+    let kinds = time_kinds(desk);
+    let same_bits = off_is_zero_gains::<2>() && off_is_zero_gains::<3>();
+    let mut csv = Csv::new("name,ns_per_step,ns_iqr,instructions_per_step");
+    for kind in &kinds {
+        let per_step = 1e9 / in_f64(STEPS);
+        let (low, high) = kind.timing.quartiles;
+        csv.row(&[
+            kind.name.into(),
+            (kind.timing.minimum * per_step).into(),
+            ((high - low) * per_step).into(),
+            counts.get(kind.name).copied().into(),
+        ]);
+    }
+    desk.keep("left-out", csv);
+    let table = table(&kinds, &counts, same_bits);
+    Section {
+        findings: findings(&kinds, &counts),
+        verdicts: verdicts(&counts, same_bits),
+        blocks: vec![
+            Block::Table(table),
+            Block::Table(steps_table(&kinds, &counts)),
+        ],
+        ..Section::default()
+    }
+}
+
+fn read(desk: &Desk<'_>) -> Counts {
+    let text = std::fs::read_to_string(desk.out.join("work.csv")).unwrap_or_default();
+    text.lines()
+        .skip(1)
+        .filter_map(|line| {
+            let mut fields = line.split(',');
+            let name = fields.next()?.to_owned();
+            Some((name, fields.next()?.parse().ok()?))
+        })
+        .collect()
+}
+
+fn start<const N: usize>(
+    gravity: f64,
+    integral: bool,
+    control: bool,
+    method: Method,
+) -> Simulation<N>
+where
+    Gains<N>: Default,
+{
+    let arm = Arm::new([1.0; N], [1.0; N], gravity).unwrap_or_default();
+    let mut gains = Gains::default();
+    if !integral {
+        gains.ki = [0.0; N];
+    }
+    let mut simulation = Simulation::new(arm, gains);
+    simulation.set_method(method);
+    simulation.set_state(State {
+        position: [0.4; N],
+        velocity: [0.0; N],
+    });
+    simulation.set_setpoint(Setpoint {
+        position: [0.4; N],
+        velocity: [0.0; N],
+    });
+    simulation.enable(control);
+    simulation
+}
+
+fn time_kinds(desk: &mut Desk<'_>) -> Vec<Kind> {
+    let effort = desk.choose(
+        Effort {
+            least: 15,
+            most: 60,
+            seconds: 0.5,
+        },
+        Effort {
+            least: 5,
+            most: 10,
+            seconds: 0.02,
+        },
+    );
+    let mut kinds = Vec::new();
+    let mut add = |name, work: &mut dyn FnMut() -> f64| {
+        kinds.push(Kind {
+            name,
+            timing: time(effort, work),
+        });
+        desk.at(kinds.len(), 12);
+    };
+    let two = |gravity, integral, control, method| {
+        let ready = start::<2>(gravity, integral, control, method);
+        move || run(&ready)
+    };
+    let three = |gravity, control| {
+        let ready = start::<3>(gravity, true, control, Method::Rk4);
+        move || run(&ready)
+    };
+    add(
+        "step-2-euler-free",
+        &mut two(9.81, true, false, Method::Euler),
+    );
+    add(
+        "step-2-midpoint-free",
+        &mut two(9.81, true, false, Method::Midpoint),
+    );
+    add(
+        "step-2-verlet-free",
+        &mut two(9.81, true, false, Method::Verlet),
+    );
+    add("step-2-rk4-free", &mut two(9.81, true, false, Method::Rk4));
+    add(
+        "step-2-rk4-weightless",
+        &mut two(0.0, true, false, Method::Rk4),
+    );
+    add("step-2-rk4-pd", &mut two(9.81, false, true, Method::Rk4));
+    add("step-2-rk4-pid", &mut two(9.81, true, true, Method::Rk4));
+    add("step-3-rk4-free", &mut three(9.81, false));
+    add("step-3-rk4-weightless", &mut three(0.0, false));
+    add("step-3-rk4-pid", &mut three(9.81, true));
+    add("particle-rk4-constant", &mut || particle("1"));
+    add("particle-rk4-cosine", &mut || particle("cos(2*t)"));
+    kinds
+}
+
+fn run<const N: usize>(ready: &Simulation<N>) -> f64 {
+    let mut simulation = ready.clone();
+    simulation.advance(STEPS);
+    black_box(simulation.state().position.iter().sum())
+}
+
+fn particle(function: &str) -> f64 {
+    let Ok(function) = Expression::parse(function) else {
+        return f64::NAN;
+    };
+    let Ok(mut particle) = Particle::new(function, 0.5, -0.25, 1e-4, STEPS, Method::Rk4) else {
+        return f64::NAN;
+    };
+    particle.advance(usize::MAX);
+    particle.positions().last().copied().unwrap_or(f64::NAN)
+}
+
+/// Whether an arm without control takes the same steps, bit for bit, as one under control with gains of zero.
+fn off_is_zero_gains<const N: usize>() -> bool
+where
+    Gains<N>: Default,
+{
+    Method::ALL.into_iter().all(|method| {
+        let mut off = start::<N>(9.81, true, false, method);
+        let mut zero = start::<N>(9.81, true, true, method);
+        zero.set_gains(Gains {
+            kp: [0.0; N],
+            ki: [0.0; N],
+            kd: [0.0; N],
+        });
+        off.advance(5000);
+        zero.advance(5000);
+        let bits = |simulation: &Simulation<N>| simulation.state().position.map(f64::to_bits);
+        bits(&off) == bits(&zero)
+    })
+}
+
+fn findings(kinds: &[Kind], counts: &Counts) -> Vec<String> {
+    let time = |name| {
+        kinds
+            .iter()
+            .find(|kind| kind.name == name)
+            .map(|kind| kind.timing.minimum / in_f64(STEPS))
+    };
+    let mut findings = Vec::new();
+    if let (Some(free), Some(pid)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid"))
+        && let (Some(free_time), Some(pid_time)) = (time("step-2-rk4-free"), time("step-2-rk4-pid"))
+    {
+        findings.push(format!(
+            "**Without control a 2-link RK4 step is {} instructions instead of {}** ({} instead of {}).",
+            number(free.round()),
+            number(pid.round()),
+            seconds(free_time),
+            seconds(pid_time)
+        ));
+    }
+    findings
+}
+
+fn verdicts(counts: &Counts, same_bits: bool) -> Vec<Verdict> {
+    let mut verdicts = vec![Verdict {
+        claim: "Leaving out the control law changes no bit".to_owned(),
+        seen: "5000 steps of every method, 2 and 3 links".to_owned(),
+        holds: same_bits,
+    }];
+    if let Some(allocations) = counts.get("allocations-in-steps") {
+        verdicts.push(Verdict {
+            claim: "A physics step allocates nothing".to_owned(),
+            seen: format!("{} allocations", number(*allocations)),
+            holds: *allocations < 0.5,
+        });
+    }
+    if let (Some(running), Some(paused)) =
+        (counts.get("server-running"), counts.get("server-paused"))
+    {
+        verdicts.push(Verdict {
+            claim: "A paused server works less than a running one".to_owned(),
+            seen: format!(
+                "{} against {} million instructions a second",
+                number(paused / 1e6),
+                number(running / 1e6)
+            ),
+            holds: paused < running,
+        });
+    }
+    verdicts
+}
+
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "counts of steps are far below 2^53"
+)]
+fn in_f64(count: u64) -> f64 {
+    count as f64
+}

@@ -1,0 +1,107 @@
+//! What the numbers were made on: processor, load, flags, commit.
+//!
+//! **Invariant:** what cannot be found out is called unknown, never guessed.
+
+use std::fs;
+use std::process::Command;
+
+use serde::{Deserialize, Serialize};
+
+/// Facts about the machine and the build, in the order in which they are shown.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Machine {
+    pub(crate) commit: String,
+    pub(crate) facts: Vec<(String, String)>,
+}
+
+impl Machine {
+    pub(crate) fn here() -> Self {
+        let commit = commit();
+        let fact = |name: &str, value: String| (name.to_owned(), value);
+        let unknown = || "unknown".to_owned();
+        let build = if cfg!(debug_assertions) {
+            "development build: its times say nothing about the shipped program"
+        } else {
+            "release build (optimised, link-time optimisation, one codegen unit)"
+        };
+        let facts = vec![
+            fact(
+                "Version",
+                format!("pendularm {}", env!("CARGO_PKG_VERSION")),
+            ),
+            fact("Commit", commit.clone()),
+            fact("Build", build.to_owned()),
+            fact(
+                "Target",
+                format!(
+                    "{} {}, {}",
+                    std::env::consts::ARCH,
+                    std::env::consts::OS,
+                    features()
+                ),
+            ),
+            fact(
+                "Compiler on the path",
+                output("rustc", &["--version"]).unwrap_or_else(unknown),
+            ),
+            fact("Processor", processor().unwrap_or_else(unknown)),
+            fact(
+                "Cores",
+                std::thread::available_parallelism().map_or_else(|_| unknown(), |n| n.to_string()),
+            ),
+            fact(
+                "Load when started",
+                load().map_or_else(unknown, |load| {
+                    format!("{load} (1, 5 and 15 minutes); above 0 somebody else was at work too")
+                }),
+            ),
+        ];
+        Self { commit, facts }
+    }
+}
+
+/// The commit that was built if the build was told, otherwise that of the working directory if it is this project's.
+fn commit() -> String {
+    if let Some(commit) = option_env!("PENDULARM_COMMIT") {
+        return commit.to_owned();
+    }
+    let ours = fs::read_to_string("Cargo.toml")
+        .is_ok_and(|manifest| manifest.contains("name = \"pendularm\""));
+    let head = ours
+        .then(|| output("git", &["rev-parse", "--short=12", "HEAD"]))
+        .flatten();
+    match head {
+        Some(head) => match output("git", &["status", "--porcelain", "--untracked-files=no"]) {
+            Some(changes) if !changes.is_empty() => format!("{head} with changes"),
+            _ => head,
+        },
+        None => "unknown".to_owned(),
+    }
+}
+
+fn output(program: &str, arguments: &[&str]) -> Option<String> {
+    let output = Command::new(program).args(arguments).output().ok()?;
+    let text = String::from_utf8(output.stdout).ok()?;
+    output.status.success().then(|| text.trim().to_owned())
+}
+
+fn processor() -> Option<String> {
+    let text = fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    Some(line.split_once(':')?.1.trim().to_owned())
+}
+
+fn load() -> Option<String> {
+    let text = fs::read_to_string("/proc/loadavg").ok()?;
+    Some(text.split(' ').take(3).collect::<Vec<_>>().join(" "))
+}
+
+fn features() -> &'static str {
+    if cfg!(target_feature = "avx2") {
+        "compiled for AVX2"
+    } else if cfg!(target_feature = "sse2") {
+        "compiled for the baseline (SSE2), no fused multiply-add"
+    } else {
+        "compiled for the baseline"
+    }
+}

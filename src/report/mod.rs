@@ -1,0 +1,241 @@
+//! The study as a page to look at: `pendularm report --out report/`.
+//!
+//! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one `.csv` and
+//! `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their files. What is
+//! measured is `math` and `study`; this is where the clock, the files and the drawing are.
+//!
+//! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
+
+mod csv;
+mod figures;
+mod html;
+mod machine;
+mod progress;
+mod section;
+mod svg;
+mod timing;
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use csv::Csv;
+use figures::SECTIONS;
+use machine::Machine;
+use progress::Progress;
+use section::{Block, Section, Table};
+use serde_json::{Value, json};
+
+/// What to make, and where.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReportOptions {
+    /// Directory for the results; made if it is not there.
+    pub out: PathBuf,
+    /// Sections to make anew; all if empty.
+    pub only: Vec<String>,
+    /// Coarser and shorter: a look in seconds instead of a report in minutes.
+    pub quick: bool,
+}
+
+/// Why there is no report.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// A name that is no section's.
+    #[error("--only: there is no section {name:?}; there are {}", names())]
+    UnknownSection {
+        /// The name.
+        name: String,
+    },
+    /// A file or directory that cannot be written.
+    #[error("cannot write {}: {error}", path.display())]
+    Write {
+        /// Which.
+        path: PathBuf,
+        /// What the system says.
+        error: io::Error,
+    },
+}
+
+/// The sections' names, in order, with commas between.
+#[must_use]
+pub fn names() -> String {
+    SECTIONS.map(|section| section.name).join(", ")
+}
+
+/// Makes the report and answers the page's path.
+///
+/// # Errors
+/// A section that does not exist, or a file that cannot be written.
+pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
+    for name in &options.only {
+        if !SECTIONS.iter().any(|section| section.name == name) {
+            return Err(ReportError::UnknownSection { name: name.clone() });
+        }
+    }
+    let machine = Machine::here();
+    let kept = options.out.join("sections");
+    fs::create_dir_all(&kept).map_err(|error| ReportError::Write {
+        path: kept.clone(),
+        error,
+    })?;
+    let wanted =
+        |name: &str| options.only.is_empty() || options.only.iter().any(|only| only == name);
+    let weight = |maker: &figures::Maker| if options.quick { 1.0 } else { maker.weight };
+    let total = SECTIONS
+        .iter()
+        .filter(|maker| wanted(maker.name))
+        .map(weight)
+        .sum();
+    let mut progress = Progress::new(total);
+    let mut sections = Vec::new();
+    for maker in &SECTIONS {
+        let file = kept.join(format!("{}.json", maker.name));
+        if wanted(maker.name) {
+            progress.begin(maker.name, weight(maker));
+            let section = make(maker, options, &machine, &mut progress)?;
+            progress.end();
+            write(&file, &serde_json::to_string(&section).unwrap_or_default())?;
+            sections.push(section);
+        } else if let Some(section) = read(&file) {
+            sections.push(section);
+        }
+    }
+    let page = options.out.join("index.html");
+    write(&page, &html::page(&sections, &machine))?;
+    let json = summary(&sections, &machine, options.quick);
+    write(
+        &options.out.join("report.json"),
+        &serde_json::to_string_pretty(&json).unwrap_or_default(),
+    )?;
+    let short = sections
+        .iter()
+        .flat_map(|section| &section.verdicts)
+        .filter(|verdict| !verdict.holds)
+        .count();
+    progress.finish(&format!(
+        "report: {} ({short} verdicts fall short)",
+        page.display()
+    ));
+    Ok(page)
+}
+
+fn make(
+    maker: &figures::Maker,
+    options: &ReportOptions,
+    machine: &Machine,
+    progress: &mut Progress,
+) -> Result<Section, ReportError> {
+    let started = Instant::now();
+    let mut desk = Desk {
+        quick: options.quick,
+        out: &options.out,
+        progress,
+        tables: Vec::new(),
+    };
+    let mut section = (maker.make)(&mut desk);
+    for (stem, csv) in desk.tables {
+        write(&options.out.join(format!("{stem}.csv")), &csv.into_text())?;
+    }
+    for block in &section.blocks {
+        if let Block::Figure(figure) = block {
+            let path = options.out.join(format!("{}.svg", figure.name));
+            write(&path, &figure.sheet)?;
+        }
+    }
+    maker.name.clone_into(&mut section.name);
+    maker.title.clone_into(&mut section.title);
+    section.commit.clone_from(&machine.commit);
+    section.quick = options.quick;
+    section.seconds = started.elapsed().as_secs_f64();
+    Ok(section)
+}
+
+/// What a section has at hand while it is made.
+#[derive(Debug)]
+pub(crate) struct Desk<'a> {
+    quick: bool,
+    /// Where the report is written, and counts from outside are looked for.
+    out: &'a Path,
+    progress: &'a mut Progress,
+    /// Stems and contents of `.csv` files.
+    tables: Vec<(String, Csv)>,
+}
+
+impl Desk<'_> {
+    /// One of two values: for the report, and for a quick look.
+    fn choose<T>(&self, full: T, quick: T) -> T {
+        if self.quick { quick } else { full }
+    }
+
+    fn at(&mut self, done: usize, of: usize) {
+        #[allow(
+            clippy::cast_precision_loss,
+            reason = "counts of runs are far below 2^53"
+        )]
+        self.progress.at(done as f64 / of as f64);
+    }
+
+    fn keep(&mut self, stem: &str, csv: Csv) {
+        self.tables.push((stem.to_owned(), csv));
+    }
+}
+
+/// Everything but the drawings.
+fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
+    let tables = |section: &Section| -> Vec<Value> {
+        let in_body = section.blocks.iter().filter_map(|block| match block {
+            Block::Table(table) => Some(table),
+            Block::Text(_) | Block::Figure(_) => None,
+        });
+        section.glance.iter().chain(in_body).map(rows).collect()
+    };
+    let sections: Vec<Value> = sections
+        .iter()
+        .map(|section| {
+            json!({
+                "name": section.name,
+                "title": section.title,
+                "findings": section.findings,
+                "verdicts": section.verdicts,
+                "tables": tables(section),
+                "seconds": section.seconds,
+                "commit": section.commit,
+                "quick": section.quick,
+            })
+        })
+        .collect();
+    json!({ "machine": machine, "quick": quick, "sections": sections })
+}
+
+fn rows(table: &Table) -> Value {
+    let cells = |row: &Vec<section::Cell>| -> Vec<String> {
+        row.iter()
+            .map(|cell| match cell.detail.as_str() {
+                "" => cell.text.clone(),
+                detail => format!("{} ({detail})", cell.text),
+            })
+            .collect()
+    };
+    json!({
+        "name": table.name,
+        "title": table.title,
+        "head": table.head,
+        "rows": table.rows.iter().map(cells).collect::<Vec<_>>(),
+    })
+}
+
+fn read(path: &Path) -> Option<Section> {
+    serde_json::from_str(&fs::read_to_string(path).ok()?).ok()
+}
+
+/// Writes beside the file first, so that there is always a whole one.
+fn write(path: &Path, text: &str) -> Result<(), ReportError> {
+    let beside = path.with_extension("part");
+    fs::write(&beside, text)
+        .and_then(|()| fs::rename(&beside, path))
+        .map_err(|error| ReportError::Write {
+            path: path.to_owned(),
+            error,
+        })
+}

@@ -1,0 +1,250 @@
+//! Small SVG plots: log axes, lines, markers, marks that explain, heat maps. No library, no script, no colour of its own.
+//!
+//! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with a marker
+//! shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
+//!
+//! **Invariant:** whatever has no place on the axes is drawn at the edge as lost, never dropped in silence.
+
+mod axis;
+mod heat;
+mod plot;
+
+pub(crate) use axis::{Axis, Unit, number, power, scientific, seconds};
+pub(crate) use heat::Heat;
+pub(crate) use plot::Plot;
+
+use std::fmt::Write;
+
+use crate::math::integrator::Method;
+
+/// Classes that plots use, for the page and for files of their own.
+pub(crate) const STYLE: &str = include_str!("style.css");
+
+/// Paper of one panel.
+pub(crate) const WIDTH: f64 = 420.0;
+pub(crate) const HEIGHT: f64 = 336.0;
+
+/// Shapes, so that colour is never alone in telling methods apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Marker {
+    None,
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+}
+
+impl Marker {
+    pub(crate) fn of(method: Method) -> Self {
+        match method {
+            Method::Euler => Self::Circle,
+            Method::Midpoint => Self::Square,
+            Method::Verlet => Self::Triangle,
+            Method::Rk4 => Self::Diamond,
+        }
+    }
+
+    /// The shape about `(x, y)` as a path.
+    pub(crate) fn path(self, x: f64, y: f64) -> String {
+        let r = 3.6;
+        match self {
+            Self::None => String::new(),
+            Self::Circle => format!(
+                "M{:.1} {y:.1}a{r} {r} 0 1 0 {d:.1} 0a{r} {r} 0 1 0 -{d:.1} 0z",
+                x - r,
+                d = 2.0 * r
+            ),
+            Self::Square => format!("M{:.1} {:.1}h6.4v6.4h-6.4z", x - 3.2, y - 3.2),
+            Self::Triangle => format!("M{x:.1} {:.1}l4.2 7.4h-8.4z", y - 4.6),
+            Self::Diamond => format!("M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6z", y - 4.6),
+        }
+    }
+}
+
+/// A point of a series, with what a pointer resting on it is told.
+#[derive(Debug, Clone)]
+pub(crate) struct Point {
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// From and to, along x.
+    pub(crate) spread: Option<(f64, f64)>,
+    pub(crate) told: String,
+}
+
+impl Point {
+    pub(crate) fn new(x: f64, y: f64, told: impl Into<String>) -> Self {
+        Self {
+            x,
+            y,
+            spread: None,
+            told: told.into(),
+        }
+    }
+}
+
+/// A line, or marks, or both.
+#[derive(Debug, Clone)]
+pub(crate) struct Series {
+    /// CSS class: a method's name, or one of the style's others.
+    pub(crate) class: &'static str,
+    pub(crate) marker: Marker,
+    pub(crate) line: bool,
+    pub(crate) dashed: bool,
+    pub(crate) points: Vec<Point>,
+}
+
+impl Series {
+    /// A method's line with its colour and marker.
+    pub(crate) fn of(method: Method, points: Vec<Point>) -> Self {
+        Self {
+            class: method.name(),
+            marker: Marker::of(method),
+            line: true,
+            dashed: false,
+            points,
+        }
+    }
+
+    /// A line without markers.
+    pub(crate) fn line(class: &'static str, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self {
+            class,
+            marker: Marker::None,
+            line: true,
+            dashed: false,
+            points: points
+                .into_iter()
+                .map(|(x, y)| Point::new(x, y, ""))
+                .collect(),
+        }
+    }
+}
+
+/// Something that explains.
+#[derive(Debug, Clone)]
+pub(crate) enum Mark {
+    /// A line up from `x`.
+    Vertical {
+        x: f64,
+        class: &'static str,
+        told: String,
+    },
+    /// A line across at `y`, labelled.
+    Horizontal {
+        y: f64,
+        class: &'static str,
+        label: String,
+        /// Whether the label stands at the right end; at the left otherwise.
+        right: bool,
+    },
+    /// Slopes of the given orders, from a corner at `(x, y)`, `decades` wide. Negative orders fall.
+    Slopes {
+        x: f64,
+        y: f64,
+        decades: f64,
+        orders: Vec<f64>,
+    },
+}
+
+/// One entry of a legend.
+#[derive(Debug, Clone)]
+pub(crate) struct Key {
+    pub(crate) class: &'static str,
+    pub(crate) marker: Marker,
+    pub(crate) dashed: bool,
+    pub(crate) label: String,
+}
+
+impl Key {
+    pub(crate) fn of(method: Method) -> Self {
+        Self {
+            class: method.name(),
+            marker: Marker::of(method),
+            dashed: false,
+            label: method.name().to_owned(),
+        }
+    }
+
+    /// The four methods.
+    pub(crate) fn methods() -> Vec<Self> {
+        Method::ALL.map(Self::of).to_vec()
+    }
+
+    pub(crate) fn line(class: &'static str, label: impl Into<String>) -> Self {
+        Self {
+            class,
+            marker: Marker::None,
+            dashed: false,
+            label: label.into(),
+        }
+    }
+
+    /// The sample of line and marker, as an `<svg>` element.
+    pub(crate) fn swatch(&self) -> String {
+        let dashed = if self.dashed { " dashed" } else { "" };
+        format!(
+            "<svg class=\"swatch\" viewBox=\"0 0 28 12\" width=\"28\" height=\"12\" aria-hidden=\"true\">\
+             <g class=\"series {}{dashed}\"><path class=\"line\" d=\"M1 6H27\"/><path class=\"marker\" d=\"{}\"/></g></svg>",
+            self.class,
+            self.marker.path(14.0, 6.0)
+        )
+    }
+}
+
+/// Panels and legend as one file: a grid `columns` wide, with its style inside.
+pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
+    let columns = match panels.len() {
+        few @ 0..=2 => few.max(1),
+        many if many % 4 == 0 => 4,
+        _ => 3,
+    };
+    let rows = panels.len().div_ceil(columns);
+    let header = 62.0;
+    let (width, height) = (WIDTH * in_f64(columns), HEIGHT * in_f64(rows) + header);
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\">\
+         <style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
+         <text class=\"heading\" x=\"14\" y=\"26\">{}</text>",
+        escape(title)
+    );
+    let mut x = 14.0;
+    for key in legend {
+        let swatch = key.swatch();
+        let _ = write!(
+            out,
+            "<g transform=\"translate({x} 40)\">{swatch}<text class=\"label\" x=\"34\" y=\"10\">{}</text></g>",
+            escape(&key.label)
+        );
+        x += 52.0 + 6.6 * in_f64(key.label.chars().count());
+    }
+    for (index, panel) in panels.iter().enumerate() {
+        let (x, y) = (
+            WIDTH * in_f64(index % columns),
+            header + HEIGHT * in_f64(index / columns),
+        );
+        let placed = panel.replacen(
+            "<svg ",
+            &format!("<svg x=\"{x}\" y=\"{y}\" width=\"{WIDTH}\" height=\"{HEIGHT}\" "),
+            1,
+        );
+        out.push_str(&placed);
+    }
+    out.push_str("</svg>\n");
+    out
+}
+
+/// Text for use between tags and in attributes.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;")
+        .replace('<', "&lt;")
+        .replace('>', "&gt;")
+        .replace('"', "&quot;")
+}
+
+#[allow(
+    clippy::cast_precision_loss,
+    reason = "counts of panels and letters are far below 2^53"
+)]
+fn in_f64(count: usize) -> f64 {
+    count as f64
+}

@@ -1,0 +1,69 @@
+//! The only clock of the study: how long a computation takes, as the minimum of repeats with their spread.
+//!
+//! Whatever else the machine does can only make a run longer, so the minimum is the best estimate of the computation itself;
+//! the quartiles say how noisy the machine was. Source: Chen and Revels, *Robust benchmarking in noisy environments*
+//! (2016), arXiv:1608.04295.
+//!
+//! **Invariant:** one untimed run comes first, nothing is compared, counted or written while the clock runs.
+
+use std::hint::black_box;
+use std::time::Instant;
+
+/// How often at least and at most, and for how long altogether \[s\].
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Effort {
+    pub(crate) least: usize,
+    pub(crate) most: usize,
+    pub(crate) seconds: f64,
+}
+
+/// Repeats of one computation \[s\].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Timing {
+    pub(crate) minimum: f64,
+    pub(crate) median: f64,
+    /// First and third quartile.
+    pub(crate) quartiles: (f64, f64),
+    pub(crate) repeats: u64,
+}
+
+/// Times `work`, again and again.
+pub(crate) fn time<T>(effort: Effort, mut work: impl FnMut() -> T) -> Timing {
+    let started = Instant::now();
+    black_box(work());
+    // Short computations are repeated within one measurement, or the clock itself would be measured.
+    const SHORTEST: f64 = 20e-6;
+    let once = started.elapsed().as_secs_f64().max(1e-9);
+    let batch = batch_for(SHORTEST / once);
+    let mut times = Vec::with_capacity(effort.most);
+    let started = Instant::now();
+    while times.len() < effort.most
+        && (times.len() < effort.least || started.elapsed().as_secs_f64() < effort.seconds)
+    {
+        let start = Instant::now();
+        for _ in 0..batch {
+            black_box(work());
+        }
+        times.push(start.elapsed().as_secs_f64() / f64::from(batch));
+    }
+    times.sort_by(f64::total_cmp);
+    let at = |quarter: usize| {
+        let index = (times.len().saturating_sub(1) * quarter + 2) / 4;
+        times.get(index).copied().unwrap_or(f64::NAN)
+    };
+    Timing {
+        minimum: at(0),
+        median: at(2),
+        quartiles: (at(1), at(3)),
+        repeats: times.len() as u64,
+    }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "clamped to small whole numbers first"
+)]
+fn batch_for(ratio: f64) -> u32 {
+    ratio.ceil().clamp(1.0, 1000.0) as u32
+}

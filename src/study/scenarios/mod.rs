@@ -1,0 +1,62 @@
+//! Named scenes, stiff and extreme, each with what is expected of it, what is observed, and whether that holds.
+//!
+//! Expectations come from theory or from the arm's own prediction, never from an earlier run. Some are verdicts of the study
+//! alone: efforts that are capped or late, and arms that the live one takes as the contract wants but a careful user would
+//! not. A scene that falls short says so.
+//!
+//! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds.
+
+mod extreme;
+mod gains;
+mod inertia;
+mod methods;
+mod motion;
+mod sampling;
+mod support;
+
+/// A named scene.
+#[derive(Debug, Clone, Copy)]
+pub struct Scenario {
+    /// `S01` to `S39`.
+    pub id: &'static str,
+    /// What it is called.
+    pub name: &'static str,
+    /// The arm, its motion and its control.
+    pub parameters: &'static str,
+    /// What a correct arm does.
+    pub expected: &'static str,
+    /// Whether it takes seconds.
+    pub slow: bool,
+    check: fn() -> Verdict,
+}
+
+impl Scenario {
+    /// Runs the scene.
+    #[must_use]
+    pub fn run(&self) -> Verdict {
+        (self.check)()
+    }
+}
+
+/// What came of a scene.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Verdict {
+    /// What was observed, with its figures.
+    pub observed: String,
+    /// Whether that is what was expected.
+    pub holds: bool,
+}
+
+/// All scenes, in order.
+#[must_use]
+pub fn all() -> Vec<Scenario> {
+    [
+        motion::SCENES.as_slice(),
+        gains::SCENES.as_slice(),
+        sampling::SCENES.as_slice(),
+        inertia::SCENES.as_slice(),
+        extreme::SCENES.as_slice(),
+        methods::SCENES.as_slice(),
+    ]
+    .concat()
+}

@@ -1,0 +1,390 @@
+//! The largest stable timestep, predicted.
+//!
+//! A method steps the linear system of [`Linear`] by a matrix, `x ↦ (I + h E) x`. The loop is stable at the timestep `h`
+//! as long as no eigenvalue `1 + h μ` of that matrix leaves the unit circle: `2 Re μ + h |μ|² ≤ 0` for every eigenvalue μ
+//! of `E`. `E` is formed without subtracting the identity, so that growth of a trillionth part shows at any timestep.
+//!
+//! | control | what is stepped | `E` |
+//! | --- | --- | --- |
+//! | in every stage | the loop `ẋ = A x` | Runge-Kutta of order p: `A + h/2 A² + … + h^(p-1)/p! A^p` |
+//! | held over the step | the arm with constant efforts, then the law closes the loop | monodromy matrix of one period |
+//!
+//! Verlet steps positions (and integrals) by `A + h/2 A²`, velocities by the mean of the accelerations at the start and
+//! at the predicted state. The held law is the shipped one: the integral takes up the error before it is used.
+//!
+//! Source: Hairer and Wanner, *Solving Ordinary Differential Equations II* (1996), ch. IV.2; for sampled control, Åström
+//! and Wittenmark, *Computer-Controlled Systems* (1997), ch. 2 and 3.
+//!
+//! **Invariant:** the answer is the end of the stable timesteps that begin at zero; stable islands beyond are ignored.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over the states of matrices that are made for them"
+)]
+
+use super::linear::{Equilibrium, Linear, equilibrium};
+use super::matrix::{Complex, Matrix, largest};
+use super::poses::minimum_over_poses;
+use crate::math::arm::Arm;
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+
+/// Part of the smallest limit over all poses that is advised: what linearisation leaves out (a start of 0.3 rad off
+/// costs up to a third of a stiff limit, poses on the way have limits of their own) stays within it.
+pub const ADVISED_PART: f64 = 0.8;
+
+/// Growth, relative to the fastest eigenvalue, that rounding can feign: eigenvalues of graded 9×9 matrices are good to
+/// some 1e-13.
+pub(super) const NEUTRAL: f64 = 1e-11;
+
+/// Where the search begins, in units of the fastest time constant. Already here an undamped swing shows its growth
+/// under Euler (1e-3) and midpoint (2.5e-10).
+const SEARCH_START: f64 = 1e-3;
+
+/// Until here the search doubles the timestep: so far below the fast mode's own limit only slow, regular things happen.
+const SEARCH_FINE: f64 = 0.1;
+
+/// Step of the search beyond, as a factor: an unstable window narrower than this may be missed.
+const SEARCH_STEP: f64 = 1.05;
+
+/// Where the search ends. No explicit method reaches beyond 3.
+const SEARCH_END: f64 = 30.0;
+
+/// When the control law looks at the state.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Sampling {
+    /// Once a step; the effort is held through all of the step's stages. What the live arm does.
+    Held,
+    /// In every stage, as if the law were part of the arm.
+    Continuous,
+}
+
+impl Sampling {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Held, Self::Continuous];
+
+    /// `held` or `continuous`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Held => "held",
+            Self::Continuous => "continuous",
+        }
+    }
+}
+
+/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep found unstable, as for a
+/// free arm without gravity, which linear methods carry at any pace.
+///
+/// Gains that are all zero mean an arm left to itself, and its hanging pose.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// At the setpoint's equilibrium, effort held over the step.
+    pub held: Option<f64>,
+    /// At the setpoint's equilibrium, control in every stage.
+    pub continuous: Option<f64>,
+    /// The smallest over a grid of poses, effort held over the step.
+    pub minimum_held: Option<f64>,
+    /// The smallest over a grid of poses, control in every stage.
+    pub minimum_continuous: Option<f64>,
+    /// [`ADVISED_PART`] of the smaller of `held` and `minimum_held`, the live arm's way.
+    pub advised: Option<f64>,
+}
+
+/// All limits of a loop. Some 5 ms of one core for two links, 0.1 s for three (optimised build).
+#[must_use]
+pub fn limits<const N: usize>(
+    arm: &Arm<N>,
+    gains: &Gains<N>,
+    setpoint: &Setpoint<N>,
+    method: Method,
+) -> Limits {
+    let rest = equilibrium(arm, gains, setpoint);
+    let linear = at_rest(arm, gains, &rest);
+    let held = largest_timestep(&linear, method, Sampling::Held);
+    let continuous = largest_timestep(&linear, method, Sampling::Continuous);
+    let over_poses = |sampling, bound| minimum_over_poses(arm, gains, method, sampling, bound);
+    let minimum_held = over_poses(Sampling::Held, held);
+    Limits {
+        held,
+        continuous,
+        minimum_held,
+        minimum_continuous: over_poses(Sampling::Continuous, continuous),
+        advised: minimum_held.map(|limit| ADVISED_PART * limit),
+    }
+}
+
+/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Half a millisecond of one core for two
+/// links, one for three (optimised build).
+#[must_use]
+pub fn limit_held<const N: usize>(
+    arm: &Arm<N>,
+    gains: &Gains<N>,
+    setpoint: &Setpoint<N>,
+    method: Method,
+) -> Option<f64> {
+    let rest = equilibrium(arm, gains, setpoint);
+    largest_timestep(&at_rest(arm, gains, &rest), method, Sampling::Held)
+}
+
+fn at_rest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>, rest: &Equilibrium<N>) -> Linear {
+    Linear::at(arm, gains, &rest.position, &rest.integrating)
+}
+
+/// The largest stable timestep of a linear loop \[s\]: see [`Limits`] for `None` and zero.
+#[must_use]
+pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> Option<f64> {
+    let stepping = Stepping::new(linear, method, sampling);
+    stepping.search(&Modes::of(linear))
+}
+
+/// As [`largest_timestep`] with the effort held over `substeps` steps of the method: the limit of the control period.
+#[must_use]
+pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
+    let stepping = Stepping {
+        substeps: substeps.max(1),
+        ..Stepping::new(linear, method, Sampling::Held)
+    };
+    stepping.search(&Modes::of(linear))
+}
+
+/// As [`largest_period`] with every effort acting one period late, as a bus or a slow controller would have it. There is no
+/// integral in it.
+#[must_use]
+pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
+    let stepping = Stepping {
+        substeps: substeps.max(1),
+        delayed: true,
+        ..Stepping::new(linear, method, Sampling::Held)
+    };
+    stepping.search(&Modes::of(linear))
+}
+
+/// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
+#[must_use]
+pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) -> Matrix {
+    let stepping = Stepping::new(linear, method, sampling);
+    stepping.generator(h).shifted_identity(h)
+}
+
+/// The loop as it would be in continuous time.
+pub(super) struct Modes {
+    eigenvalues: Vec<Complex>,
+    /// The fastest rate \[1/s\].
+    rate: f64,
+}
+
+impl Modes {
+    pub(super) fn of(linear: &Linear) -> Self {
+        let eigenvalues = linear.flow().eigenvalues();
+        Self {
+            rate: largest(eigenvalues.iter().map(|mode| mode.modulus())),
+            eigenvalues,
+        }
+    }
+
+    /// Whether there is a mode that no timestep can help: one that grows, or one so near to drifting that rounding
+    /// decides on which side it is (a double zero is good to the root of the rounding error).
+    pub(super) fn run_away(&self) -> bool {
+        let noise = 0.1 * NEUTRAL * self.rate;
+        self.eigenvalues.iter().any(|mode| {
+            let drifts = mode.modulus() < 1e-6 * self.rate;
+            mode.re > if drifts { -noise } else { noise } || mode.re.is_nan()
+        })
+    }
+}
+
+/// A linear loop, and how it is stepped.
+pub(super) struct Stepping<'a> {
+    linear: &'a Linear,
+    method: Method,
+    sampling: Sampling,
+    /// Steps of the method in one control period.
+    substeps: u32,
+    /// Whether an effort acts one period late.
+    delayed: bool,
+    /// What the method steps: the loop, or the arm with constant efforts.
+    stepped: Matrix,
+}
+
+impl<'a> Stepping<'a> {
+    pub(super) fn new(linear: &'a Linear, method: Method, sampling: Sampling) -> Self {
+        Self {
+            linear,
+            method,
+            sampling,
+            substeps: 1,
+            delayed: false,
+            stepped: match sampling {
+                Sampling::Continuous => linear.flow(),
+                Sampling::Held => linear.plant(),
+            },
+        }
+    }
+
+    /// `E` of `x ↦ (I + T E) x` over the period `T` \[s\].
+    fn generator(&self, period: f64) -> Matrix {
+        let h = period / f64::from(self.substeps);
+        let free = if self.method == Method::Verlet {
+            self.verlet(h)
+        } else {
+            runge_kutta(&self.stepped, self.method.order(), h)
+        };
+        match self.sampling {
+            Sampling::Continuous => free,
+            Sampling::Held if self.delayed => self.close_late(self.repeated(&free, h), period),
+            Sampling::Held => self.close(&self.repeated(&free, h), period),
+        }
+    }
+
+    /// Velocity Verlet, its predictor and one correction, on the states in [`Linear`]'s order.
+    fn verlet(&self, h: f64) -> Matrix {
+        let (n, a) = (self.linear.joints(), &self.stepped);
+        let size = a.size();
+        let moves_slowly = |row: usize| !(n..2 * n).contains(&row);
+        let second = a.clone().plus(0.5 * h, &a.product(a));
+        let predicted = Matrix::from_fn(size, |row, column| {
+            if moves_slowly(row) {
+                second[(row, column)]
+            } else {
+                a[(row, column)]
+            }
+        });
+        let mean = a.clone().plus(0.5 * h, &a.product(&predicted));
+        Matrix::from_fn(size, |row, column| {
+            if moves_slowly(row) {
+                second[(row, column)]
+            } else {
+                mean[(row, column)]
+            }
+        })
+    }
+
+    /// `((I + h E)^m - I) / (m h)` for the `m` substeps of a period.
+    fn repeated(&self, step: &Matrix, h: f64) -> Matrix {
+        let mut sum = step.clone();
+        for _ in 1..self.substeps {
+            let product = step.product(&sum);
+            sum = sum.plus(1.0, step).plus(h, &product);
+        }
+        let size = sum.size();
+        Matrix::zeros(size).plus(1.0 / f64::from(self.substeps), &sum)
+    }
+
+    /// The law, once a period: `s ↦ s - T x`, then `u = -kp x - kd v + ki s` held.
+    fn close(&self, arm: &Matrix, period: f64) -> Matrix {
+        let linear = self.linear;
+        let n = linear.joints();
+        let mut closed = Matrix::zeros(linear.states());
+        for row in 0..2 * n {
+            for j in 0..n {
+                let effort = arm[(row, 2 * n + j)];
+                closed[(row, j)] = arm[(row, j)] - effort * linear.kp[j];
+                closed[(row, n + j)] = arm[(row, n + j)] - effort * linear.kd[j];
+            }
+            for (k, &(joint, ki)) in linear.integrals.iter().enumerate() {
+                let effort = arm[(row, 2 * n + joint)] * ki;
+                closed[(row, 2 * n + k)] = effort;
+                closed[(row, joint)] -= effort * period;
+            }
+        }
+        for (k, &(joint, _)) in linear.integrals.iter().enumerate() {
+            closed[(2 * n + k, joint)] = -1.0;
+        }
+        closed
+    }
+
+    /// The law, once a period, for the period after: efforts are states, `u ↦ -kp x - kd v`.
+    fn close_late(&self, mut arm: Matrix, period: f64) -> Matrix {
+        let n = self.linear.joints();
+        for j in 0..n {
+            arm[(2 * n + j, j)] = -self.linear.kp[j] / period;
+            arm[(2 * n + j, n + j)] = -self.linear.kd[j] / period;
+            arm[(2 * n + j, 2 * n + j)] = -1.0 / period;
+        }
+        arm
+    }
+
+    /// Fastest growth of any mode, `max (2 Re μ + h |μ|²)`, relative to the largest `|μ|`; NaN if not finite.
+    pub(super) fn growth(&self, period: f64) -> f64 {
+        let values = self.generator(period).eigenvalues();
+        let fastest = largest(values.iter().map(|mu| mu.modulus()));
+        if fastest == 0.0 {
+            return 0.0;
+        }
+        values
+            .iter()
+            .map(|mu| (2.0 * mu.re + period * mu.modulus() * mu.modulus()) / fastest)
+            .fold(f64::NEG_INFINITY, |max, growth| {
+                if growth > max || growth.is_nan() {
+                    growth
+                } else {
+                    max
+                }
+            })
+    }
+
+    /// Whether nothing grows at this period. NaN is not stable.
+    pub(super) fn is_stable(&self, period: f64) -> bool {
+        self.growth(period) <= NEUTRAL
+    }
+
+    /// Upward from far below the fastest time constant to the first unstable period, then bisection.
+    pub(super) fn search(&self, modes: &Modes) -> Option<f64> {
+        let rate = modes.rate;
+        if rate == 0.0 {
+            return None;
+        }
+        let start = SEARCH_START / rate;
+        if !self.is_stable(start) {
+            // Almost no damping may still carry periods a thousand times shorter. It must show as decay there: what
+            // only seems neutral is growth too small to see, as of an undamped swing under midpoint.
+            let tiny = 1e-3 * start;
+            return if self.growth(tiny) < -NEUTRAL {
+                Some(self.bisect(tiny, start))
+            } else {
+                Some(0.0)
+            };
+        }
+        let mut stable = start;
+        while stable * rate < SEARCH_END {
+            let step = if stable * rate < SEARCH_FINE {
+                2.0
+            } else {
+                SEARCH_STEP
+            };
+            let next = step * stable;
+            if !self.is_stable(next) {
+                return Some(self.bisect(stable, next));
+            }
+            stable = next;
+        }
+        None
+    }
+
+    /// The boundary between a stable and an unstable period, to some units of rounding.
+    fn bisect(&self, mut stable: f64, mut unstable: f64) -> f64 {
+        // A thousandfold interval takes 60 halvings of its logarithm to come down to 1e-14.
+        for _ in 0..60 {
+            let middle = (stable * unstable).sqrt();
+            if middle <= stable || middle >= unstable || unstable - stable < 1e-13 * stable {
+                break;
+            }
+            if self.is_stable(middle) {
+                stable = middle;
+            } else {
+                unstable = middle;
+            }
+        }
+        stable
+    }
+}
+
+/// `A + h/2 A² + … + h^(p-1)/p! A^p`, by Horner's rule.
+fn runge_kutta(a: &Matrix, order: u32, h: f64) -> Matrix {
+    let mut sum = a.clone();
+    for k in (2..=order).rev() {
+        sum = a.clone().plus(h / f64::from(k), &a.product(&sum));
+    }
+    sum
+}
