@@ -122,7 +122,7 @@ fn a_name_that_only_resembles_a_service_is_none() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     for service in [
-        "arm_sim/pause",
+        "//arm_sim/pause",
         "/arm_sim/pause/",
         "/ARM_SIM/pause",
         "/arm_sim/pause ",

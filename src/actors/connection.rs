@@ -53,10 +53,15 @@ pub const LINGER: Duration = Duration::from_secs(5);
 pub const ANSWERS_OWED: Duration = Duration::from_secs(15);
 
 /// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
-const ARM_STATE: [&str; 3] = [
+const ARM_STATE: [&str; 8] = [
     Topic::JointStates.name(),
+    Topic::JointStates.short_name(),
     Topic::Clock.name(),
+    Topic::Clock.short_name(),
     Topic::Diagnostics.name(),
+    Topic::Diagnostics.short_name(),
+    Topic::Tf.name(),
+    Topic::Tf.short_name(),
 ];
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -90,6 +95,8 @@ struct Shared {
     refusing: Cell<bool>,
     /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
     unbatched: Cell<bool>,
+    /// Whether frames may be binary: over raw TCP they are text.
+    binary: Cell<bool>,
     /// Bytes of responses in the outbox, for the registry to look at.
     backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
@@ -126,6 +133,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             finishing: Cell::new(false),
             refusing: Cell::new(false),
             unbatched: Cell::new(false),
+            binary: Cell::new(false),
             backlog: Arc::default(),
             gauges,
         });

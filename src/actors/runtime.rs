@@ -16,7 +16,7 @@ use tokio::runtime::Builder;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep};
 
-use super::arm_sim::ArmSim;
+use super::arm_sim::{ArmSim, joint_names};
 use super::connection::gate::Gate;
 use super::gauges::Gauges;
 use super::ik::Ik;
@@ -25,6 +25,8 @@ use super::ik_trial::{GoalClient, IkTrial};
 use super::integration::Integration;
 use super::listener::{Listener, StopListening};
 use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
+use super::rosapi::Rosapi;
+use super::rosout::Rosout;
 use super::workers::WorkerPool;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -155,6 +157,15 @@ fn start_nodes<const N: usize>(
         ArmSim::new(Arm::default(), Gains::default(), publish, respond, gauges)
     });
     ArmSim::attach(&arm, nodes);
+    let introspection = Rosapi::new(
+        registry.clone().recipient(),
+        arm.clone().recipient(),
+        arm.clone().recipient(),
+        &joint_names::<N>(),
+    );
+    Rosapi::attach(&introspection.start(), nodes);
+    let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
+    Rosout::attach(&rosout.start(), nodes);
 
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
+use super::fragments::Piece;
 use super::messages::Level;
 pub use reader::read;
 
@@ -75,6 +76,15 @@ pub enum Op {
     },
     /// Calls a service.
     CallService(CallService),
+    /// A goal for an action.
+    SendActionGoal(ActionGoal),
+    /// The end of the goal that has the frame's id.
+    CancelActionGoal {
+        /// Action name.
+        action: String,
+    },
+    /// A piece of a longer frame.
+    Fragment(Piece),
     /// Which statuses the sender wants from now on.
     SetLevel(Verbosity),
     /// Shows who the sender is, where the runtime asks for that.
@@ -123,6 +133,41 @@ pub struct Subscribe {
     pub throttle: Duration,
     /// How many messages throttling may hold back; 1 to [`MAX_QUEUE_LENGTH`].
     pub queue_length: usize,
+    /// How messages are to be written.
+    pub encoding: Encoding,
+}
+
+/// How a subscriber wants its messages written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Encoding {
+    /// As what.
+    pub compression: Compression,
+    /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. None: in one piece always.
+    pub fragment_size: Option<usize>,
+}
+
+impl Encoding {
+    /// What two subscriptions of one client come to: the denser encoding, the smaller pieces.
+    #[must_use]
+    pub fn merged(self, other: Self) -> Self {
+        let sizes = self.fragment_size.into_iter().chain(other.fragment_size);
+        Self {
+            compression: self.compression.max(other.compression),
+            fragment_size: sizes.min(),
+        }
+    }
+}
+
+/// As what a message is written; of several that a client asked for, the last in this order counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Compression {
+    /// JSON. Also where `png` was asked for, which saves nothing on messages as short as ours.
+    #[default]
+    None,
+    /// CBOR, with typed arrays.
+    Cbor,
+    /// CDR in CBOR.
+    CborRaw,
 }
 
 /// A service call.
@@ -134,6 +179,19 @@ pub struct CallService {
     pub args: Arguments,
     /// How long an external provider may take, if given; at most [`MAX_TIMEOUT`].
     pub timeout: Option<Duration>,
+}
+
+/// A goal.
+#[derive(Debug, Clone)]
+pub struct ActionGoal {
+    /// Action name.
+    pub action: String,
+    /// Action type, if given.
+    pub type_name: Option<String>,
+    /// Its fields.
+    pub args: Arguments,
+    /// Whether feedback is wanted.
+    pub feedback: bool,
 }
 
 /// The arguments of a call.

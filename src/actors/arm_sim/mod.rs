@@ -12,6 +12,7 @@
 
 mod by_hand;
 mod goals;
+mod scene;
 mod services;
 mod telemetry;
 
@@ -32,7 +33,7 @@ use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::catalog::{Direction, Node, Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::trajectory::joint_trajectory;
 
@@ -106,7 +107,11 @@ impl<const N: usize> ArmSim<N> {
                 nodes.services.insert(service, address.clone().recipient());
             }
         }
-        for topic in [Topic::JointStates, Topic::Clock, Topic::Diagnostics] {
+        let published = |topic: &Topic| topic.direction() == Direction::Published;
+        for topic in Topic::ALL.into_iter().filter(published) {
+            if topic.owner() != Node::ArmSim {
+                continue;
+            }
             nodes.publishers.insert(topic, address.clone().recipient());
         }
         nodes
@@ -116,6 +121,11 @@ impl<const N: usize> ArmSim<N> {
 }
 
 // ---- messages -------------------------------------------------------------------------------------------------------
+
+/// What time it is in the simulation \[s\]. From `rosapi` and `rosout`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "f64")]
+pub struct SimulationTime;
 
 /// Which simulation an offline observer would have to run to get the present state. From tests and tools.
 #[derive(Message)]
@@ -190,6 +200,16 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
 
     fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
         self.telemetry.set_wanted(interest.topic, interest.wanted);
+        self.publish_lasting(interest.topic);
+    }
+}
+
+impl<const N: usize> Handler<SimulationTime> for ArmSim<N> {
+    type Result = f64;
+
+    fn handle(&mut self, _: SimulationTime, ctx: &mut Context<Self>) -> f64 {
+        self.advance_to_now(ctx);
+        self.simulation.time()
     }
 }
 

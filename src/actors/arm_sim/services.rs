@@ -140,6 +140,7 @@ impl<const N: usize> ArmSim<N> {
             Ok(changed) if changed != *arm => {
                 self.simulation.set_arm(changed);
                 self.restart_energy_drift();
+                self.publish_description();
             }
             Ok(_) => {}
             // The fields were checked with the same bounds; should the two ever differ, the arm's word counts.

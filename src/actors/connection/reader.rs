@@ -17,15 +17,20 @@ use super::{ANSWERS_OWED, Finish, Shared};
 use crate::actors::ConnectionId;
 use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
+use crate::protocol::fragments::Fragments;
 use crate::protocol::frame::{Frame, FrameError, FrameReader};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::{self, CallService, Incoming, Op, OpError};
+use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
 use crate::protocol::token::Token;
 
 /// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
 /// a socket with unread input resets it.
 const DISCARD_TIME: Duration = Duration::from_secs(1);
 const DISCARD_BYTES: usize = 16 * 1024 * 1024;
+
+/// What a client hears that asks for binary frames over raw TCP.
+const NO_BINARY: &str = "subscribe: compression cbor and cbor-raw need WebSocket; over raw TCP every frame is a line of JSON";
+const NESTED_FRAGMENT: &str = "fragment: the pieces make a fragment again";
 
 /// The reading half of a connection.
 pub(super) struct Reader {
@@ -34,6 +39,8 @@ pub(super) struct Reader {
     registry: Addr<Registry>,
     finish: Recipient<Finish>,
     frames: FrameReader,
+    /// Frames that come in pieces.
+    fragments: Fragments,
     /// What the client has yet to show before anything is done for it.
     locked: Option<Token>,
 }
@@ -65,6 +72,7 @@ impl Reader {
             registry,
             finish,
             frames: FrameReader::new(),
+            fragments: Fragments::default(),
             locked,
         }
     }
@@ -169,8 +177,15 @@ impl Reader {
             Err(error) => return self.complain(&error.to_string(), None).await,
         };
         self.shared.unbatched.set(!frame.newline);
-        let Incoming { id, op } = op::read(&frame.text);
+        let Some(Incoming { id, op }) = self.assemble(op::read(&frame.text)).await else {
+            return;
+        };
         match op {
+            Ok(Op::Subscribe(Subscribe { encoding, .. }))
+                if encoding.compression != Compression::None && !self.shared.binary.get() =>
+            {
+                self.complain(NO_BINARY, id.as_deref()).await;
+            }
             Ok(op) => {
                 self.perform(Request {
                     from: self.id,
@@ -188,6 +203,38 @@ impl Reader {
                 self.complain(&problem.to_string(), id.as_deref()).await;
             }
         }
+    }
+
+    /// Whatever is no fragment, as it is; of fragments, the frame that they make once all are there.
+    async fn assemble(&mut self, incoming: Incoming) -> Option<Incoming> {
+        let Ok(Op::Fragment(piece)) = incoming.op else {
+            return Some(incoming);
+        };
+        let id = incoming.id;
+        let whole = match self.fragments.take(piece, Instant::now().into_std()) {
+            Ok(whole) => whole?,
+            Err(why) => {
+                self.complain(&why.to_string(), id.as_deref()).await;
+                return None;
+            }
+        };
+        // A frame like any other: the same bounds hold, and the same leniency.
+        let mut frames = FrameReader::new();
+        frames.push(whole.as_bytes());
+        frames.push(b"\n");
+        let why = match frames.next() {
+            Some(Ok(frame)) => match op::read(&frame.text) {
+                Incoming {
+                    op: Ok(Op::Fragment(_)),
+                    ..
+                } => NESTED_FRAGMENT.to_owned(),
+                whole => return Some(whole),
+            },
+            Some(Err(why)) => why.to_string(),
+            None => return None,
+        };
+        self.complain(&why, id.as_deref()).await;
+        None
     }
 
     /// The client has not shown what it has to: it is told so, and nothing that it sends is looked at any more.

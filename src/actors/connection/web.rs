@@ -67,12 +67,13 @@ impl Session {
             op: Op::SetLevel(Verbosity::NONE),
         };
         let _ = self.registry.send(quiet).await;
+        self.shared.binary.set(true);
         let link = Link::open(stream, &behind).await;
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,
             shared: Rc::clone(&self.shared),
-            in_message: false,
+            unfinished: None,
         };
         // Whoever got here has shown the token already, if there is one.
         let reader = self.reader(id, None);
@@ -241,8 +242,8 @@ fn farewell(error: &Error) -> (CloseCode, &'static str) {
 struct Output<S> {
     link: Rc<Link<S>>,
     shared: Rc<Shared>,
-    /// The first frame of the next write goes on with a message that has begun.
-    in_message: bool,
+    /// What the first frame of the next write goes on with, if it does not begin a message.
+    unfinished: Option<Data>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
@@ -255,22 +256,22 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
             if written > 0 && frame.len() > room {
                 break;
             }
-            let piece = frame.slice(..frame.len().min(room));
-            let is_last = piece.len() == frame.len();
+            let kind = self.unfinished.unwrap_or_else(|| kind_of(frame));
+            let (piece, is_last) = first_piece(frame, kind == Data::Text, room);
             written += piece.len();
-            let opcode = if self.in_message {
-                Data::Continue
-            } else {
-                Data::Text
+            let is_whole = piece.len() == frame.len();
+            let opcode = match self.unfinished {
+                Some(_) => Data::Continue,
+                None => kind,
             };
-            self.in_message = !is_last;
+            self.unfinished = (!is_last).then_some(kind);
             let payload = match piece.strip_suffix(b"\n") {
-                Some(line) if is_last => piece.slice_ref(line),
+                Some(line) if is_last && kind == Data::Text => piece.slice_ref(line),
                 _ => piece,
             };
             let part = Frame::message(payload, OpCode::Data(opcode), is_last);
             self.link.put(Message::Frame(part))?;
-            if !is_last {
+            if !is_whole {
                 break;
             }
         }
@@ -298,6 +299,29 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         }
         // Nothing that it sends is looked at any more, a close frame included: the stream's own end has to do.
         poll_fn(|cx| Pin::new(self.link.socket.borrow_mut().get_mut()).poll_shutdown(cx)).await
+    }
+}
+
+/// How a frame goes out: JSON begins with a brace, CBOR never does.
+fn kind_of(frame: &Bytes) -> Data {
+    if frame.first() == Some(&b'{') {
+        Data::Text
+    } else {
+        Data::Binary
+    }
+}
+
+/// As much of a frame as there is room for in one WebSocket frame, and whether a message ends there. A text may be several
+/// messages, one per line.
+fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
+    let offered = frame.slice(..frame.len().min(room));
+    if !is_text {
+        let is_last = offered.len() == frame.len();
+        return (offered, is_last);
+    }
+    match offered.iter().position(|&byte| byte == b'\n') {
+        Some(end) => (offered.slice(..=end), true),
+        None => (offered, false),
     }
 }
 

@@ -16,6 +16,7 @@ use crate::actors::connection::{Answer, Configure, Deliver, Finish};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::Level;
 use crate::protocol::op::Op;
+use crate::protocol::rosapi::Census;
 
 /// The runtime's nodes. From the runtime, once, before any client is accepted.
 #[derive(Message)]
@@ -109,6 +110,23 @@ pub struct Respond {
     /// Dropped once the frame is on its way, where that is also the end of the call.
     pub done: Option<oneshot::Sender<()>>,
 }
+
+/// Progress of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the goal.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Progress {
+    /// The client.
+    pub connection: ConnectionId,
+    /// The action, as the client spells it.
+    pub action: Arc<str>,
+    /// The whole frame.
+    pub frame: Bytes,
+}
+
+/// Which topics and services clients have. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Census")]
+pub struct TakeCensus;
 
 /// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
 #[derive(Message)]

@@ -2,7 +2,9 @@
 //!
 //! **Invariant:** a service without an entry does not compile.
 
+use super::rosapi::Rosapi;
 use super::{Field, Node, optional, required};
+use crate::protocol::names;
 
 /// A service of the runtime's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -37,10 +39,12 @@ pub enum Service {
     TrialSkip,
     /// Ends the trial.
     TrialStop,
+    /// A question of rosapi, under either of its prefixes.
+    Rosapi(Rosapi),
 }
 
 impl Service {
-    /// All services, in the order in which they are documented.
+    /// The arm's own services, in the order in which they are documented; the others are [`Rosapi::ALL`].
     pub const ALL: [Self; 15] = [
         Self::IntegrationStep,
         Self::SetIntegrator,
@@ -76,6 +80,7 @@ impl Service {
             Self::TrialStart => &TRIAL_START,
             Self::TrialSkip => &TRIAL_SKIP,
             Self::TrialStop => &TRIAL_STOP,
+            Self::Rosapi(question) => question.entry(),
         }
     }
 
@@ -85,10 +90,12 @@ impl Service {
         self.entry().name
     }
 
-    /// The service of that name, if it is the runtime's own.
+    /// The service of that name, if it is the runtime's own; the leading slash may be left out.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|service| service.name() == name)
+        let name = names::absolute(name);
+        let own = Self::ALL.into_iter().find(|service| service.name() == name);
+        own.or_else(|| Rosapi::from_name(&name).map(Self::Rosapi))
     }
 
     /// The service type, as ROS writes it.
@@ -136,12 +143,12 @@ impl Service {
     }
 }
 
-struct ServiceEntry {
-    name: &'static str,
-    type_name: &'static str,
-    owner: Node,
-    request: &'static [Field],
-    response: &'static [Field],
+pub(super) struct ServiceEntry {
+    pub(super) name: &'static str,
+    pub(super) type_name: &'static str,
+    pub(super) owner: Node,
+    pub(super) request: &'static [Field],
+    pub(super) response: &'static [Field],
 }
 
 const INTEGRATION_STEP: ServiceEntry = ServiceEntry {

@@ -8,9 +8,10 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 use super::{
-    Arguments, CallService, Incoming, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
-    OpError, Problem, Subscribe, Verbosity,
+    ActionGoal, Arguments, CallService, Compression, Encoding, Incoming, MAX_NAME,
+    MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, Subscribe, Verbosity,
 };
+use crate::protocol::fragments::Piece;
 use crate::protocol::messages::Level;
 use crate::protocol::{json, text};
 
@@ -18,7 +19,7 @@ use crate::protocol::{json, text};
 const MAX_COMPLAINT: usize = 160;
 
 /// The members of a frame that mean something to us.
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 23] = [
     "op",
     "id",
     "topic",
@@ -34,10 +35,18 @@ const KEYS: [&str; 15] = [
     "status",
     "level",
     "token",
+    "compression",
+    "fragment_size",
+    "data",
+    "num",
+    "total",
+    "action",
+    "action_type",
+    "feedback",
 ];
 
 /// The operations that we know.
-const OPS: [&str; 11] = [
+const OPS: [&str; 14] = [
     "advertise",
     "unadvertise",
     "publish",
@@ -49,6 +58,9 @@ const OPS: [&str; 11] = [
     "service_response",
     "set_level",
     "auth",
+    "fragment",
+    "send_action_goal",
+    "cancel_action_goal",
 ];
 
 /// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
@@ -127,6 +139,19 @@ impl<'a> Reader<'a> {
             "unadvertise_service" => Op::UnadvertiseService {
                 service: self.name("service")?,
             },
+            "send_action_goal" => Op::SendActionGoal(ActionGoal {
+                action: self.name("action")?,
+                type_name: self.optional_text("action_type")?,
+                args: self.args(),
+                feedback: match self.get("feedback") {
+                    Some(_) => self.boolean("feedback")?,
+                    None => false,
+                },
+            }),
+            "cancel_action_goal" => Op::CancelActionGoal {
+                action: self.name("action")?,
+            },
+            "fragment" => Op::Fragment(self.piece()?),
             "set_level" => Op::SetLevel(self.verbosity()?),
             "auth" => Op::Auth {
                 token: self.secret()?,
@@ -144,7 +169,54 @@ impl<'a> Reader<'a> {
             type_name: self.optional_text("type")?,
             throttle: self.throttle()?,
             queue_length: self.queue_length()?,
+            encoding: Encoding {
+                compression: self.compression()?,
+                fragment_size: self.fragment_size()?,
+            },
         })
+    }
+
+    fn compression(&self) -> Result<Compression, Problem> {
+        let Some(raw) = self.get("compression") else {
+            return Ok(Compression::None);
+        };
+        match json::text(raw).as_deref() {
+            Some("none" | "png") => Ok(Compression::None),
+            Some("cbor") => Ok(Compression::Cbor),
+            Some("cbor-raw") => Ok(Compression::CborRaw),
+            _ => Err(self.mistyped("compression", "none, png, cbor or cbor-raw", raw)),
+        }
+    }
+
+    fn fragment_size(&self) -> Result<Option<usize>, Problem> {
+        let Some(raw) = self.get("fragment_size").filter(|raw| raw.get() != "null") else {
+            return Ok(None);
+        };
+        let size = json::integer(raw)
+            .filter(|size| *size > 0)
+            .ok_or_else(|| self.mistyped("fragment_size", "an integer, at least 1", raw))?;
+        Ok(usize::try_from(size).ok())
+    }
+
+    fn piece(&self) -> Result<Piece, Problem> {
+        let id = self.required("id")?;
+        self.short("id", id.get())?;
+        let raw = self.required("data")?;
+        let data = json::text(raw).ok_or_else(|| self.mistyped("data", "a string", raw))?;
+        Ok(Piece {
+            id: id.get().to_owned(),
+            data: data.into_owned(),
+            num: self.index("num")?,
+            total: self.index("total")?,
+        })
+    }
+
+    /// A count; a larger one than fits is refused as too large a little later.
+    fn index(&self, field: &'static str) -> Result<usize, Problem> {
+        let raw = self.required(field)?;
+        let number = json::integer(raw)
+            .ok_or_else(|| self.mistyped(field, "an integer, at least 0", raw))?;
+        Ok(usize::try_from(number).unwrap_or(usize::MAX))
     }
 
     fn verbosity(&self) -> Result<Verbosity, Problem> {
