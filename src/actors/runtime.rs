@@ -16,7 +16,7 @@ use tokio::runtime::Builder;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep};
 
-use super::arm_sim::ArmSim;
+use super::arm_sim::{ArmSim, Consult};
 use super::gauges::Gauges;
 use super::ik::Ik;
 use super::ik_action::{GoalTracker, IkAction};
@@ -24,6 +24,7 @@ use super::ik_trial::{GoalClient, IkTrial};
 use super::integration::Integration;
 use super::listener::{Listener, StopListening};
 use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
+use super::study::Study;
 use super::workers::WorkerPool;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -80,8 +81,10 @@ async fn serve(options: &Options) -> Result<(), RunError> {
         .seed
         .map_or_else(fastrand::Rng::new, fastrand::Rng::with_seed);
     match options.links {
-        Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, rng, &mut nodes),
-        Links::Three => start_nodes::<3>(&registry, &gauges, &arm_thread, rng, &mut nodes),
+        Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes),
+        Links::Three => {
+            start_nodes::<3>(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes)
+        }
     }
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
@@ -108,6 +111,7 @@ fn start_nodes<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     arm_thread: &Arbiter,
+    workers: &WorkerPool,
     rng: fastrand::Rng,
     nodes: &mut Nodes,
 ) where
@@ -119,6 +123,10 @@ fn start_nodes<const N: usize>(
         ArmSim::new(Arm::default(), Gains::default(), publish, respond, gauges)
     });
     ArmSim::attach(&arm, nodes);
+
+    let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
+    Study::attach(&study, nodes);
+    arm.do_send(Consult(study.recipient()));
 
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();

@@ -23,6 +23,7 @@ pub mod conditioning;
 pub mod error;
 pub mod error_estimate;
 pub mod extrapolation;
+mod limits;
 pub mod linear;
 pub mod matrix;
 pub mod measure;

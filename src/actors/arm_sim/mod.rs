@@ -2,7 +2,7 @@
 //!
 //! The actor only asks the clock and says who hears what. What is due is reckoned by `math::pacer`, what happens in a
 //! step by `math::simulation`, requests are read in `services`, messages written in `telemetry`, goals judged in
-//! `goals`.
+//! `goals`, timesteps in `limit`.
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
 //! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up after
@@ -11,6 +11,7 @@
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
 mod goals;
+mod limit;
 mod services;
 mod telemetry;
 
@@ -22,6 +23,8 @@ use tokio::time::Instant;
 
 use self::goals::Goals;
 pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
+use self::limit::LimitWatch;
+pub use self::limit::{ArmSettings, Consult, ControlLoop, HeldLimit, Present};
 use self::telemetry::Telemetry;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
@@ -30,7 +33,7 @@ use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::catalog::{Direction, Node, Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::trajectory::joint_trajectory;
 
@@ -69,6 +72,7 @@ pub struct ArmSim<const N: usize> {
     telemetry: Telemetry,
     joint_names: [&'static str; N],
     goals: Goals<N>,
+    limit: LimitWatch<N>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -93,6 +97,7 @@ impl<const N: usize> ArmSim<N> {
             respond,
             joint_names: joint_names(),
             goals: Goals::default(),
+            limit: LimitWatch::default(),
         }
     }
 
@@ -104,8 +109,11 @@ impl<const N: usize> ArmSim<N> {
                 nodes.services.insert(service, address.clone().recipient());
             }
         }
-        for topic in [Topic::JointStates, Topic::Clock, Topic::Diagnostics] {
-            nodes.publishers.insert(topic, address.clone().recipient());
+        for topic in Topic::ALL {
+            let published = topic.direction() == Direction::Published;
+            if published && topic.owner() == Node::ArmSim {
+                nodes.publishers.insert(topic, address.clone().recipient());
+            }
         }
         nodes
             .listeners
@@ -185,8 +193,9 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
 impl<const N: usize> Handler<Interest> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         self.telemetry.set_wanted(interest.topic, interest.wanted);
+        self.ask_limit(ctx);
     }
 }
 
@@ -209,6 +218,7 @@ impl<const N: usize> ArmSim<N> {
         let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap_or(0));
         ctx.run_later(wait, |arm, ctx| {
             arm.advance_to_now(ctx);
+            arm.watch_limit(ctx);
             arm.publish_state();
             arm.schedule_tick(ctx);
         });

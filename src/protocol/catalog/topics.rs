@@ -21,11 +21,13 @@ pub enum Topic {
     IkResult,
     /// The timed trial, 10 Hz and at every change.
     TrialStatus,
+    /// The local error of the arm's steps, 10 Hz.
+    ErrorEstimate,
 }
 
 impl Topic {
     /// All topics, in the order in which they are documented.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::JointTrajectory,
         Self::JointStates,
         Self::Clock,
@@ -33,6 +35,7 @@ impl Topic {
         Self::IkFeedback,
         Self::IkResult,
         Self::TrialStatus,
+        Self::ErrorEstimate,
     ];
 
     const fn entry(self) -> &'static TopicEntry {
@@ -44,6 +47,7 @@ impl Topic {
             Self::IkFeedback => &IK_FEEDBACK,
             Self::IkResult => &IK_RESULT,
             Self::TrialStatus => &TRIAL_STATUS,
+            Self::ErrorEstimate => &ERROR_ESTIMATE,
         }
     }
 
@@ -177,5 +181,18 @@ const TRIAL_STATUS: TopicEntry = TopicEntry {
         required("error", "float64", "m"),
         required("desired_positions", "float64[]", "rad"),
         required("action_status", "string", ""),
+    ],
+};
+const ERROR_ESTIMATE: TopicEntry = TopicEntry {
+    name: "/arm_sim/error_estimate",
+    type_name: "pendularm_interfaces/msg/ErrorEstimate",
+    direction: Direction::Published,
+    owner: Node::ArmSim,
+    fields: &[
+        required("method", "string", ""),
+        required("timestep", "float64", "s"),
+        required("local_error", "float64", "rad"),
+        required("error_per_second", "float64", "rad/s"),
+        required("predicted_limit", "float64", "s"),
     ],
 };
