@@ -27,7 +27,7 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
 }
 
 /// Contract section 3, the table: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 13] = [
+const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -65,6 +65,42 @@ const SERVICES: [(&str, &[&str], &[&str]); 13] = [
     ),
     ("/ik_trial/skip", &[], &[]),
     ("/ik_trial/stop", &[], &[]),
+    (
+        "/study/stability",
+        &["integrator", "gains", "params", "setpoint"],
+        &[
+            "timestep_limit_held",
+            "timestep_limit_continuous",
+            "minimum_over_poses_held",
+            "minimum_over_poses_continuous",
+            "advised_timestep",
+        ],
+    ),
+    (
+        "/study/rollout",
+        &[
+            "q0",
+            "qdot0",
+            "duration",
+            "timestep",
+            "integrator",
+            "params",
+            "gains",
+            "setpoint",
+            "samples",
+            "reference",
+        ],
+        &[
+            "times",
+            "positions",
+            "velocities",
+            "efforts",
+            "energy",
+            "evaluations",
+            "wall_time",
+            "error",
+        ],
+    ),
 ];
 
 #[test]
@@ -126,6 +162,11 @@ fn the_topics_are_those_of_the_contract() {
                 "pendularm_interfaces/msg/TrialStatus",
                 Direction::Published
             ),
+            (
+                "/arm_sim/error_estimate",
+                "pendularm_interfaces/msg/ErrorEstimate",
+                Direction::Published
+            ),
         ]
     );
 }
@@ -143,23 +184,46 @@ fn required_fields_are_those_that_have_no_default() {
 }
 
 #[test]
-fn one_service_computes_and_four_take_all_or_nothing() {
+fn three_services_compute_and_six_take_all_or_nothing() {
     let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
         Service::ALL
             .into_iter()
             .filter(|&service| chosen(service))
             .collect()
     };
-    assert_eq!(of(Service::is_computation), [Service::IntegrationStep]);
+    assert_eq!(
+        of(Service::is_computation),
+        [
+            Service::IntegrationStep,
+            Service::Stability,
+            Service::Rollout
+        ]
+    );
     assert_eq!(
         of(Service::all_or_nothing),
         [
             Service::IntegrationStep,
             Service::Solve,
             Service::SendGoal,
-            Service::TrialStart
+            Service::TrialStart,
+            Service::Stability,
+            Service::Rollout
         ]
     );
+}
+
+#[test]
+fn gains_and_params_have_the_members_that_their_services_have_as_fields() {
+    for service in [Service::Stability, Service::Rollout] {
+        for field in service.fields() {
+            let members = match field.name {
+                "gains" => Service::SetGains.fields(),
+                "params" => Service::SetParams.fields(),
+                _ => &[],
+            };
+            assert_eq!(field.members(), members, "{field:?}");
+        }
+    }
 }
 
 #[test]
@@ -218,7 +282,7 @@ fn every_node_has_a_name_of_its_own() {
     let names: HashSet<&str> = Node::ALL.iter().map(|node| node.name()).collect();
     assert_eq!(
         names,
-        HashSet::from(["arm_sim", "ik", "ik_action", "ik_trial", "gateway"])
+        HashSet::from(["arm_sim", "ik", "ik_action", "ik_trial", "study", "gateway"])
     );
     assert_eq!(Topic::JointStates.owner(), Node::ArmSim);
     assert_eq!(Service::TrialStop.owner(), Node::IkTrial);
