@@ -285,7 +285,7 @@ fn every_field_that_is_wrong_is_named_members_with_their_object() {
             (json!({"gains": {"kp": [1, -2]}}), "gains.kp[1] must be at least 0, got -2"),
             (json!({"gains": {"ki": [1]}}), "gains.ki must have 2 entries, got 1"),
             (json!({"gains": {"kd": 3}}), "gains.kd must be an array of 2 numbers, got 3"),
-            (json!({"gains": [1, 2, 3]}), "gains must be an object, got [1,2,3]"),
+            (json!({"gains": [1, 2, 3]}), "gains must be an object, got an array"),
             (json!({"gains": true}), "gains must be an object, got true"),
             (json!({"params": {"masses": [0, 1]}}), "params.masses[0] must be greater than 0, got 0"),
             (json!({"params": {"lengths": ["a", 1]}}), "params.lengths[0] must be a number, got \"a\""),
@@ -441,8 +441,9 @@ fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
         let short = json!({"duration": 0.01, "timestep": 0.001});
         bench.call(2, Service::Rollout, &short);
         bench.call(3, Service::Rollout, &short);
-        assert_eq!(bench.answer().await.0, 2);
-        assert_eq!(bench.answer().await.0, 3);
+        let mut light = [bench.answer().await.0, bench.answer().await.0];
+        light.sort_unstable();
+        assert_eq!(light, [2, 3]);
         // A prediction is cut into slices too.
         let mut three = Bench::<3>::new();
         three.call(1, Service::Stability, &json!({}));

@@ -186,7 +186,7 @@ fn members_of_an_object_are_read_like_fields_and_named_after_it() {
     let (value, status) = read(r#"{"params":[1]}"#);
     assert_eq!(
         (value, status.as_str()),
-        (None, "params must be an object, got [1]")
+        (None, "params must be an object, got an array")
     );
 }
 
