@@ -810,8 +810,34 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
     });
 }
 
+/// A limit of other gains says nothing: between the change and the answer the limit is unknown, and there is no warning.
 #[test]
-fn an_arm_that_nobody_advises_says_so_and_does_not_warn() {
+fn a_limit_of_another_loop_is_never_held_against_the_arm() {
+    in_virtual_time(|| async {
+        let stage = Stage::new(0.0).await;
+        stage.want(Topic::Diagnostics, true).await;
+        sleep(Duration::from_millis(500)).await;
+        stage.said(Topic::Diagnostics);
+        stage.oracle.limit.set(0.004);
+        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.ask(Service::Pause, json!({"data": true})).await;
+        sleep(Duration::from_millis(100)).await;
+        let told = stage.said(Topic::Diagnostics);
+        let told: Vec<_> = told
+            .iter()
+            .map(|one| {
+                (
+                    one["status"][0]["level"].as_u64().unwrap(),
+                    value(one, "timestep_limit"),
+                )
+            })
+            .collect();
+        assert_eq!(told, [(0, "NaN"), (0, "0.004")]);
+    });
+}
+
+#[test]
+fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
     in_virtual_time(|| async {
         let stage = Stage::new(f64::INFINITY).await;
         stage.want(Topic::Diagnostics, true).await;

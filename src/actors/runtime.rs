@@ -80,12 +80,11 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     let rng = options
         .seed
         .map_or_else(fastrand::Rng::new, fastrand::Rng::with_seed);
-    match options.links {
-        Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes),
-        Links::Three => {
-            start_nodes::<3>(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes)
-        }
-    }
+    let start = match options.links {
+        Links::Two => start_nodes::<2>,
+        Links::Three => start_nodes::<3>,
+    };
+    start(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes);
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function: it can't be gone.

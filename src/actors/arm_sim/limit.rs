@@ -20,7 +20,8 @@ use crate::protocol::messages::ErrorEstimate;
 use crate::study::error_estimate::estimate;
 use crate::study::linear::no_control;
 
-/// Least time between two predictions, a millisecond of a worker each: setpoints may come by the thousand a second.
+/// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may come
+/// by the thousand a second.
 const LEAST_PAUSE: Duration = Duration::from_millis(100);
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -33,8 +34,8 @@ pub(super) struct LimitWatch<const N: usize> {
     asked: Option<(ControlLoop<N>, Instant)>,
     /// The answer is on its way.
     waiting: bool,
-    /// The latest answer \[s\]: infinite where nothing limits, NaN while there is none.
-    limit: f64,
+    /// The latest answer \[s\], infinite where nothing limits, and the loop that it is about.
+    known: Option<(ControlLoop<N>, f64)>,
     /// Whether the timestep was too long when that was last told.
     warned: bool,
 }
@@ -45,16 +46,9 @@ impl<const N: usize> Default for LimitWatch<N> {
             study: None,
             asked: None,
             waiting: false,
-            limit: f64::NAN,
+            known: None,
             warned: false,
         }
-    }
-}
-
-impl<const N: usize> LimitWatch<N> {
-    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none.
-    pub(super) fn limit(&self) -> f64 {
-        self.limit
     }
 }
 
@@ -71,6 +65,13 @@ pub struct ControlLoop<const N: usize> {
     pub setpoint: Setpoint<N>,
     /// The method that takes the steps.
     pub method: Method,
+}
+
+impl<const N: usize> ControlLoop<N> {
+    /// Whether it differs from another in its setpoint at most.
+    fn resembles(&self, other: &Self) -> bool {
+        self.arm == other.arm && self.gains == other.gains && self.method == other.method
+    }
 }
 
 /// The arm's settings as they are now. From `study`, at every call.
@@ -131,8 +132,9 @@ impl<const N: usize> ArmSim<N> {
     /// At a tick: has the limit predicted anew if the loop has changed, and tells at once if the warning comes or goes.
     pub(super) fn watch_limit(&mut self, ctx: &mut Context<Self>) {
         self.ask_limit(ctx);
-        let exceeded = self.exceeds_limit();
-        if self.wants_limit() && exceeded != self.limit.warned {
+        let limit = self.timestep_limit();
+        let exceeded = self.simulation.timestep() > limit;
+        if self.wants_limit() && !limit.is_nan() && exceeded != self.limit.warned {
             self.limit.warned = exceeded;
             self.publish_diagnostics();
         }
@@ -145,7 +147,8 @@ impl<const N: usize> ArmSim<N> {
         }
         let present = self.loop_in_force();
         let settled = self.limit.asked.is_some_and(|(control, asked_at)| {
-            control == present || asked_at.elapsed() < LEAST_PAUSE
+            let soon = asked_at.elapsed() < LEAST_PAUSE;
+            control == present || (soon && control.resembles(&present))
         });
         let Some(study) = self.limit.study.as_ref().filter(|_| !settled) else {
             return;
@@ -153,10 +156,10 @@ impl<const N: usize> ArmSim<N> {
         let answer = study.send(HeldLimit(present)).into_actor(self);
         self.limit.asked = Some((present, Instant::now()));
         self.limit.waiting = true;
-        ctx.spawn(answer.map(|answer, arm, _| {
+        ctx.spawn(answer.map(move |answer, arm, _| {
             arm.limit.waiting = false;
             if let Ok(Some(limit)) = answer {
-                arm.limit.limit = limit;
+                arm.limit.known = Some((present, limit));
             }
         }));
     }
@@ -181,13 +184,18 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry.wants(Topic::Diagnostics) || self.telemetry.wants(Topic::ErrorEstimate)
     }
 
-    fn exceeds_limit(&self) -> bool {
-        self.simulation.timestep() > self.limit.limit
+    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none. One for an earlier setpoint will
+    /// do until the next is there; one for another arm, other gains or another method says nothing.
+    pub(super) fn timestep_limit(&self) -> f64 {
+        match &self.limit.known {
+            Some((of, limit)) if of.resembles(&self.loop_in_force()) => *limit,
+            _ => f64::NAN,
+        }
     }
 
     /// What is wrong with the present timestep, if anything is predicted to be.
     pub(super) fn limit_warning(&self) -> Option<String> {
-        let (timestep, limit) = (self.simulation.timestep(), self.limit.limit);
+        let (timestep, limit) = (self.simulation.timestep(), self.timestep_limit());
         let method = self.simulation.method();
         let place = if self.simulation.pid().is_enabled() {
             "at the present setpoint"
@@ -201,7 +209,7 @@ impl<const N: usize> ArmSim<N> {
                 "the timestep {timestep:?} s exceeds {limit:?} s, up to which {method} is predicted to be stable {place}"
             )
         };
-        self.exceeds_limit().then_some(says)
+        (timestep > limit).then_some(says)
     }
 
     /// The message of `/arm_sim/error_estimate`: of the step that is about to be taken, paused or not.
@@ -213,7 +221,7 @@ impl<const N: usize> ArmSim<N> {
             timestep: self.simulation.timestep(),
             local_error: estimate.map_or(f64::NAN, |one| one.local_error),
             error_per_second: estimate.map_or(f64::NAN, |one| one.error_per_second),
-            predicted_limit: self.limit.limit,
+            predicted_limit: self.timestep_limit(),
         }
     }
 }

@@ -242,7 +242,7 @@ impl<const N: usize> ArmSim<N> {
             ("energy", energy),
             ("energy_drift", energy - self.telemetry.energy_reference),
             ("max_step_time", self.telemetry.window.longest.step_time()),
-            ("timestep_limit", self.limit.limit()),
+            ("timestep_limit", self.timestep_limit()),
         ];
         let mut values = vec![entry("state", state)];
         // Debug prints what is huge or tiny with an exponent.

@@ -20,7 +20,7 @@ use crate::protocol::fields::{Bound, Fields};
 use crate::protocol::op::Arguments;
 use crate::protocol::streamed::StreamedResponse;
 use crate::study::linear::no_control;
-use crate::study::rollout::{MAX_SAMPLES, Plan, Rollout};
+use crate::study::rollout::{Deviation, MAX_SAMPLES, Plan, Rollout};
 
 /// How long a run is unless it is said \[s\].
 const DEFAULT_DURATION: f64 = 10.0;
@@ -221,7 +221,7 @@ impl<const N: usize> Encoding<N> {
             .run
             .deviation()
             .filter(|deviation| deviation.errors.len() == self.run.times().len())
-            .map_or(f64::NAN, |deviation| deviation.largest());
+            .map_or(f64::NAN, Deviation::largest);
         let writer = &mut self.writer;
         writer.raw(&format!(
             "],\"evaluations\":{},\"wall_time\":",
