@@ -816,7 +816,8 @@ fn a_limit_of_another_loop_is_never_held_against_the_arm() {
     in_virtual_time(|| async {
         let stage = Stage::new(0.0).await;
         stage.want(Topic::Diagnostics, true).await;
-        sleep(Duration::from_millis(500)).await;
+        // Between two ticks, so that none comes between the change and the message.
+        sleep(Duration::from_millis(508)).await;
         stage.said(Topic::Diagnostics);
         stage.oracle.limit.set(0.004);
         stage.ask(Service::Enable, json!({"data": true})).await;
