@@ -26,7 +26,7 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
         .collect()
 }
 
-/// Contract section 3, the table, and what came later: service, request, values.
+/// Contract section 3, the table: service, request, values.
 const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     (
         "/arm_sim/integration_step",
@@ -45,12 +45,6 @@ const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     ),
     ("/arm_sim/pause", &["data"], &["data"]),
     ("/arm_sim/reset", &[], &["position", "velocity"]),
-    ("/arm_sim/step", &["steps"], &["steps", "time"]),
-    (
-        "/arm_sim/disturb",
-        &["effort", "duration"],
-        &["effort", "duration"],
-    ),
     ("/pid_controller/enable", &["data"], &["data"]),
     (
         "/pid_controller/set_gains",
@@ -71,6 +65,42 @@ const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     ),
     ("/ik_trial/skip", &[], &[]),
     ("/ik_trial/stop", &[], &[]),
+    (
+        "/study/stability",
+        &["integrator", "gains", "params", "setpoint"],
+        &[
+            "timestep_limit_held",
+            "timestep_limit_continuous",
+            "minimum_over_poses_held",
+            "minimum_over_poses_continuous",
+            "advised_timestep",
+        ],
+    ),
+    (
+        "/study/rollout",
+        &[
+            "q0",
+            "qdot0",
+            "duration",
+            "timestep",
+            "integrator",
+            "params",
+            "gains",
+            "setpoint",
+            "samples",
+            "reference",
+        ],
+        &[
+            "times",
+            "positions",
+            "velocities",
+            "efforts",
+            "energy",
+            "evaluations",
+            "wall_time",
+            "error",
+        ],
+    ),
 ];
 
 #[test]
@@ -93,7 +123,7 @@ fn the_services_are_those_of_the_contract() {
 }
 
 #[test]
-fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
+fn the_topics_are_those_of_the_contract() {
     let listed: Vec<_> = Topic::ALL
         .iter()
         .map(|topic| (topic.name(), topic.type_name(), topic.direction()))
@@ -132,14 +162,11 @@ fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
                 "pendularm_interfaces/msg/TrialStatus",
                 Direction::Published
             ),
-            ("/tf", "tf2_msgs/msg/TFMessage", Direction::Published),
-            ("/tf_static", "tf2_msgs/msg/TFMessage", Direction::Published),
             (
-                "/robot_description",
-                "std_msgs/msg/String",
+                "/arm_sim/error_estimate",
+                "pendularm_interfaces/msg/ErrorEstimate",
                 Direction::Published
             ),
-            ("/rosout", "rcl_interfaces/msg/Log", Direction::Published),
         ]
     );
 }
@@ -150,8 +177,6 @@ fn required_fields_are_those_that_have_no_default() {
         let expected: &[&str] = match service {
             Service::IntegrationStep => &["function", "x0", "dt", "steps", "integrator"],
             Service::Solve | Service::SendGoal => &["x", "y"],
-            Service::Step => &["steps"],
-            Service::Disturb => &["effort", "duration"],
             _ => &[],
         };
         assert_eq!(required(service.fields()), expected, "{}", service.name());
@@ -159,39 +184,59 @@ fn required_fields_are_those_that_have_no_default() {
 }
 
 #[test]
-fn one_service_computes_and_six_take_all_or_nothing() {
+fn three_services_compute_and_six_take_all_or_nothing() {
     let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
         Service::ALL
             .into_iter()
             .filter(|&service| chosen(service))
             .collect()
     };
-    assert_eq!(of(Service::is_computation), [Service::IntegrationStep]);
+    assert_eq!(
+        of(Service::is_computation),
+        [
+            Service::IntegrationStep,
+            Service::Stability,
+            Service::Rollout
+        ]
+    );
     assert_eq!(
         of(Service::all_or_nothing),
         [
             Service::IntegrationStep,
-            Service::Step,
-            Service::Disturb,
             Service::Solve,
             Service::SendGoal,
-            Service::TrialStart
+            Service::TrialStart,
+            Service::Stability,
+            Service::Rollout
         ]
     );
+}
+
+#[test]
+fn gains_and_params_have_the_members_that_their_services_have_as_fields() {
+    for service in [Service::Stability, Service::Rollout] {
+        for field in service.fields() {
+            let members = match field.name {
+                "gains" => Service::SetGains.fields(),
+                "params" => Service::SetParams.fields(),
+                _ => &[],
+            };
+            assert_eq!(field.members(), members, "{field:?}");
+        }
+    }
 }
 
 #[test]
 fn a_name_leads_back_to_what_it_names() {
     for topic in Topic::ALL {
         assert_eq!(Topic::from_name(topic.name()), Some(topic));
-        assert_eq!(Topic::from_name(topic.short_name()), Some(topic));
         assert_eq!(Service::from_name(topic.name()), None);
     }
     for service in Service::ALL {
         assert_eq!(Service::from_name(service.name()), Some(service));
         assert_eq!(Topic::from_name(service.name()), None);
     }
-    for other in ["", "/", "//joint_states", "/joint_states/", "/arm_sim"] {
+    for other in ["", "/", "joint_states", "/joint_states/", "/arm_sim"] {
         assert_eq!(Topic::from_name(other), None);
         assert_eq!(Service::from_name(other), None);
     }
@@ -203,9 +248,8 @@ fn names_and_types_are_given_once_and_in_the_form_that_ros_gives_them() {
     let services = Service::ALL.map(|service| (service.name(), service.type_name(), "srv"));
     let mut seen = HashSet::new();
     for (name, type_name, kind) in topics.into_iter().chain(services) {
-        // Frames that move and frames that do not have one type.
         assert!(
-            seen.insert(name) && (seen.insert(type_name) || name == "/tf_static"),
+            seen.insert(name) && seen.insert(type_name),
             "{name} or {type_name} is listed twice"
         );
         let parts: Vec<&str> = type_name.split('/').collect();
@@ -238,14 +282,7 @@ fn every_node_has_a_name_of_its_own() {
     let names: HashSet<&str> = Node::ALL.iter().map(|node| node.name()).collect();
     assert_eq!(
         names,
-        HashSet::from([
-            "arm_sim",
-            "ik",
-            "ik_action",
-            "ik_trial",
-            "gateway",
-            "rosapi"
-        ])
+        HashSet::from(["arm_sim", "ik", "ik_action", "ik_trial", "study", "gateway"])
     );
     assert_eq!(Topic::JointStates.owner(), Node::ArmSim);
     assert_eq!(Service::TrialStop.owner(), Node::IkTrial);
