@@ -1,4 +1,6 @@
 //! S27 to S35: gravity, timesteps, angles and parameters far from the ordinary.
+//!
+//! **Invariant:** a scene ends finite or with the step that was not taken; either is said, neither panics.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,4 +1,6 @@
 //! S36 to S39: the methods themselves.
+//!
+//! **Invariant:** each of these is a statement about all four methods, and fails if one of them leaves its order.
 
 #![allow(
     clippy::indexing_slicing,

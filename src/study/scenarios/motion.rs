@@ -1,4 +1,6 @@
 //! S01 to S06: at rest, swinging, chaotic, with nobody at the controls.
+//!
+//! **Invariant:** what a scene expects is stated before it runs, from theory or from the reference, never from an earlier run.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,4 +1,6 @@
 //! What scenes share: settings, random states, growth rates.
+//!
+//! **Invariant:** noise is seeded: a scene run twice sees the same states.
 
 #![allow(
     clippy::indexing_slicing,
