@@ -1,4 +1,6 @@
 //! S07 to S10: stiff, overdamped and undamped gains.
+//!
+//! **Invariant:** a limit is predicted before it is measured, and both are shown.
 
 #![allow(
     clippy::indexing_slicing,

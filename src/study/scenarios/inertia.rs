@@ -1,4 +1,6 @@
 //! S16 to S26: light and heavy tips, short and long links, stretched, folded, whirling.
+//!
+//! **Invariant:** accelerations are compared with ones in twice the digits, measured limits with predicted ones.
 
 #![allow(
     clippy::indexing_slicing,

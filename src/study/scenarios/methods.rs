@@ -1,4 +1,6 @@
 //! S36 to S39: the methods themselves.
+//!
+//! **Invariant:** whatever a scene compares starts from the same state.
 
 #![allow(
     clippy::indexing_slicing,

@@ -1,4 +1,6 @@
 //! What scenes share: settings, random states, growth rates.
+//!
+//! **Invariant:** what is random comes from a seed in the source, so a scene does the same every time.
 
 #![allow(
     clippy::indexing_slicing,
