@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test lint doc report clean vendor submission test-submission
+.PHONY: help build run test test-browser lint doc report bench bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -19,14 +19,19 @@ run: build ## Build, then serve clients in the foreground until SIGINT or SIGTER
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
-test: ## Run every test
+test: ## Run every test but those of the page
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) test --locked
+
+test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
+	@echo "make test-browser: the page in headless Chromium"
+	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --no-default-features -- -D warnings
 
 # What is public must not link to what is not; then private items too, for whoever reads the source.
 doc: ## Build the documentation; any warning fails
@@ -38,6 +43,14 @@ report: build ## Measure error against run time and stability, and write report/
 	@echo "make report: report/index.html"
 	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
+
+bench: ## Measure our own speed and size; KEEP=1 keeps the figures in benches/results/
+	@echo "make bench: some minutes; the fewer other programs run, the better"
+	@KEEP="$(KEEP)" bash benches/run.sh
+
+bench-peers: ## Measure beside Pinocchio and MuJoCo, installed from PyPI into benches/peers/.venv; KEEP=1 as above
+	@echo "make bench-peers: downloads about 100 MB once, compiles, then some minutes"
+	@KEEP="$(KEEP)" bash benches/peers/run.sh
 
 clean: ## Remove what was built and packed; vendored sources stay
 	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"

@@ -5,14 +5,20 @@
 //!
 //! **Invariant:** logging never blocks, and a broken standard error never fails anything.
 
+use std::fmt::{self, Write as _};
 use std::io::{self, Write};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
+use tokio::sync::mpsc::Sender;
+use tracing::field::{Field, Visit};
 use tracing::level_filters::LevelFilter;
+use tracing::{Event, Level, Subscriber};
+use tracing_subscriber::Layer;
+use tracing_subscriber::layer::{Context, SubscriberExt};
 
 /// Lines that may wait for the writer: more than any burst of connections logs at the default level.
 const QUEUE_LINES: usize = 1024;
@@ -43,12 +49,88 @@ pub struct Log {
 pub fn start(level: LevelFilter) -> io::Result<Log> {
     let log = Log::to(io::stderr())?;
     let lines = log.clone();
-    let subscriber = tracing_subscriber::fmt()
-        .with_max_level(level)
+    let printed = tracing_subscriber::fmt::layer()
         .with_writer(move || lines.clone())
-        .finish();
+        .with_filter(level);
+    let subscriber = tracing_subscriber::registry().with(printed).with(Told);
     tracing::subscriber::set_global_default(subscriber).map_err(io::Error::other)?;
     Ok(log)
+}
+
+/// A warning or an error, for whoever listens in the program itself.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Warning {
+    /// As ROS has it: 30 is a warning, 40 an error.
+    pub level: u8,
+    /// The node that it comes from.
+    pub node: &'static str,
+    /// What happened.
+    pub text: String,
+    /// The source file.
+    pub file: &'static str,
+    /// The line in it.
+    pub line: u32,
+}
+
+/// Who listens to warnings.
+static LISTENER: Mutex<Option<Sender<Warning>>> = Mutex::new(None);
+
+/// Warnings and errors go to `listener` too from now on, whatever the log's level; `None`: to nobody. What does not fit
+/// into the channel is not waited for.
+pub fn hear_warnings(listener: Option<Sender<Warning>>) {
+    *LISTENER.lock().unwrap_or_else(PoisonError::into_inner) = listener;
+}
+
+/// Hands warnings to the listener.
+struct Told;
+
+impl<S: Subscriber> Layer<S> for Told {
+    fn max_level_hint(&self) -> Option<LevelFilter> {
+        Some(LevelFilter::WARN)
+    }
+
+    fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
+        let metadata = event.metadata();
+        let level = match *metadata.level() {
+            Level::ERROR => 40,
+            Level::WARN => 30,
+            _ => return,
+        };
+        let listener = LISTENER.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(listener) = &*listener {
+            let mut text = Text::default();
+            event.record(&mut text);
+            let _ = listener.try_send(Warning {
+                level,
+                node: node_of(metadata.target()),
+                text: text.0,
+                file: metadata.file().unwrap_or_default(),
+                line: metadata.line().unwrap_or_default(),
+            });
+        }
+    }
+}
+
+/// The actor in whose module something was reported.
+fn node_of(target: &'static str) -> &'static str {
+    let mut parts = target.split("::").skip_while(|part| *part != "actors");
+    parts.nth(1).unwrap_or("pendularm")
+}
+
+/// An event as one line: the message, then the fields.
+#[derive(Default)]
+struct Text(String);
+
+impl Visit for Text {
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        // A `String` takes whatever is written to it.
+        let _ = if field.name() == "message" {
+            let fields = std::mem::take(&mut self.0);
+            write!(self.0, "{value:?}{fields}")
+        } else {
+            write!(self.0, " {}={value:?}", field.name())
+        };
+    }
 }
 
 impl Log {

@@ -7,17 +7,24 @@
 //!
 //! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
 
+mod report;
+mod usage;
+#[cfg(feature = "web")]
+mod web;
+
 use std::ffi::OsString;
-use std::fmt;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
-use std::path::PathBuf;
 
 use clap::builder::{OsStringValueParser, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
-use clap::{Arg, ArgAction, ArgMatches, Command};
+use clap::{Arg, ArgMatches, Command};
 use tracing::level_filters::LevelFilter;
 
-use crate::report::{self, ReportOptions};
+pub use self::usage::{Origin, UsageError};
+#[cfg(feature = "web")]
+pub use self::web::WebOptions;
+use crate::protocol::token::Token;
+use crate::report::ReportOptions;
 
 /// Where the runtime listens unless told otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
@@ -33,8 +40,19 @@ const LEVELS: [(&str, LevelFilter); 6] = [
     ("trace", LevelFilter::TRACE),
 ];
 
-/// The subcommand that makes the study's report, and the directory that it writes to unless told otherwise.
-const REPORT: &str = "report";
+/// What this build has, as the version says it.
+const BUILD: &str = if cfg!(feature = "web") {
+    concat!(env!("CARGO_PKG_VERSION"), " (web)")
+} else {
+    concat!(env!("CARGO_PKG_VERSION"), " (without web)")
+};
+
+#[cfg(feature = "web")]
+const DOORS: &str = "\
+This build has the web feature: the port speaks rosbridge JSON over TCP and over WebSocket, and serves a page over HTTP.";
+#[cfg(not(feature = "web"))]
+const DOORS: &str = "\
+This build is without the web feature: the port speaks rosbridge JSON over TCP, and neither WebSocket nor HTTP.";
 
 const AFTER_HELP: &str = "\
 An option wins over its environment variable; an empty variable counts as unset.
@@ -49,6 +67,8 @@ struct Setting {
     about: &'static str,
     /// What holds without either, as the help shows it.
     default: &'static str,
+    /// Given without a value it is true.
+    is_switch: bool,
 }
 
 const LINKS: Setting = Setting {
@@ -57,14 +77,16 @@ const LINKS: Setting = Setting {
     value: "N",
     about: "Number of links of the arm, 2 or 3",
     default: "2",
+    is_switch: false,
 };
 
 const BIND: Setting = Setting {
     option: "bind",
     variable: "ARM_SIM_BIND",
     value: "ADDRESS",
-    about: "Loopback address and port to listen on; port 0 takes a free one",
+    about: "Address and port to listen on, loopback unless there is a token; port 0 takes a free one",
     default: "127.0.0.1:9095",
+    is_switch: false,
 };
 
 const SEED: Setting = Setting {
@@ -73,6 +95,7 @@ const SEED: Setting = Setting {
     value: "N",
     about: "Makes the targets of timed trials repeatable",
     default: "a new seed at every start",
+    is_switch: false,
 };
 
 const LOG: Setting = Setting {
@@ -81,9 +104,34 @@ const LOG: Setting = Setting {
     value: "LEVEL",
     about: "What is logged to standard error: off, error, warn, info, debug or trace",
     default: "info",
+    is_switch: false,
 };
 
-const SETTINGS: [&Setting; 4] = [&LINKS, &BIND, &SEED, &LOG];
+const TOKEN: Setting = Setting {
+    option: "token",
+    variable: "ARM_SIM_TOKEN",
+    value: "TOKEN",
+    about: "What every client has to show; who may list this machine's processes sees it, so better use the variable",
+    default: "none",
+    is_switch: false,
+};
+
+/// All of them, in the order of the help.
+const SETTINGS: &[&Setting] = &[
+    &LINKS,
+    &BIND,
+    &SEED,
+    &LOG,
+    &TOKEN,
+    #[cfg(feature = "web")]
+    &web::ALLOW_HOST,
+    #[cfg(feature = "web")]
+    &web::ALLOW_ORIGIN,
+    #[cfg(feature = "web")]
+    &web::STRICT_ORIGIN,
+    #[cfg(feature = "web")]
+    &web::REPORT,
+];
 
 /// How many links the arm has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -107,11 +155,11 @@ impl Links {
 }
 
 /// Everything that is chosen at launch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Options {
     /// How many links the arm has.
     pub links: Links,
-    /// Where to listen: a loopback address; port 0 takes a free one.
+    /// Where to listen: a loopback address, or any if there is a token; port 0 takes a free one.
     pub bind: SocketAddr,
     /// Whether `bind` is [`DEFAULT_BIND`], which brings `[::1]` with it.
     pub is_default_bind: bool,
@@ -119,6 +167,11 @@ pub struct Options {
     pub seed: Option<u64>,
     /// What is logged.
     pub log: LevelFilter,
+    /// What every client has to show, if anything.
+    pub token: Option<Token>,
+    /// About the web door.
+    #[cfg(feature = "web")]
+    pub web: WebOptions,
 }
 
 impl Default for Options {
@@ -129,6 +182,9 @@ impl Default for Options {
             is_default_bind: true,
             seed: None,
             log: LevelFilter::INFO,
+            token: None,
+            #[cfg(feature = "web")]
+            web: WebOptions::default(),
         }
     }
 }
@@ -142,104 +198,6 @@ pub enum Parsed {
     Report(ReportOptions),
     /// To show this text on standard output, and no more: the help or the version.
     Show(String),
-}
-
-/// Where a value came from, as a refusal names it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Origin {
-    /// An option on the command line, by its long name.
-    Option(&'static str),
-    /// An environment variable.
-    Variable(&'static str),
-}
-
-impl fmt::Display for Origin {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Option(name) => write!(f, "--{name}"),
-            Self::Variable(name) => f.write_str(name),
-        }
-    }
-}
-
-/// Why the command line or the environment was refused.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum UsageError {
-    /// An argument that is no option of this program.
-    #[error("unknown argument {argument:?}; --help shows all of them")]
-    UnknownArgument {
-        /// The argument as it was given.
-        argument: String,
-    },
-    /// An option at the end, or before another option.
-    #[error("{option} needs a value")]
-    MissingValue {
-        /// The option with its value's name, as in the help.
-        option: String,
-    },
-    /// An option that is given more than once.
-    #[error("{option} is given more than once")]
-    Repeated {
-        /// The option with its value's name, as in the help.
-        option: String,
-    },
-    /// `--help=...` or the like.
-    #[error("{option} takes no value, got {value:?}")]
-    UnexpectedValue {
-        /// The option.
-        option: String,
-        /// What was given to it.
-        value: String,
-    },
-    /// Anything else that is wrong with the arguments' form.
-    #[error("the arguments cannot be read ({kind:?}); --help shows them")]
-    Arguments {
-        /// What the reader of the arguments calls it.
-        kind: ErrorKind,
-    },
-    /// A number of links other than 2 and 3.
-    #[error("{origin} must be 2 or 3, got {value:?}")]
-    Links {
-        /// Whose value it is.
-        origin: Origin,
-        /// The value.
-        value: String,
-    },
-    /// No address with a port.
-    #[error("{origin} must be an IP address with a port, such as 127.0.0.1:9095, got {value:?}")]
-    Bind {
-        /// Whose value it is.
-        origin: Origin,
-        /// The value.
-        value: String,
-    },
-    /// An address that other machines could reach: nothing asks them who they are.
-    #[error("{origin} must be a loopback address, such as 127.0.0.1:9095, got {value:?}")]
-    NotLoopback {
-        /// Whose value it is.
-        origin: Origin,
-        /// The value.
-        value: String,
-    },
-    /// No seed.
-    #[error(
-        "{origin} must be a whole number from 0 to {}, got {value:?}",
-        u64::MAX
-    )]
-    Seed {
-        /// Whose value it is.
-        origin: Origin,
-        /// The value.
-        value: String,
-    },
-    /// No log level.
-    #[error("{origin} must be one of off, error, warn, info, debug, trace, got {value:?}")]
-    Log {
-        /// Whose value it is.
-        origin: Origin,
-        /// The value.
-        value: String,
-    },
 }
 
 impl Options {
@@ -257,18 +215,19 @@ impl Options {
             Ok(matches) => matches,
             Err(error) => return told(&error),
         };
-        if let Some(report) = matches.subcommand_matches(REPORT) {
+        if let Some(report) = matches.subcommand_matches(report::NAME) {
             // What serving is told means nothing to a report.
             if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
                 return Err(UsageError::UnknownArgument {
                     argument: format!("--{}", stray.option),
                 });
             }
-            return Ok(Parsed::Report(read_report(report)));
+            return Ok(Parsed::Report(report::read(report)));
         }
-        let given = |setting| given(setting, &matches, &environment);
+        let given = |setting: &Setting| given(setting, &matches, &environment);
+        let token = given(&TOKEN).map(read_token).transpose()?;
         let bind = given(&BIND)
-            .map(read_bind)
+            .map(|bind| read_bind(bind, token.is_some()))
             .transpose()?
             .unwrap_or(DEFAULT_BIND);
         Ok(Parsed::Serve(Self {
@@ -283,81 +242,46 @@ impl Options {
                 .map(read_log)
                 .transpose()?
                 .unwrap_or(LevelFilter::INFO),
+            token,
+            #[cfg(feature = "web")]
+            web: WebOptions::read(given)?,
         }))
     }
 }
 
 /// The command line as `clap` is to read it. The values stay unread, and the variables unknown to it.
 fn command() -> Command {
-    let options = SETTINGS.map(|setting| {
+    let options = SETTINGS.iter().map(|setting| {
         let Setting {
             option,
             variable,
             value,
             about,
             default,
-        } = *setting;
-        Arg::new(option)
+            is_switch,
+        } = **setting;
+        let arg = Arg::new(option)
             .long(option)
             .value_name(value)
             .value_parser(OsStringValueParser::new())
             .help(StyledStr::from(format!(
                 "{about} [env: {variable}] [default: {default}]"
-            )))
+            )));
+        if is_switch {
+            arg.num_args(0..=1)
+                .require_equals(true)
+                .default_missing_value("true")
+        } else {
+            arg
+        }
     });
     Command::new(env!("CARGO_PKG_NAME"))
-        .version(env!("CARGO_PKG_VERSION"))
+        .version(BUILD)
         .about(env!("CARGO_PKG_DESCRIPTION"))
-        .after_help(AFTER_HELP)
+        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
         .args(options)
         .disable_help_subcommand(true)
-        .subcommand(report_command())
-}
-
-fn report_command() -> Command {
-    let option = |name: &'static str, value: &'static str, about: String| {
-        Arg::new(name).long(name).value_name(value).help(about)
-    };
-    Command::new(REPORT)
-        .about("Measure error against run time and stability, and write a page about it")
-        .arg(
-            option(
-                "out",
-                "DIRECTORY",
-                "Where to write it [default: report]".to_owned(),
-            )
-            .value_parser(OsStringValueParser::new()),
-        )
-        .arg(
-            option(
-                "only",
-                "NAMES",
-                format!(
-                    "Make these sections anew, keep the others: {}",
-                    report::names()
-                ),
-            )
-            .value_delimiter(','),
-        )
-        .arg(
-            Arg::new("quick")
-                .long("quick")
-                .action(ArgAction::SetTrue)
-                .help("Coarser and shorter: a look in seconds"),
-        )
-}
-
-fn read_report(matches: &ArgMatches) -> ReportOptions {
-    ReportOptions {
-        out: matches
-            .get_one::<OsString>("out")
-            .map_or_else(|| PathBuf::from(REPORT), PathBuf::from),
-        only: matches
-            .get_many::<String>("only")
-            .map(|names| names.cloned().collect())
-            .unwrap_or_default(),
-        quick: matches.get_flag("quick"),
-    }
+        .subcommand(report::command())
 }
 
 /// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
@@ -422,9 +346,14 @@ fn read_links(Given { origin, value }: Given) -> Result<Links, UsageError> {
     }
 }
 
-fn read_bind(Given { origin, value }: Given) -> Result<SocketAddr, UsageError> {
+fn read_token(Given { origin, value }: Given) -> Result<Token, UsageError> {
+    Token::new(&value).map_err(|why| UsageError::Token { origin, why })
+}
+
+/// With a token to ask for, any address will do.
+fn read_bind(Given { origin, value }: Given, has_token: bool) -> Result<SocketAddr, UsageError> {
     match value.parse::<SocketAddr>() {
-        Ok(address) if address.ip().is_loopback() => Ok(address),
+        Ok(address) if address.ip().is_loopback() || has_token => Ok(address),
         Ok(_) => Err(UsageError::NotLoopback { origin, value }),
         Err(_) => Err(UsageError::Bind { origin, value }),
     }

@@ -15,7 +15,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::protocol::catalog::{Field, Rosapi, Service, Topic};
 
 fn text(path: &str) -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
@@ -158,6 +158,21 @@ fn the_readme_lists_every_service_with_its_fields_in_order() {
     }
 }
 
+#[cfg(feature = "web")]
+#[test]
+fn the_readme_lists_every_question_of_rosapi_with_its_fields_in_order() {
+    let rows = table(&text("README.md"), "rosapi");
+    assert_eq!(rows.len(), Rosapi::ALL.len());
+    for (row, question) in rows.iter().zip(Rosapi::ALL) {
+        let service = Service::Rosapi(question);
+        assert_eq!(codes(&row[0]), [question.short_name()]);
+        let names = |fields: &[Field]| -> Vec<&str> { fields.iter().map(|one| one.name).collect() };
+        assert_eq!(codes(&row[1]), names(service.fields()), "{question:?}");
+        let values = names(service.response_fields());
+        assert_eq!(codes(&row[2]), values, "{question:?}");
+    }
+}
+
 #[test]
 fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
     let help = Command::new(env!("CARGO_BIN_EXE_pendularm"))
@@ -168,9 +183,9 @@ fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
     let rows = table(&text("README.md"), "option");
     for row in &rows {
         let (option, variable) = (codes(&row[0])[0], codes(&row[1])[0]);
-        let line = help
-            .lines()
-            .find(|line| line.contains(&format!("{option} <")));
+        let line = help.lines().find(|line| {
+            line.contains(&format!("{option} <")) || line.contains(&format!("{option}[=<"))
+        });
         let line = line.unwrap_or_else(|| panic!("{option} is not in the help"));
         assert!(line.contains(&format!("[env: {variable}]")), "{line}");
     }

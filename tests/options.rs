@@ -47,13 +47,15 @@ fn without_arguments_and_variables_the_defaults_hold() {
         is_default_bind,
         seed,
         log,
+        token,
+        ..
     } = Options::default();
     assert_eq!(links, Links::Two);
     assert_eq!(
         (bind.to_string().as_str(), is_default_bind),
         ("127.0.0.1:9095", true)
     );
-    assert_eq!((seed, log), (None, LevelFilter::INFO));
+    assert_eq!((seed, log, token), (None, LevelFilter::INFO, None));
 }
 
 #[test]
@@ -63,6 +65,11 @@ fn an_empty_variable_counts_as_unset() {
         ("ARM_SIM_BIND", ""),
         ("ARM_SIM_SEED", ""),
         ("ARM_SIM_LOG", ""),
+        ("ARM_SIM_TOKEN", ""),
+        ("ARM_SIM_ALLOW_HOST", ""),
+        ("ARM_SIM_ALLOW_ORIGIN", ""),
+        ("ARM_SIM_STRICT_ORIGIN", ""),
+        ("ARM_SIM_REPORT", ""),
     ];
     assert_eq!(options(&[], &empty), Options::default());
 }
@@ -117,15 +124,16 @@ fn loopback_addresses_are_taken_and_only_the_default_one_brings_the_other_family
 }
 
 #[test]
-fn an_address_that_other_machines_could_reach_is_refused() {
+fn an_address_that_other_machines_could_reach_needs_a_token() {
     for address in [
         "0.0.0.0:9095",
         "[::]:9095",
         "192.0.2.1:9095",
         "[::ffff:127.0.0.1]:9095",
     ] {
-        let expected =
-            format!("must be a loopback address, such as 127.0.0.1:9095, got {address:?}");
+        let expected = format!(
+            "must be a loopback address, such as 127.0.0.1:9095, unless --token gives something to ask for, got {address:?}"
+        );
         assert_eq!(
             refusal(&["--bind", address], &[]),
             format!("--bind {expected}")
@@ -134,6 +142,10 @@ fn an_address_that_other_machines_could_reach_is_refused() {
             refusal(&[], &[("ARM_SIM_BIND", address)]),
             format!("ARM_SIM_BIND {expected}")
         );
+        let arguments = ["--bind", address, "--token", "secret"];
+        let options = options(&arguments, &[]);
+        assert_eq!(options.bind.to_string(), address);
+        assert!(options.token.unwrap().matches("secret"));
     }
 }
 
@@ -251,6 +263,19 @@ fn the_help_shows_every_option_with_its_variable_and_default() {
         ("--bind <ADDRESS>", "ARM_SIM_BIND", "127.0.0.1:9095"),
         ("--seed <N>", "ARM_SIM_SEED", "a new seed at every start"),
         ("--log <LEVEL>", "ARM_SIM_LOG", "info"),
+        ("--token <TOKEN>", "ARM_SIM_TOKEN", "none"),
+        #[cfg(feature = "web")]
+        ("--allow-host <HOSTS>", "ARM_SIM_ALLOW_HOST", "none"),
+        #[cfg(feature = "web")]
+        ("--allow-origin <ORIGINS>", "ARM_SIM_ALLOW_ORIGIN", "none"),
+        #[cfg(feature = "web")]
+        (
+            "--strict-origin[=<SWITCH>]",
+            "ARM_SIM_STRICT_ORIGIN",
+            "false",
+        ),
+        #[cfg(feature = "web")]
+        ("--report <FOLDER>", "ARM_SIM_REPORT", "report"),
     ] {
         let line = help.lines().find(|line| line.contains(option)).unwrap();
         assert!(
@@ -259,12 +284,88 @@ fn the_help_shows_every_option_with_its_variable_and_default() {
         );
     }
     assert!(help.contains("--version"), "{help}");
+    let build = if cfg!(feature = "web") {
+        "This build has the web feature"
+    } else {
+        "This build is without the web feature"
+    };
+    assert!(help.contains(build), "{help}");
 }
 
 #[test]
-fn the_version_is_the_packages() {
-    let expected = format!("pendularm {}\n", env!("CARGO_PKG_VERSION"));
+fn the_version_is_the_packages_and_says_what_is_in_this_build() {
+    let web = if cfg!(feature = "web") {
+        "web"
+    } else {
+        "without web"
+    };
+    let expected = format!("pendularm {} ({web})\n", env!("CARGO_PKG_VERSION"));
     assert_eq!(parse(&["--version"], &[]), Ok(Parsed::Show(expected)));
+}
+
+#[test]
+fn a_token_is_printable_and_never_shown() {
+    let options = options(&[], &[("ARM_SIM_TOKEN", "a-Secret_1")]);
+    assert!(!format!("{options:?}").contains("Secret"));
+    assert!(options.token.unwrap().matches("a-Secret_1"));
+    let long = "s".repeat(257);
+    for (value, why) in [
+        ("my secret", "must be printable ASCII without spaces"),
+        ("schlüssel", "must be printable ASCII without spaces"),
+        (&long, "must be at most 256 bytes long, got 257"),
+    ] {
+        let refused = refusal(&[], &[("ARM_SIM_TOKEN", value)]);
+        assert_eq!(refused, format!("ARM_SIM_TOKEN {why}"));
+    }
+    assert_eq!(refusal(&["--token="], &[]), "--token must not be empty");
+}
+
+#[cfg(feature = "web")]
+#[test]
+fn hosts_and_origins_are_lists_and_the_switch_needs_no_value() {
+    let given = options(
+        &[
+            "--allow-host=Arm.Example, other:80",
+            "--allow-origin",
+            "https://Example.org,null,file://",
+            "--strict-origin",
+            "--report=somewhere",
+        ],
+        &[],
+    );
+    let hosts: Vec<String> = given.web.hosts.iter().map(ToString::to_string).collect();
+    assert_eq!(hosts, ["arm.example", "other:80"]);
+    let origins: Vec<&str> = given.web.origins.iter().map(|one| &**one).collect();
+    assert_eq!(origins, ["https://example.org", "null", "file://"]);
+    assert!(given.web.strict_origin);
+    assert_eq!(given.web.report.to_str(), Some("somewhere"));
+    for (value, on) in [("true", true), ("1", true), ("false", false), ("0", false)] {
+        let options = options(&[], &[("ARM_SIM_STRICT_ORIGIN", value)]);
+        assert_eq!(options.web.strict_origin, on);
+    }
+    assert!(!options(&["--strict-origin=false"], &[]).web.strict_origin);
+}
+
+#[cfg(feature = "web")]
+#[test]
+fn what_is_no_host_or_origin_or_switch_is_refused_by_name_and_value() {
+    for value in ["a b", "http://a", "a,,b", "a:99999"] {
+        let refused = refusal(&["--allow-host", value], &[]);
+        let expected = "--allow-host must be hosts, with or without a port, separated by commas";
+        assert_eq!(refused, format!("{expected}, got {value:?}"));
+    }
+    for value in ["example.org", "http://a/", "://a", "a,b", "*"] {
+        let refused = refusal(&[], &[("ARM_SIM_ALLOW_ORIGIN", value)]);
+        assert!(
+            refused.starts_with("ARM_SIM_ALLOW_ORIGIN must be origins as browsers write them")
+                && refused.ends_with(&format!("got {value:?}")),
+            "{refused}"
+        );
+    }
+    assert_eq!(
+        refusal(&["--strict-origin=maybe"], &[]),
+        "--strict-origin must be true or false, got \"maybe\""
+    );
 }
 
 #[cfg(unix)]
@@ -273,7 +374,7 @@ fn bytes_that_are_no_text_are_refused_like_any_other_value() {
     use std::os::unix::ffi::OsStringExt;
     let bytes = || OsString::from_vec(vec![b'2', 0xff]);
     let variable = Options::parse(["pendularm"], |_| Some(bytes())).unwrap_err();
-    assert!(matches!(variable, UsageError::Bind { .. }), "{variable}");
+    assert!(matches!(variable, UsageError::Token { .. }), "{variable}");
     let option = Options::parse(["pendularm".into(), "--links".into(), bytes()], |_| None);
     assert!(
         matches!(option, Err(UsageError::Links { .. })),
@@ -293,7 +394,7 @@ proptest! {
         arguments in prop::collection::vec(
             prop_oneof![
                 ".{0,12}",
-                "--(links|bind|seed|log|help|version|)(=.{0,6})?",
+                "--(links|bind|seed|log|token|allow-host|allow-origin|strict-origin|report|help|version|)(=.{0,6})?",
                 Just("2".to_owned()),
                 Just("--".to_owned()),
             ],
@@ -317,6 +418,11 @@ fn program(arguments: &[&str]) -> Command {
         "ARM_SIM_BIND",
         "ARM_SIM_SEED",
         "ARM_SIM_LOG",
+        "ARM_SIM_TOKEN",
+        "ARM_SIM_ALLOW_HOST",
+        "ARM_SIM_ALLOW_ORIGIN",
+        "ARM_SIM_STRICT_ORIGIN",
+        "ARM_SIM_REPORT",
     ] {
         command.env_remove(variable);
     }

@@ -26,8 +26,8 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
         .collect()
 }
 
-/// Contract section 3, the table: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 13] = [
+/// Contract section 3, the table, and what came later: service, request, values.
+const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -45,6 +45,12 @@ const SERVICES: [(&str, &[&str], &[&str]); 13] = [
     ),
     ("/arm_sim/pause", &["data"], &["data"]),
     ("/arm_sim/reset", &[], &["position", "velocity"]),
+    ("/arm_sim/step", &["steps"], &["steps", "time"]),
+    (
+        "/arm_sim/disturb",
+        &["effort", "duration"],
+        &["effort", "duration"],
+    ),
     ("/pid_controller/enable", &["data"], &["data"]),
     (
         "/pid_controller/set_gains",
@@ -87,7 +93,7 @@ fn the_services_are_those_of_the_contract() {
 }
 
 #[test]
-fn the_topics_are_those_of_the_contract() {
+fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
     let listed: Vec<_> = Topic::ALL
         .iter()
         .map(|topic| (topic.name(), topic.type_name(), topic.direction()))
@@ -126,6 +132,14 @@ fn the_topics_are_those_of_the_contract() {
                 "pendularm_interfaces/msg/TrialStatus",
                 Direction::Published
             ),
+            ("/tf", "tf2_msgs/msg/TFMessage", Direction::Published),
+            ("/tf_static", "tf2_msgs/msg/TFMessage", Direction::Published),
+            (
+                "/robot_description",
+                "std_msgs/msg/String",
+                Direction::Published
+            ),
+            ("/rosout", "rcl_interfaces/msg/Log", Direction::Published),
         ]
     );
 }
@@ -136,6 +150,8 @@ fn required_fields_are_those_that_have_no_default() {
         let expected: &[&str] = match service {
             Service::IntegrationStep => &["function", "x0", "dt", "steps", "integrator"],
             Service::Solve | Service::SendGoal => &["x", "y"],
+            Service::Step => &["steps"],
+            Service::Disturb => &["effort", "duration"],
             _ => &[],
         };
         assert_eq!(required(service.fields()), expected, "{}", service.name());
@@ -143,7 +159,7 @@ fn required_fields_are_those_that_have_no_default() {
 }
 
 #[test]
-fn one_service_computes_and_four_take_all_or_nothing() {
+fn one_service_computes_and_six_take_all_or_nothing() {
     let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
         Service::ALL
             .into_iter()
@@ -155,6 +171,8 @@ fn one_service_computes_and_four_take_all_or_nothing() {
         of(Service::all_or_nothing),
         [
             Service::IntegrationStep,
+            Service::Step,
+            Service::Disturb,
             Service::Solve,
             Service::SendGoal,
             Service::TrialStart
@@ -166,13 +184,14 @@ fn one_service_computes_and_four_take_all_or_nothing() {
 fn a_name_leads_back_to_what_it_names() {
     for topic in Topic::ALL {
         assert_eq!(Topic::from_name(topic.name()), Some(topic));
+        assert_eq!(Topic::from_name(topic.short_name()), Some(topic));
         assert_eq!(Service::from_name(topic.name()), None);
     }
     for service in Service::ALL {
         assert_eq!(Service::from_name(service.name()), Some(service));
         assert_eq!(Topic::from_name(service.name()), None);
     }
-    for other in ["", "/", "joint_states", "/joint_states/", "/arm_sim"] {
+    for other in ["", "/", "//joint_states", "/joint_states/", "/arm_sim"] {
         assert_eq!(Topic::from_name(other), None);
         assert_eq!(Service::from_name(other), None);
     }
@@ -184,8 +203,9 @@ fn names_and_types_are_given_once_and_in_the_form_that_ros_gives_them() {
     let services = Service::ALL.map(|service| (service.name(), service.type_name(), "srv"));
     let mut seen = HashSet::new();
     for (name, type_name, kind) in topics.into_iter().chain(services) {
+        // Frames that move and frames that do not have one type.
         assert!(
-            seen.insert(name) && seen.insert(type_name),
+            seen.insert(name) && (seen.insert(type_name) || name == "/tf_static"),
             "{name} or {type_name} is listed twice"
         );
         let parts: Vec<&str> = type_name.split('/').collect();
@@ -218,7 +238,14 @@ fn every_node_has_a_name_of_its_own() {
     let names: HashSet<&str> = Node::ALL.iter().map(|node| node.name()).collect();
     assert_eq!(
         names,
-        HashSet::from(["arm_sim", "ik", "ik_action", "ik_trial", "gateway"])
+        HashSet::from([
+            "arm_sim",
+            "ik",
+            "ik_action",
+            "ik_trial",
+            "gateway",
+            "rosapi"
+        ])
     );
     assert_eq!(Topic::JointStates.owner(), Node::ArmSim);
     assert_eq!(Service::TrialStop.owner(), Node::IkTrial);

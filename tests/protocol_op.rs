@@ -12,6 +12,7 @@
 
 use std::time::Duration;
 
+use pendularm::protocol::messages::Level;
 use pendularm::protocol::op::{
     Arguments, CallService, Incoming, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
     OpError, Subscribe, read,
@@ -370,6 +371,44 @@ fn a_bad_optional_value_of_a_subscription_is_named() {
         );
         assert!(message.len() < 200, "{message}");
     }
+}
+
+#[test]
+fn a_level_is_one_of_four_and_says_which_statuses_are_wanted() {
+    for (name, wanted) in [
+        ("info", [true, true, true]),
+        ("warning", [false, true, true]),
+        ("error", [false, false, true]),
+        ("none", [false, false, false]),
+    ] {
+        let Op::SetLevel(verbosity) = op(&format!(r#"{{"op":"set_level","level":"{name}"}}"#))
+        else {
+            panic!("{name} is a level");
+        };
+        assert_eq!(Level::ALL.map(|level| verbosity.wants(level)), wanted);
+    }
+    assert_eq!(
+        status(r#"{"op":"set_level"}"#),
+        "set_level: level is required"
+    );
+    for level in [r#""loud""#, r#""Info""#, "3", "null"] {
+        let status = status(&format!(r#"{{"op":"set_level","level":{level}}}"#));
+        let expected = "set_level: level must be info, warning, error or none, got ";
+        assert!(status.starts_with(expected), "{status}");
+    }
+}
+
+#[test]
+fn a_token_is_a_string_and_what_is_wrong_with_it_is_told_without_repeating_it() {
+    let Op::Auth { token } = op(r#"{"op":"auth","token":"secr\u0065t"}"#) else {
+        panic!("it shows a token");
+    };
+    assert_eq!(token, "secret");
+    assert_eq!(status(r#"{"op":"auth"}"#), "auth: token is required");
+    let mistyped = status(r#"{"op":"auth","token":["secret"]}"#);
+    assert!(mistyped.starts_with("auth: token must be a string") && !mistyped.contains("secret"));
+    let long = format!(r#"{{"op":"auth","token":"{}"}}"#, "s".repeat(MAX_NAME + 1));
+    assert!(status(&long).contains("at most 1024 bytes"));
 }
 
 #[test]

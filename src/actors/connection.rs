@@ -1,18 +1,24 @@
 //! One client: bytes in, ops to the registry; messages and answers back, through a bounded outbox.
 //!
-//! Three parts on one thread share one `Shared`: the reading task hands one op at a time to the registry and waits
-//! until it has taken effect; the actor moves what it is sent into the outbox; the writing task drains the outbox. A
-//! client that reads slowly fills its own outbox and nothing else.
+//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
+//! reading task hands one op at a time to the registry and waits until it has taken effect; the actor moves what it is
+//! sent into the outbox; the writing task drains the outbox. A client that reads slowly fills its own outbox and nothing else.
 //!
 //! Generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
 //!
 //! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
 
+pub mod gate;
 mod reader;
+mod session;
+mod transport;
+#[cfg(feature = "web")]
+mod web;
 mod writer;
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
+use std::net::SocketAddr;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
@@ -24,12 +30,13 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::Notify;
 use tokio::time::Instant;
 
-use self::reader::Reader;
+use self::gate::Gate;
+use self::session::Session;
 use super::ConnectionId;
 use super::gauges::Gauges;
 use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Request, Throttle};
+use crate::options::DEFAULT_BIND;
 use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::messages::{self, Level};
 use crate::protocol::outbox::Outbox;
 
 /// While more bytes of responses than this wait, the client is not read and none of its computations starts.
@@ -46,10 +53,15 @@ pub const LINGER: Duration = Duration::from_secs(5);
 pub const ANSWERS_OWED: Duration = Duration::from_secs(15);
 
 /// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
-const ARM_STATE: [&str; 3] = [
+const ARM_STATE: [&str; 8] = [
     Topic::JointStates.name(),
+    Topic::JointStates.short_name(),
     Topic::Clock.name(),
+    Topic::Clock.short_name(),
     Topic::Diagnostics.name(),
+    Topic::Diagnostics.short_name(),
+    Topic::Tf.name(),
+    Topic::Tf.short_name(),
 ];
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -60,6 +72,10 @@ pub struct Connection<S> {
     stream: Option<S>,
     registry: Addr<Registry>,
     shared: Rc<Shared>,
+    /// What is asked of the client first.
+    gate: Arc<Gate>,
+    /// The address that the client has connected to.
+    local: SocketAddr,
 }
 
 /// What the actor and its two tasks share; one thread, so plain cells do.
@@ -79,6 +95,8 @@ struct Shared {
     refusing: Cell<bool>,
     /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
     unbatched: Cell<bool>,
+    /// Whether frames may be binary: over raw TCP they are text.
+    binary: Cell<bool>,
     /// Bytes of responses in the outbox, for the registry to look at.
     backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
@@ -92,8 +110,19 @@ struct Computations {
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
-    /// Starts the actor for `stream` in the present system.
+    /// Starts the actor for `stream` in the present system; nothing is asked of the client first.
     pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
+        Self::start_behind(Arc::default(), DEFAULT_BIND, stream, registry, gauges)
+    }
+
+    /// Starts the actor behind a gate, for a client that has connected to `local`.
+    pub fn start_behind(
+        gate: Arc<Gate>,
+        local: SocketAddr,
+        stream: S,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Addr<Self> {
         let shared = Rc::new(Shared {
             id: Cell::new(None),
             outbox: RefCell::new(Outbox::new()),
@@ -104,6 +133,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             finishing: Cell::new(false),
             refusing: Cell::new(false),
             unbatched: Cell::new(false),
+            binary: Cell::new(false),
             backlog: Arc::default(),
             gauges,
         });
@@ -111,6 +141,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             stream: Some(stream),
             registry,
             shared,
+            gate,
+            local,
         }
         .start()
     }
@@ -258,36 +290,21 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Ended> for Connection<
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
-    /// Starts the two tasks; a client that was refused is told why and finished.
-    fn begin(&mut self, answer: Result<ConnectionId, Refused>, ctx: &mut Context<Self>) {
+    /// Starts the tasks that serve the client, or tell it why not.
+    fn begin(&mut self, admitted: Result<ConnectionId, Refused>, ctx: &mut Context<Self>) {
         let Some(stream) = self.stream.take() else {
             return;
         };
-        let (input, output) = tokio::io::split(stream);
-        let registry = self.registry.clone();
-        let finish = ctx.address().recipient();
-        let reading = match answer {
-            Ok(id) => {
-                self.shared.id.set(Some(id));
-                let reader = Reader::new(id, Rc::clone(&self.shared), registry.clone(), finish);
-                actix_rt::spawn(reader.run(input))
-            }
-            Err(why) => {
-                self.shared.refusing.set(true);
-                self.shared
-                    .send(messages::status(Level::Error, &why.to_string(), None));
-                self.shared.finish();
-                actix_rt::spawn(reader::discard(input))
-            }
+        let session = Session {
+            shared: Rc::clone(&self.shared),
+            registry: self.registry.clone(),
+            finish: ctx.address().recipient(),
+            gate: Arc::clone(&self.gate),
+            local: self.local,
         };
-        let (shared, address) = (Rc::clone(&self.shared), ctx.address());
+        let address = ctx.address();
         actix_rt::spawn(async move {
-            let all_written = writer::run(output, &shared, &registry).await;
-            if all_written && shared.refusing.get() {
-                let _ = reading.await;
-            } else {
-                reading.abort();
-            }
+            session.run(stream, admitted).await;
             address.do_send(Ended);
         });
     }
@@ -362,6 +379,13 @@ impl Shared {
     /// Nobody waits for the computations any more.
     fn abandon_computations(&self) {
         *self.computations.borrow_mut() = Computations::default();
+    }
+
+    /// Waits for that.
+    async fn finished(&self) {
+        while !self.finishing.get() {
+            self.outgoing.notified().await;
+        }
     }
 
     /// Nothing more is read; what is owed is sent.

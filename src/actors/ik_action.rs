@@ -8,20 +8,25 @@
 //! the old goal's result, the response, the trajectory, feedback, result.
 
 use actix::prelude::*;
+use tokio::sync::oneshot;
 
 use super::arm_sim::{EndGoal, GoalJudged, Pose, TrackGoal, Tracking, joint_names};
+use super::follower::{ActionRequest, Follower, GoalStatus};
 use super::ik::{Solve, SolveError, read_target};
 use super::node::{Interest, Reply, ServiceCall};
 use super::registry::{Nodes, Publish};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
-use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::catalog::{Action, Node, Service, Topic};
 use crate::protocol::fields::{Bound, Fields};
 use crate::protocol::goal_messages::{
     GoalValues, IkFeedback, IkResult, TargetMessage, setpoint_trajectory,
 };
 use crate::protocol::messages::{self, Empty};
 use crate::protocol::op::Arguments;
+
+/// What a client hears that wants a goal to end which it has not sent, or which has ended.
+const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -55,6 +60,23 @@ struct ActiveGoal<const N: usize> {
     positions: [f64; N],
     /// Who follows it besides the subscribers.
     owner: Option<Recipient<GoalNews<N>>>,
+    /// The client that sent it by the action.
+    follower: Option<Follower>,
+    /// Somebody has asked for its end.
+    cancelled: bool,
+}
+
+/// Who sent a goal, and how it is answered.
+enum Caller {
+    /// By the service.
+    Service(Reply),
+    /// By the action; the second value is dropped once the goal is under way.
+    Action(
+        Option<Follower>,
+        #[expect(dead_code, reason = "its end is the news")] oneshot::Sender<()>,
+    ),
+    /// Another node, which gets the answer as a value.
+    Node,
 }
 
 impl<const N: usize> IkAction<N> {
@@ -79,6 +101,8 @@ impl<const N: usize> IkAction<N> {
                 nodes.services.insert(service, address.clone().recipient());
             }
         }
+        let pursuer = address.clone().recipient();
+        nodes.actions.insert(Action::MoveTo, pursuer);
         for topic in [Topic::IkFeedback, Topic::IkResult] {
             nodes.publishers.insert(topic, address.clone().recipient());
         }
@@ -176,7 +200,7 @@ impl<const N: usize> Handler<ServiceCall> for IkAction<N> {
         if call.service == Service::SendGoal {
             match read_goal(&call.arguments) {
                 Ok(goal) => {
-                    let pursuit = self.pursue(goal, Some(reply), ctx.address());
+                    let pursuit = self.pursue(goal, Caller::Service(reply), ctx.address());
                     ctx.wait(pursuit.map(|_, _, _| ()));
                 }
                 Err(why) => reply.refuse(&why),
@@ -196,11 +220,43 @@ impl<const N: usize> Handler<ServiceCall> for IkAction<N> {
     }
 }
 
+impl<const N: usize> Handler<ActionRequest> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, request: ActionRequest, ctx: &mut Context<Self>) {
+        match request {
+            ActionRequest::Goal {
+                arguments,
+                follower,
+                done,
+            } => match read_goal(&arguments) {
+                Ok(goal) => {
+                    let caller = Caller::Action(Some(follower), done);
+                    let pursuit = self.pursue(goal, caller, ctx.address());
+                    ctx.wait(pursuit.map(|_, _, _| ()));
+                }
+                Err(why) => follower.refuse(&why),
+            },
+            ActionRequest::Cancel { from, done } => {
+                let goal = self.active.as_ref().filter(|goal| {
+                    let follower = goal.follower.as_ref();
+                    follower.is_some_and(|follower| follower.is_meant_by(&from))
+                });
+                let Some(id) = goal.map(|goal| goal.id.clone()) else {
+                    return from.refuse(NOT_ACTIVE);
+                };
+                let cancellation = self.cancel(Some(&id));
+                ctx.wait(cancellation.map(move |_, _, _| drop(done)));
+            }
+        }
+    }
+}
+
 impl<const N: usize> Handler<SendGoal<N>> for IkAction<N> {
     type Result = AtomicResponse<Self, Result<String, GoalRejected>>;
 
     fn handle(&mut self, goal: SendGoal<N>, ctx: &mut Context<Self>) -> Self::Result {
-        AtomicResponse::new(self.pursue(goal, None, ctx.address()))
+        AtomicResponse::new(self.pursue(goal, Caller::Node, ctx.address()))
     }
 }
 
@@ -222,6 +278,9 @@ impl<const N: usize> Handler<GoalJudged<N>> for IkAction<N> {
         } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&judged)) {
             if self.feedback_wanted {
                 self.publish(Topic::IkFeedback, &goal.feedback(&judged));
+            }
+            if let Some(follower) = &goal.follower {
+                follower.feed_back(&goal.feedback(&judged));
             }
             goal.tell_owner(&judged);
         }
@@ -249,11 +308,11 @@ impl<const N: usize> Handler<Interest> for IkAction<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> IkAction<N> {
-    /// Solves a goal and sets it in motion; a client's `reply` is answered in its place between old and new.
+    /// Solves a goal and sets it in motion; a client is answered in its place between old and new.
     fn pursue(
         &self,
         goal: SendGoal<N>,
-        mut reply: Option<Reply>,
+        mut caller: Caller,
         own: Addr<Self>,
     ) -> ResponseActFuture<Self, Result<String, GoalRejected>> {
         let (ik, arm) = (self.ik.clone(), self.arm.track.clone());
@@ -274,11 +333,20 @@ impl<const N: usize> IkAction<N> {
         };
         let set_off = move |tracking: Result<_, GoalRejected>, node: &mut Self, _: &mut _| {
             let outcome = tracking.map(|tracking| node.accept(number, goal, tracking));
-            if let Some(reply) = &mut reply {
-                match &outcome {
-                    Ok(goal_id) => reply.succeed(&GoalValues { goal_id }),
-                    Err(why) => reply.refuse(&why.to_string()),
+            match (&mut caller, &outcome) {
+                (Caller::Service(reply), Ok(goal_id)) => reply.succeed(&GoalValues { goal_id }),
+                (Caller::Service(reply), Err(why)) => reply.refuse(&why.to_string()),
+                (Caller::Action(follower, _), Ok(_)) => {
+                    if let Some(goal) = &mut node.active {
+                        goal.follower = follower.take();
+                    }
                 }
+                (Caller::Action(follower, _), Err(why)) => {
+                    if let Some(follower) = follower {
+                        follower.refuse(&why.to_string());
+                    }
+                }
+                (Caller::Node, _) => {}
             }
             let trajectory = outcome.is_ok().then(|| node.trajectory());
             let publish = node.publish.clone();
@@ -287,7 +355,7 @@ impl<const N: usize> IkAction<N> {
                 if let Some(trajectory) = trajectory.flatten() {
                     let _ = publish.send(trajectory).await;
                 }
-                drop(reply);
+                drop(caller);
                 outcome
             }
             .into_actor(node)
@@ -308,6 +376,8 @@ impl<const N: usize> IkAction<N> {
             target: goal.target,
             positions: tracking.positions,
             owner: goal.owner,
+            follower: None,
+            cancelled: false,
         });
         id
     }
@@ -342,6 +412,9 @@ impl<const N: usize> IkAction<N> {
         };
         Box::pin(ended.into_actor(self).map(|ended, node, _| {
             let ended = ended?.ok_or(CancelRejected::NotActive)?;
+            if let Some(goal) = &mut node.active {
+                goal.cancelled = true;
+            }
             node.conclude(&ended);
             match ended.outcome {
                 Some(Outcome::Preempted) => Ok(()),
@@ -357,6 +430,9 @@ impl<const N: usize> IkAction<N> {
         };
         if self.result_wanted {
             self.publish(Topic::IkResult, &goal.result(judged));
+        }
+        if let Some(follower) = &goal.follower {
+            follower.conclude(&goal.result(judged), goal.status(judged));
         }
         goal.tell_owner(judged);
     }
@@ -391,6 +467,14 @@ impl<const N: usize> ActiveGoal<N> {
             outcome: judged.outcome.map_or("", Outcome::name),
             target: target_message(&self.target),
             final_distance: judged.distance,
+        }
+    }
+
+    fn status(&self, judged: &GoalJudged<N>) -> GoalStatus {
+        match judged.outcome {
+            Some(Outcome::Reached) => GoalStatus::Succeeded,
+            _ if self.cancelled => GoalStatus::Canceled,
+            _ => GoalStatus::Aborted,
         }
     }
 

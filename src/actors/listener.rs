@@ -11,8 +11,10 @@ use actix::prelude::*;
 use tokio::net::TcpListener;
 
 use super::connection::Connection;
+use super::connection::gate::Gate;
 use super::gauges::Gauges;
 use super::registry::Registry;
+use crate::options::DEFAULT_BIND;
 
 /// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
 const BACKOFF: Duration = Duration::from_millis(50);
@@ -24,16 +26,29 @@ pub struct Listener {
     socket: Arc<TcpListener>,
     registry: Addr<Registry>,
     gauges: Arc<Gauges>,
+    gate: Arc<Gate>,
 }
 
 impl Listener {
-    /// A listener on a socket that is bound already.
+    /// A listener on a socket that is bound already; nothing is asked of its clients first.
     #[must_use]
     pub fn new(socket: TcpListener, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
+        Self::behind(Arc::default(), socket, registry, gauges)
+    }
+
+    /// A listener whose clients come through a gate.
+    #[must_use]
+    pub fn behind(
+        gate: Arc<Gate>,
+        socket: TcpListener,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Self {
         Self {
             socket: Arc::new(socket),
             registry,
             gauges,
+            gate,
         }
     }
 }
@@ -55,6 +70,7 @@ impl Actor for Listener {
             Arc::clone(&self.socket),
             self.registry.clone(),
             Arc::clone(&self.gauges),
+            Arc::clone(&self.gate),
         );
         ctx.spawn(accepting.into_actor(self));
     }
@@ -72,7 +88,12 @@ impl Handler<StopListening> for Listener {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-async fn accept(socket: Arc<TcpListener>, registry: Addr<Registry>, gauges: Arc<Gauges>) {
+async fn accept(
+    socket: Arc<TcpListener>,
+    registry: Addr<Registry>,
+    gauges: Arc<Gauges>,
+    gate: Arc<Gate>,
+) {
     loop {
         match socket.accept().await {
             Ok((stream, peer)) => {
@@ -81,7 +102,9 @@ async fn accept(socket: Arc<TcpListener>, registry: Addr<Registry>, gauges: Arc<
                     tracing::debug!(%peer, %error, "TCP_NODELAY refused");
                 }
                 tracing::debug!(%peer, "client connected");
-                Connection::start_on(stream, registry.clone(), Arc::clone(&gauges));
+                let local = stream.local_addr().unwrap_or(DEFAULT_BIND);
+                let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
+                Connection::start_behind(Arc::clone(&gate), local, stream, registry, gauges);
             }
             Err(error) => {
                 tracing::warn!(%error, "cannot accept a client; trying again");

@@ -6,7 +6,7 @@
 //!  listener ───────────▶ connection ───────────────────────▶ registry ──────────────────────────────────────▶ nodes
 //!                        (one per client)                     (one)                                       arm_sim (own thread)
 //!                            ▲     Deliver, Answer, Finish      │ ▲         Publish, Respond             integration (worker pool)
-//!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial
+//!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial, rosapi
 //! ```
 //!
 //! | message | from | to | meaning |
@@ -16,6 +16,8 @@
 //! | [`registry::Request`] | connection | registry | one rosbridge op of that client |
 //! | [`node::ServiceCall`] | registry | the node that serves it | answered exactly once, through its [`node::Reply`] |
 //! | [`node::TopicMessage`] | registry | the node that subscribes | a message on a topic the runtime listens to |
+//! | [`follower::ActionRequest`] | registry | `ik_action` | a goal of the action, or its end; the client follows by its [`follower::Follower`] |
+//! | [`registry::Progress`] | `ik_action` | registry | feedback of a goal, for the client that sent it |
 //! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: no encoding without |
 //! | [`registry::Publish`] / [`registry::Respond`] | nodes | registry | a topic message; an answer |
 //! | [`arm_sim::ArmPose`] | ik, `ik_trial` | `arm_sim` | lengths, positions and time, asked for every time |
@@ -24,6 +26,8 @@
 //! | [`arm_sim::GoalJudged`] | `arm_sim` | `ik_action` | progress of a goal, or how it ended |
 //! | [`ik_action::SendGoal`] / [`ik_action::CancelGoal`] | `ik_trial` | `ik_action` | what clients ask by services |
 //! | [`ik_action::GoalNews`] | `ik_action` | `ik_trial` | what clients hear by topics |
+//! | [`registry::TakeCensus`] | rosapi | registry | which topics and services clients have |
+//! | [`arm_sim::SimulationTime`] | rosapi, rosout | `arm_sim` | the time |
 //! | [`connection::Deliver`] / [`connection::Answer`] / [`connection::Finish`] | registry | connection | bytes to send; the end |
 //!
 //! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
@@ -31,6 +35,7 @@
 
 pub mod arm_sim;
 pub mod connection;
+pub mod follower;
 pub mod gauges;
 pub mod ik;
 pub mod ik_action;
@@ -39,6 +44,8 @@ pub mod integration;
 pub mod listener;
 pub mod node;
 pub mod registry;
+pub mod rosapi;
+pub mod rosout;
 pub mod runtime;
 pub mod workers;
 

@@ -170,6 +170,7 @@ impl Reply {
             connection: self.connection,
             frame,
             service: Some(self.service),
+            status: None,
             done,
         });
     }

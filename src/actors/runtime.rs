@@ -16,7 +16,8 @@ use tokio::runtime::Builder;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep};
 
-use super::arm_sim::ArmSim;
+use super::arm_sim::{ArmSim, joint_names};
+use super::connection::gate::Gate;
 use super::gauges::Gauges;
 use super::ik::Ik;
 use super::ik_action::{GoalTracker, IkAction};
@@ -24,10 +25,17 @@ use super::ik_trial::{GoalClient, IkTrial};
 use super::integration::Integration;
 use super::listener::{Listener, StopListening};
 use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
+use super::rosapi::Rosapi;
+use super::rosout::Rosout;
 use super::workers::WorkerPool;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::{Links, Options};
+#[cfg(feature = "web")]
+use crate::{
+    options::WebOptions,
+    web::{Door, access::Access, authority::Host},
+};
 
 /// What waiting calls are told when the runtime ends.
 const SHUTTING_DOWN: &str = "shutting down";
@@ -88,11 +96,17 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     // The registry lives as long as this function: it can't be gone.
     let _ = registry.send(Attach(nodes)).await;
 
+    let gate = Arc::new(gate(options));
     let listeners: Vec<Addr<Listener>> = sockets
         .into_iter()
-        .map(|socket| Listener::new(socket, registry.clone(), Arc::clone(&gauges)).start())
+        .map(|socket| {
+            let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
+            Listener::behind(Arc::clone(&gate), socket, registry, gauges).start()
+        })
         .collect();
     announce(address);
+    #[cfg(feature = "web")]
+    announce_page(address, options.token.is_some());
     wait_for_signal(&mut interrupt, &mut terminate).await;
 
     for listener in listeners {
@@ -101,6 +115,30 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     shut_down(&registry, &workers, &gauges).await;
     arm_thread.stop();
     Ok(())
+}
+
+/// What is asked of clients, and what they find behind it.
+fn gate(options: &Options) -> Gate {
+    Gate {
+        token: options.token.clone(),
+        #[cfg(feature = "web")]
+        door: {
+            let WebOptions {
+                hosts,
+                origins,
+                strict_origin,
+                report,
+            } = options.web.clone();
+            let token = options.token.clone();
+            let access = Access {
+                token,
+                hosts,
+                origins,
+                strict_origin,
+            };
+            Door::new(access, report)
+        },
+    }
 }
 
 /// The arm and the nodes that know its number of links.
@@ -119,6 +157,15 @@ fn start_nodes<const N: usize>(
         ArmSim::new(Arm::default(), Gains::default(), publish, respond, gauges)
     });
     ArmSim::attach(&arm, nodes);
+    let introspection = Rosapi::new(
+        registry.clone().recipient(),
+        arm.clone().recipient(),
+        arm.clone().recipient(),
+        &joint_names::<N>(),
+    );
+    Rosapi::attach(&introspection.start(), nodes);
+    let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
+    Rosout::attach(&rosout.start(), nodes);
 
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();
@@ -158,8 +205,26 @@ async fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
 /// The one line on stdout. Nobody may be reading it: that is no reason to end.
 fn announce(address: SocketAddr) {
     let mut stdout = std::io::stdout();
-    let _ = writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush());
+    if let Err(error) = writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush()) {
+        tracing::warn!(%address, %error, "standard output can't be told where this listens");
+    }
     tracing::info!(%address, "serving rosbridge clients");
+}
+
+/// Where a browser finds the page. The token is not for the log.
+#[cfg(feature = "web")]
+fn announce_page(address: SocketAddr, asks_token: bool) {
+    let host = if address.ip().is_unspecified() {
+        "localhost".to_owned()
+    } else {
+        Host::Address(address.ip()).to_string()
+    };
+    let port = address.port();
+    if asks_token {
+        tracing::info!("page: http://{host}:{port}/?token=... (with the token, once)");
+    } else {
+        tracing::info!("page: http://{host}:{port}/");
+    }
 }
 
 async fn wait_for_signal(interrupt: &mut Signal, terminate: &mut Signal) {

@@ -2,7 +2,8 @@
 //!
 //! One step, from the state `(q, q̇)` at its start:
 //!
-//! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero;
+//! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero; a disturbance that
+//!    has not ended ([`Disturbance`]) is added to it;
 //! 2. that effort is held while [`increment`] evaluates [`forward_dynamics`] at the method's stages;
 //! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
 //!
@@ -36,6 +37,30 @@ pub struct Divergence {
     pub time: f64,
 }
 
+/// An effort from outside, added to that of every step that begins before it ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disturbance<const N: usize> {
+    /// Effort per joint \[N m\].
+    pub effort: [f64; N],
+    /// Simulation time at which it ends \[s\].
+    ends: f64,
+}
+
+impl<const N: usize> Disturbance<N> {
+    /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration / timestep`
+    /// steps, rounded up, so that at least one has it.
+    ///
+    /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, far
+    /// less than a timestep: 1.1 s in steps of 0.1 s are eleven steps, not twelve.
+    fn new(effort: [f64; N], start: f64, duration: f64) -> Self {
+        let ends = (start + duration) * (1.0 - 4.0 * f64::EPSILON);
+        Self {
+            effort,
+            ends: ends.max(start.next_up()),
+        }
+    }
+}
+
 /// An arm under control, advanced in whole steps.
 ///
 /// ```
@@ -60,6 +85,8 @@ pub struct Simulation<const N: usize> {
     carry: State<N>,
     /// Effort of the latest step \[N m\].
     effort: [f64; N],
+    /// What is added to the effort of the next step.
+    disturbance: Option<Disturbance<N>>,
     /// Simulation time when this timestep came into force \[s\].
     base: f64,
     /// Steps taken since then.
@@ -81,6 +108,7 @@ impl<const N: usize> Simulation<N> {
             state: State::rest(),
             carry: State::rest(),
             effort: [0.0; N],
+            disturbance: None,
             base: 0.0,
             steps_since_base: 0,
             steps: 0,
@@ -127,7 +155,7 @@ impl<const N: usize> Simulation<N> {
     /// One step, unless its result is not finite: then nothing changes, and `false`.
     #[inline]
     fn take_step(&mut self) -> bool {
-        let control = if self.pid.is_enabled() {
+        let mut control = if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)
         } else {
             Control {
@@ -135,6 +163,9 @@ impl<const N: usize> Simulation<N> {
                 integral: *self.pid.integral(),
             }
         };
+        if self.disturbance.is_some() {
+            self.add_disturbance(&mut control.effort);
+        }
         let State { position, velocity } = &self.state;
         // The motion does not depend on the time, so none is reckoned for the stages.
         let (dq, dv) = increment(
@@ -163,12 +194,31 @@ impl<const N: usize> Simulation<N> {
         true
     }
 
-    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, effort zero, divergence cleared.
+    /// Adds the disturbance to the effort of the step that begins now, or ends it if its time is over.
+    #[cold]
+    fn add_disturbance(&mut self, effort: &mut [f64; N]) {
+        match self.disturbance {
+            Some(disturbance) if self.time() < disturbance.ends => {
+                *effort = std::array::from_fn(|i| effort[i] + disturbance.effort[i]);
+            }
+            _ => self.disturbance = None,
+        }
+    }
+
+    /// Adds `effort` \[N m\] to that of every step that begins within `duration` \[s\], greater than 0, of simulation time
+    /// from now; one that still runs ends here. With the controller off, this is all the effort there is.
+    pub fn disturb(&mut self, effort: [f64; N], duration: f64) {
+        self.disturbance = Some(Disturbance::new(effort, self.time(), duration));
+    }
+
+    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, effort zero, disturbance ended,
+    /// divergence cleared.
     /// On or off, gains, arm, method and timestep stay.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();
         self.effort = [0.0; N];
+        self.disturbance = None;
         self.base = 0.0;
         self.steps_since_base = 0;
         self.steps = 0;
@@ -187,7 +237,8 @@ impl<const N: usize> Simulation<N> {
         self.carry = State::rest();
     }
 
-    /// Effort of the latest step \[N m\]; zeros once the controller is off, and after a reset.
+    /// Effort of the latest step \[N m\], the controller's and the disturbance's together; zeros at once when the
+    /// controller is turned off, and after a reset.
     #[must_use]
     pub fn effort(&self) -> &[f64; N] {
         &self.effort

@@ -5,9 +5,14 @@
 //!
 //! **Invariant:** what is listed is served, and what is served is listed: the enums make the compiler ask.
 
+mod actions;
+pub mod rosapi;
 mod services;
 mod topics;
+pub mod types;
 
+pub use actions::Action;
+pub use rosapi::Rosapi;
 pub use services::Service;
 pub use topics::Topic;
 
@@ -24,16 +29,19 @@ pub enum Node {
     IkTrial,
     /// The rosbridge side: connections and registry.
     Gateway,
+    /// Tells what there is.
+    Rosapi,
 }
 
 impl Node {
     /// All nodes.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::ArmSim,
         Self::Ik,
         Self::IkAction,
         Self::IkTrial,
         Self::Gateway,
+        Self::Rosapi,
     ];
 
     /// The node's name, without a slash.
@@ -45,6 +53,7 @@ impl Node {
             Self::IkAction => "ik_action",
             Self::IkTrial => "ik_trial",
             Self::Gateway => "gateway",
+            Self::Rosapi => "rosapi",
         }
     }
 }

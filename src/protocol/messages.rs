@@ -19,7 +19,7 @@ const LARGE_FRAME: usize = 64 * 1024;
 const NANOSECONDS: u32 = 1_000_000_000;
 
 /// How serious a status is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Level {
     /// All is well.
     Info,
@@ -30,6 +30,9 @@ pub enum Level {
 }
 
 impl Level {
+    /// All levels, the least serious first.
+    pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Error];
+
     /// The level's name on the wire.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -199,6 +202,29 @@ pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
         .end()
 }
 
+/// A frame that [`publish`] has made for `topic`, for those who know it by another spelling.
+#[must_use]
+pub fn respelled(topic: &str, spelling: &str, frame: &Bytes) -> Bytes {
+    if topic == spelling {
+        return frame.clone();
+    }
+    let msg = message_text(topic, frame);
+    let mut line = Line::with_room("publish", frame.len()).text("topic", spelling);
+    line.key("msg");
+    line.text.extend_from_slice(msg);
+    line.end()
+}
+
+/// The message within a frame that [`publish`] has made for `topic`, as JSON.
+#[must_use]
+pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
+    let quoted = serde_json::to_string(topic).map_or(0, |quoted| quoted.len());
+    let head = "{\"op\":\"publish\",\"topic\":,\"msg\":".len() + quoted;
+    let msg = frame.get(head..frame.len().saturating_sub("}\n".len()));
+    debug_assert!(msg.is_some(), "{topic} is not what this frame is about");
+    msg.unwrap_or(b"null")
+}
+
 /// The answer to a service call; `values` is an object, `status` empty on success.
 #[must_use]
 pub fn response(
@@ -239,6 +265,34 @@ pub fn response_raw(
 #[must_use]
 pub fn failure(service: &str, id: Option<&RawValue>, status: &str) -> Bytes {
     response(service, id, &Empty {}, false, status)
+}
+
+/// Progress of a goal.
+#[must_use]
+pub fn action_feedback(action: &str, id: Option<&RawValue>, values: &impl Serialize) -> Bytes {
+    Line::op("action_feedback")
+        .text("action", action)
+        .optional_raw("id", id)
+        .value("values", values)
+        .end()
+}
+
+/// The end of a goal; `status` as `action_msgs/msg/GoalStatus` counts. Where `result` is false, `values` says why.
+#[must_use]
+pub fn action_result(
+    action: &str,
+    id: Option<&RawValue>,
+    values: &impl Serialize,
+    status: u8,
+    result: bool,
+) -> Bytes {
+    Line::op("action_result")
+        .text("action", action)
+        .optional_raw("id", id)
+        .value("values", values)
+        .value("status", &status)
+        .value("result", &result)
+        .end()
 }
 
 /// A status.

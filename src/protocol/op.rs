@@ -11,6 +11,8 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
+use super::fragments::Piece;
+use super::messages::Level;
 pub use reader::read;
 
 /// Longest topic or service name, and subscription id, in bytes: the registry keeps them for as long as a connection lives.
@@ -74,6 +76,22 @@ pub enum Op {
     },
     /// Calls a service.
     CallService(CallService),
+    /// A goal for an action.
+    SendActionGoal(ActionGoal),
+    /// The end of the goal that has the frame's id.
+    CancelActionGoal {
+        /// Action name.
+        action: String,
+    },
+    /// A piece of a longer frame.
+    Fragment(Piece),
+    /// Which statuses the sender wants from now on.
+    SetLevel(Verbosity),
+    /// Shows who the sender is, where the runtime asks for that.
+    Auth {
+        /// What it shows.
+        token: String,
+    },
     /// A provider's answer to a forwarded call.
     ServiceResponse {
         /// Service name.
@@ -87,6 +105,23 @@ pub enum Op {
     },
 }
 
+/// The least serious status that a client wants; `None` for no status at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verbosity(pub Option<Level>);
+
+impl Verbosity {
+    /// Every status: what holds over raw TCP until the client says otherwise.
+    pub const ALL: Self = Self(Some(Level::Info));
+    /// No status: what holds over WebSocket until the client says otherwise.
+    pub const NONE: Self = Self(None);
+
+    /// Whether a status of that level is wanted.
+    #[must_use]
+    pub fn wants(self, level: Level) -> bool {
+        self.0.is_some_and(|least| level >= least)
+    }
+}
+
 /// A subscription.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Subscribe {
@@ -98,6 +133,41 @@ pub struct Subscribe {
     pub throttle: Duration,
     /// How many messages throttling may hold back; 1 to [`MAX_QUEUE_LENGTH`].
     pub queue_length: usize,
+    /// How messages are to be written.
+    pub encoding: Encoding,
+}
+
+/// How a subscriber wants its messages written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Encoding {
+    /// As what.
+    pub compression: Compression,
+    /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. None: in one piece always.
+    pub fragment_size: Option<usize>,
+}
+
+impl Encoding {
+    /// What two subscriptions of one client come to: the denser encoding, the smaller pieces.
+    #[must_use]
+    pub fn merged(self, other: Self) -> Self {
+        let sizes = self.fragment_size.into_iter().chain(other.fragment_size);
+        Self {
+            compression: self.compression.max(other.compression),
+            fragment_size: sizes.min(),
+        }
+    }
+}
+
+/// As what a message is written; of several that a client asked for, the last in this order counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Compression {
+    /// JSON. Also where `png` was asked for, which saves nothing on messages as short as ours.
+    #[default]
+    None,
+    /// CBOR, with typed arrays.
+    Cbor,
+    /// CDR in CBOR.
+    CborRaw,
 }
 
 /// A service call.
@@ -109,6 +179,19 @@ pub struct CallService {
     pub args: Arguments,
     /// How long an external provider may take, if given; at most [`MAX_TIMEOUT`].
     pub timeout: Option<Duration>,
+}
+
+/// A goal.
+#[derive(Debug, Clone)]
+pub struct ActionGoal {
+    /// Action name.
+    pub action: String,
+    /// Action type, if given.
+    pub type_name: Option<String>,
+    /// Its fields.
+    pub args: Arguments,
+    /// Whether feedback is wanted.
+    pub feedback: bool,
 }
 
 /// The arguments of a call.

@@ -41,17 +41,27 @@ impl Runtime {
 
     /// The same with more arguments.
     pub fn with(arguments: &[&str]) -> Self {
+        Self::with_bind("127.0.0.1:0", arguments)
+    }
+
+    /// The same at another address.
+    pub fn with_bind(bind: &str, arguments: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_pendularm"));
         for variable in [
             "ARM_SIM_LINKS",
             "ARM_SIM_BIND",
             "ARM_SIM_SEED",
             "ARM_SIM_LOG",
+            "ARM_SIM_TOKEN",
+            "ARM_SIM_ALLOW_HOST",
+            "ARM_SIM_ALLOW_ORIGIN",
+            "ARM_SIM_STRICT_ORIGIN",
+            "ARM_SIM_REPORT",
         ] {
             command.env_remove(variable);
         }
         let mut child = command
-            .args(["--bind", "127.0.0.1:0"])
+            .args(["--bind", bind])
             .args(arguments)
             .env("ARM_SIM_LOG", "off")
             .stdin(Stdio::null())

@@ -10,7 +10,9 @@
 //!
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
+mod by_hand;
 mod goals;
+mod scene;
 mod services;
 mod telemetry;
 
@@ -20,6 +22,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
+pub use self::by_hand::MAX_STEPS;
 use self::goals::Goals;
 pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::telemetry::Telemetry;
@@ -30,7 +33,7 @@ use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::protocol::catalog::{Node, Service, Topic};
+use crate::protocol::catalog::{Direction, Node, Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::trajectory::joint_trajectory;
 
@@ -104,7 +107,11 @@ impl<const N: usize> ArmSim<N> {
                 nodes.services.insert(service, address.clone().recipient());
             }
         }
-        for topic in [Topic::JointStates, Topic::Clock, Topic::Diagnostics] {
+        let published = |topic: &Topic| topic.direction() == Direction::Published;
+        for topic in Topic::ALL.into_iter().filter(published) {
+            if topic.owner() != Node::ArmSim {
+                continue;
+            }
             nodes.publishers.insert(topic, address.clone().recipient());
         }
         nodes
@@ -114,6 +121,11 @@ impl<const N: usize> ArmSim<N> {
 }
 
 // ---- messages -------------------------------------------------------------------------------------------------------
+
+/// What time it is in the simulation \[s\]. From `rosapi` and `rosout`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "f64")]
+pub struct SimulationTime;
 
 /// Which simulation an offline observer would have to run to get the present state. From tests and tools.
 #[derive(Message)]
@@ -174,6 +186,7 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
                         connection: sender.connection,
                         frame,
                         service: None,
+                        status: Some(Level::Error),
                         done: Some(sender.done),
                     });
                 }
@@ -187,6 +200,16 @@ impl<const N: usize> Handler<Interest> for ArmSim<N> {
 
     fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
         self.telemetry.set_wanted(interest.topic, interest.wanted);
+        self.publish_lasting(interest.topic);
+    }
+}
+
+impl<const N: usize> Handler<SimulationTime> for ArmSim<N> {
+    type Result = f64;
+
+    fn handle(&mut self, _: SimulationTime, ctx: &mut Context<Self>) -> f64 {
+        self.advance_to_now(ctx);
+        self.simulation.time()
     }
 }
 
@@ -219,24 +242,23 @@ impl<const N: usize> ArmSim<N> {
         if self.paused || self.simulation.divergence().is_some() {
             return;
         }
+        // One budget for all that comes before the breather is over: were each message to cost one, a client that sends
+        // many would keep the arm from everybody else.
+        if self.catching_up {
+            return;
+        }
         let due = self.pacer.due(self.epoch.elapsed());
         if due == 0 {
             return;
         }
         let taken = self.take_steps(due);
         self.pacer.took(taken);
-        if let Some(divergence) = self.simulation.divergence() {
-            self.telemetry.owes(0, 0.0);
-            tracing::warn!(
-                step = divergence.step,
-                time = divergence.time,
-                "the simulation has diverged"
-            );
-            self.publish_diagnostics();
+        if self.simulation.divergence().is_some() {
+            self.note_divergence();
             return;
         }
         self.telemetry.owes(due - taken, self.simulation.timestep());
-        if taken < due && !self.catching_up {
+        if taken < due {
             self.catching_up = true;
             ctx.run_later(BREATHER, |arm, ctx| {
                 arm.catching_up = false;
@@ -259,6 +281,19 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry
             .stepped(taken, started.elapsed(), self.simulation.timestep());
         taken
+    }
+
+    /// Tells of a divergence that has just happened.
+    fn note_divergence(&mut self) {
+        self.telemetry.owes(0, 0.0);
+        if let Some(divergence) = self.simulation.divergence() {
+            tracing::warn!(
+                step = divergence.step,
+                time = divergence.time,
+                "the simulation has diverged"
+            );
+        }
+        self.publish_diagnostics();
     }
 
     /// Time counts from here: what was owed of an unfinished step is gone.

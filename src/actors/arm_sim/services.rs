@@ -91,6 +91,8 @@ impl<const N: usize> ArmSim<N> {
                 };
                 self.answer_reset(reply, fields.status(), ended, ctx);
             }
+            Service::Step => self.step_by_hand(&mut fields, reply),
+            Service::Disturb => self.disturb(&mut fields, reply),
             Service::Enable => {
                 let data = self.enable(&mut fields);
                 reply.conclude(&Switch { data }, &fields.status());
@@ -138,6 +140,7 @@ impl<const N: usize> ArmSim<N> {
             Ok(changed) if changed != *arm => {
                 self.simulation.set_arm(changed);
                 self.restart_energy_drift();
+                self.publish_description();
             }
             Ok(_) => {}
             // The fields were checked with the same bounds; should the two ever differ, the arm's word counts.

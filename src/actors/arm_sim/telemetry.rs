@@ -88,7 +88,7 @@ impl Telemetry {
         }
     }
 
-    fn wants(&self, topic: Topic) -> bool {
+    pub(super) fn wants(&self, topic: Topic) -> bool {
         self.wanted.contains(&topic)
     }
 
@@ -146,6 +146,7 @@ impl<const N: usize> ArmSim<N> {
         if self.telemetry.wants(Topic::Clock) {
             self.publish(Topic::Clock, &Clock { clock: stamp });
         }
+        self.publish_frames(stamp);
         if self.telemetry.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
             self.publish_diagnostics();
             self.telemetry.last_rates = self.telemetry.window.rates().unwrap_or_default();
@@ -166,7 +167,7 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry.energy_reference = energy(&self.simulation);
     }
 
-    fn publish(&self, topic: Topic, message: &impl serde::Serialize) {
+    pub(super) fn publish(&self, topic: Topic, message: &impl serde::Serialize) {
         let frame = messages::publish(topic.name(), message);
         self.publish.do_send(Publish {
             topic,

@@ -1,26 +1,24 @@
-//! The writing task of a connection: drains the outbox, several frames in one vectored write.
+//! The writing task of a connection: drains the outbox, several frames at a time.
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 
-use std::io::IoSlice;
-
 use actix::prelude::*;
 use bytes::{Buf, Bytes};
-use tokio::io::{AsyncWrite, AsyncWriteExt};
 use tokio::time::{Instant, sleep_until, timeout_at};
 
+use super::transport::Outbound;
 use super::{LINGER, STALL_LIMIT, Shared};
 use crate::actors::registry::Registry;
 
 /// Frames in one write.
-const BATCH_FRAMES: usize = 64;
+pub(super) const BATCH_FRAMES: usize = 64;
 /// Bytes offered in one write: after that much the other connections have a turn.
-const BATCH_BYTES: usize = 256 * 1024;
+pub(super) const BATCH_BYTES: usize = 256 * 1024;
 
 /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
 /// True if all that was owed has been written.
-pub(super) async fn run<W: AsyncWrite + Unpin>(
-    mut output: W,
+pub(super) async fn run<O: Outbound>(
+    mut output: O,
     shared: &Shared,
     registry: &Addr<Registry>,
 ) -> bool {
@@ -42,12 +40,23 @@ pub(super) async fn run<W: AsyncWrite + Unpin>(
                 return false;
             }
         } else if shared.finishing.get() && !shared.is_computing() {
-            return timeout_at(Instant::now() + LINGER, output.shutdown())
+            return timeout_at(Instant::now() + LINGER, output.end())
                 .await
                 .is_ok();
+        } else if !tend(&mut output, shared).await {
+            return false;
         } else {
             wait(shared).await;
         }
+    }
+}
+
+/// Lets the transport say what it has to; false if the client is gone or stalled.
+async fn tend<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
+    tokio::select! {
+        biased;
+        tended = output.tend() => tended.is_some(),
+        () = stalled(shared, Instant::now()) => false,
     }
 }
 
@@ -63,8 +72,8 @@ async fn wait(shared: &Shared) {
 }
 
 /// Writes the whole batch; false if the client is gone or stalled.
-async fn write_batch<W: AsyncWrite + Unpin>(
-    output: &mut W,
+async fn write_batch<O: Outbound>(
+    output: &mut O,
     batch: &mut Vec<Bytes>,
     shared: &Shared,
     registry: &Addr<Registry>,
@@ -73,7 +82,7 @@ async fn write_batch<W: AsyncWrite + Unpin>(
     while first < batch.len() {
         let written = tokio::select! {
             biased;
-            written = write_some(output, batch.get(first..).unwrap_or_default()) => written,
+            written = output.write(batch.get(first..).unwrap_or_default()) => written,
             () = stalled(shared, Instant::now()) => return false,
         };
         let Some(mut left) = written else {
@@ -98,28 +107,6 @@ async fn write_batch<W: AsyncWrite + Unpin>(
     }
     batch.clear();
     true
-}
-
-/// One vectored write; `None` if the client is gone.
-async fn write_some<W: AsyncWrite + Unpin>(output: &mut W, frames: &[Bytes]) -> Option<usize> {
-    let mut slices = [IoSlice::new(&[]); BATCH_FRAMES];
-    let mut room = BATCH_BYTES;
-    let mut count = 0;
-    for (slice, frame) in slices.iter_mut().zip(frames) {
-        let offered = frame.len().min(room);
-        *slice = IoSlice::new(frame.get(..offered).unwrap_or_default());
-        count += 1;
-        room -= offered;
-        if room == 0 {
-            break;
-        }
-    }
-    let offered = slices.get(..count).unwrap_or_default();
-    output
-        .write_vectored(offered)
-        .await
-        .ok()
-        .filter(|&written| written > 0)
 }
 
 /// Ends when the client has taken nothing since `last_byte` for too long: while responses wait, or because the

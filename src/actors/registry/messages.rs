@@ -14,7 +14,9 @@ use super::{MAX_CONNECTIONS, Nodes};
 use crate::actors::ConnectionId;
 use crate::actors::connection::{Answer, Configure, Deliver, Finish};
 use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::Level;
 use crate::protocol::op::Op;
+use crate::protocol::rosapi::Census;
 
 /// The runtime's nodes. From the runtime, once, before any client is accepted.
 #[derive(Message)]
@@ -101,11 +103,30 @@ pub struct Respond {
     pub connection: ConnectionId,
     /// The whole frame.
     pub frame: Bytes,
-    /// The service that it answers; `None` for a status.
+    /// The service that it answers, if it is the runtime's own.
     pub service: Option<Service>,
+    /// The level, if it is a status: sent only if the client wants such.
+    pub status: Option<Level>,
     /// Dropped once the frame is on its way, where that is also the end of the call.
     pub done: Option<oneshot::Sender<()>>,
 }
+
+/// Progress of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the goal.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Progress {
+    /// The client.
+    pub connection: ConnectionId,
+    /// The action, as the client spells it.
+    pub action: Arc<str>,
+    /// The whole frame.
+    pub frame: Bytes,
+}
+
+/// Which topics and services clients have. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Census")]
+pub struct TakeCensus;
 
 /// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
 #[derive(Message)]

@@ -2,12 +2,16 @@
 //!
 //! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
 
+mod actions;
+mod census;
+mod fan_out;
 mod messages;
 mod ops;
 mod refusal;
 mod services;
 mod topics;
 
+use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -17,21 +21,25 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
+use self::census::{Tally, Use};
 use self::messages::TimedOut;
 pub use self::messages::{
-    Attach, Connect, Disconnect, FinishAll, Handled, Outlets, Publish, RefuseCalls, Refused,
-    Request, Respond, Retire,
+    Attach, Connect, Disconnect, FinishAll, Handled, Outlets, Progress, Publish, RefuseCalls,
+    Refused, Request, Respond, Retire, TakeCensus,
 };
 use self::refusal::Refusal;
 use self::services::{Forwarded, Services};
 pub use self::topics::Throttle;
 use self::topics::{Subscription, Topics};
 use super::ConnectionId;
-use super::connection::{Answer, Deliver, Finish, MAX_RESPONSES_WAITING};
+use super::connection::{Answer, Finish, MAX_RESPONSES_WAITING};
+use super::follower::ActionRequest;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
-use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::{self as frames, Level};
+use crate::protocol::names;
+use crate::protocol::op::Verbosity;
 
 /// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
 /// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
@@ -56,6 +64,12 @@ pub struct Registry {
     topics: Topics,
     services: Services,
     nodes: Nodes,
+    /// The last message of each latched topic that has subscribers.
+    latched: HashMap<Topic, Bytes>,
+    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    fragmented: Cell<u64>,
+    /// What clients use and provide, for those who ask what there is.
+    tally: Tally,
     gauges: Arc<Gauges>,
     connections_made: u64,
     /// Why no call is taken any more, once the runtime is ending.
@@ -71,6 +85,8 @@ struct Client {
     withdrawn: HashSet<Topic>,
     subscriptions: HashMap<Arc<str>, Vec<Subscription>>,
     provided: HashSet<Box<str>>,
+    /// Which statuses it wants.
+    verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
     answered: Option<oneshot::Sender<()>>,
 }
@@ -80,6 +96,8 @@ struct Client {
 pub struct Nodes {
     /// The node that answers each service.
     pub services: HashMap<Service, Recipient<ServiceCall>>,
+    /// The node that pursues the goals of each action.
+    pub actions: HashMap<Action, Recipient<ActionRequest>>,
     /// The node that listens to each topic the runtime subscribes to.
     pub listeners: HashMap<Topic, Recipient<TopicMessage>>,
     /// The node that publishes each of the runtime's topics.
@@ -95,6 +113,9 @@ impl Registry {
             topics: Topics::default(),
             services: Services::default(),
             nodes: Nodes::default(),
+            latched: HashMap::new(),
+            fragmented: Cell::new(0),
+            tally: Tally::default(),
             gauges,
             connections_made: 0,
             closed: None,
@@ -180,7 +201,13 @@ impl Handler<Publish> for Registry {
     type Result = ();
 
     fn handle(&mut self, message: Publish, _: &mut Context<Self>) {
-        self.fan_out(message.topic.name(), || message.frame.clone());
+        let topic = message.topic.name();
+        self.fan_out(topic, |spelling| {
+            frames::respelled(topic, spelling, &message.frame)
+        });
+        if message.topic.is_latched() && self.topics.has_subscribers(topic) {
+            self.latched.insert(message.topic, message.frame);
+        }
         if let Some(msg) = message.msg
             && let Some(listener) = self.nodes.listeners.get(&message.topic)
         {
@@ -193,9 +220,21 @@ impl Handler<Respond> for Registry {
     type Result = ();
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        if let Some(client) = self.clients.get(&respond.connection) {
+        if let Some(client) = self.clients.get(&respond.connection)
+            && respond
+                .status
+                .is_none_or(|level| client.verbosity.wants(level))
+        {
             client.send(respond.frame, respond.service);
         }
+    }
+}
+
+impl Handler<TakeCensus> for Registry {
+    type Result = MessageResult<TakeCensus>;
+
+    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(self.tally.take())
     }
 }
 
@@ -241,6 +280,7 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: HashMap::new(),
             provided: HashSet::new(),
+            verbosity: Verbosity::ALL,
             answered: None,
         }
     }
@@ -256,34 +296,22 @@ impl Client {
 }
 
 impl Registry {
-    /// Delivers a frame to everybody who subscribes to `topic`; without subscribers it is never encoded.
-    fn fan_out(&self, topic: &str, encode: impl FnOnce() -> Bytes) {
-        let Some((name, subscribers)) = self.topics.subscribers(topic) else {
-            return;
-        };
-        let frame = encode();
-        for subscriber in subscribers {
-            let message = Deliver {
-                topic: Arc::clone(name),
-                frame: frame.clone(),
-            };
-            subscriber.outlet.do_send(message);
-        }
-    }
-
     /// Withdraws all that a client has registered, and fails the calls that wait for it as provider.
     fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
         };
-        client.advertised.clear();
+        let advertised = std::mem::take(&mut client.advertised);
         let subscriptions = std::mem::take(&mut client.subscriptions);
         let provided = std::mem::take(&mut client.provided);
+        for topic in advertised {
+            self.tally.remove(&topic, Use::Advertised);
+        }
         for topic in subscriptions.keys() {
             self.drop_subscriber(topic, id);
         }
         for service in provided {
-            self.services.withdraw(&service, id);
+            self.withdraw_service(&service, id);
         }
         for call in self.services.take_provided_by(id) {
             let why = Refusal::ProviderGone(call.service.to_string());
@@ -293,9 +321,24 @@ impl Registry {
 
     /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
     fn drop_subscriber(&mut self, topic: &Arc<str>, connection: ConnectionId) {
-        if self.topics.remove(topic, connection) {
+        let name = names::absolute(topic);
+        self.topics.remove(topic, connection);
+        self.tally.remove(&name, Use::Subscribed);
+        if !self.topics.has_subscribers(&name) {
+            if let Some(topic) = Topic::from_name(topic) {
+                self.latched.remove(&topic);
+            }
             self.tell_owner(topic, false);
         }
+    }
+
+    /// Withdraws a service by its absolute name, if `connection` is its provider; true if it was.
+    fn withdraw_service(&mut self, service: &str, connection: ConnectionId) -> bool {
+        let provided = self.services.withdraw(service, connection);
+        if provided {
+            self.tally.withdraw(service);
+        }
+        provided
     }
 
     fn tell_owner(&self, topic: &str, wanted: bool) {
@@ -314,7 +357,9 @@ impl Registry {
     }
 
     fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&RawValue>) {
-        if let Some(client) = self.clients.get(&to) {
+        if let Some(client) = self.clients.get(&to)
+            && client.verbosity.wants(level)
+        {
             client.send(frames::status(level, msg, id), None);
         }
     }

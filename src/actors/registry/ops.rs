@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -9,9 +10,10 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
+use super::census::Use;
 use super::refusal::Refusal;
-use super::services::{Forwarded, Services};
-use super::topics::{Subscription, Throttle};
+use super::services::{Forwarded, Provider, Services};
+use super::topics::{Subscription, Throttle, encoding_of};
 use super::{
     Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
     Registry, Request, TimedOut,
@@ -19,9 +21,10 @@ use super::{
 use crate::actors::ConnectionId;
 use crate::actors::connection::Configure;
 use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
-use crate::protocol::catalog::{Direction, Service, Topic};
+use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::{Arguments, CallService, MAX_NAME, Op, Subscribe};
+use crate::protocol::names;
+use crate::protocol::op::{Arguments, CallService, Compression, MAX_NAME, Op, Subscribe};
 
 /// How long a provider may take when its caller does not say.
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -42,7 +45,15 @@ impl Registry {
         let refusal = match request.op {
             Op::Publish { topic, msg } => return self.publish(origin, &topic, msg),
             Op::CallService(call) => return self.call(origin, call, ctx),
-            Op::Advertise { topic, .. } => self.advertise(&origin, &topic),
+            Op::SendActionGoal(goal) => {
+                return self.send_action_goal(origin.from, origin.id, goal, ctx);
+            }
+            Op::CancelActionGoal { action } => {
+                return self.cancel_action_goal(origin.from, origin.id, &action, ctx);
+            }
+            Op::Advertise { topic, type_name } => {
+                self.advertise(&origin, &topic, type_name.as_deref())
+            }
             Op::Unadvertise { topic } => {
                 self.unadvertise(&origin, &topic);
                 Ok(())
@@ -52,8 +63,20 @@ impl Registry {
                 self.unsubscribe(&origin, &topic);
                 Ok(())
             }
-            Op::AdvertiseService { service, .. } => self.advertise_service(&origin, &service),
+            Op::AdvertiseService { service, type_name } => {
+                self.advertise_service(&origin, &service, type_name.as_deref())
+            }
             Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
+            Op::SetLevel(verbosity) => {
+                if let Some(client) = self.clients.get_mut(&origin.from) {
+                    client.verbosity = verbosity;
+                }
+                Ok(())
+            }
+            // Put together before it gets here.
+            Op::Fragment(_) => Ok(()),
+            // Asked of a client before it gets here; where nothing is asked, anything shown will do.
+            Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
                 service,
                 values,
@@ -77,15 +100,23 @@ impl Registry {
         Handled(None)
     }
 
-    fn advertise(&mut self, origin: &Origin, topic: &str) -> Result<(), Refusal> {
+    fn advertise(
+        &mut self,
+        origin: &Origin,
+        topic: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
         refuse_runtime_topic(topic)?;
+        let topic = &*names::absolute(topic);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
         if client.advertised.len() >= MAX_ADVERTISED && !client.advertised.contains(topic) {
             return Err(Refusal::TooManyAdvertised);
         }
-        client.advertised.insert(topic.into());
+        if client.advertised.insert(topic.into()) {
+            self.tally.add(topic, Use::Advertised, type_name);
+        }
         if let Some(topic) = Topic::from_name(topic) {
             client.withdrawn.remove(&topic);
         }
@@ -96,7 +127,10 @@ impl Registry {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
-        client.advertised.remove(topic);
+        let topic = &*names::absolute(topic);
+        if client.advertised.remove(topic) {
+            self.tally.remove(topic, Use::Advertised);
+        }
         if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
             client.withdrawn.insert(topic);
         }
@@ -113,6 +147,7 @@ impl Registry {
             );
             return Handled(None);
         }
+        let topic = &*names::absolute(topic);
         let Some(client) = self.clients.get(&origin.from) else {
             return Handled(None);
         };
@@ -122,7 +157,7 @@ impl Registry {
         if listener.is_none() && !client.advertised.contains(topic) {
             return Handled(None);
         }
-        self.fan_out(topic, || messages::publish_raw(topic, &msg));
+        self.fan_out(topic, |spelling| messages::publish_raw(spelling, &msg));
         let Some(listener) = listener else {
             return Handled(None);
         };
@@ -153,17 +188,36 @@ impl Registry {
         if !known && held >= MAX_SUBSCRIPTIONS {
             return Err(Refusal::TooManySubscriptions);
         }
-        let (name, first) = self
+        let absolute = names::absolute(topic);
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
+            if type_name.and_then(types::find).is_none() {
+                return Err(Refusal::UnknownType);
+            }
+        }
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let first = !self.topics.has_subscribers(&absolute);
+        let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());
+        if new {
+            let type_name = subscribe.type_name.as_deref();
+            self.tally.add(&absolute, Use::Subscribed, type_name);
+        }
         let subscriptions = client.subscriptions.entry(name.clone()).or_default();
         subscriptions.retain(|one| one.id != id);
         subscriptions.push(Subscription {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
+            encoding: subscribe.encoding,
         });
         let throttle = Throttle::of(subscriptions);
+        let encoding = encoding_of(subscriptions);
+        self.topics.set_encoding(&name, origin.from, encoding);
+        let shared = Arc::clone(&name);
         client.outlets.configure.do_send(Configure {
             topic: name,
             throttle,
@@ -173,6 +227,8 @@ impl Registry {
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_deref());
         if first {
             self.tell_owner(topic, true);
+        } else if new {
+            self.deliver_latched(&shared, origin.from);
         }
         Ok(())
     }
@@ -198,14 +254,22 @@ impl Registry {
         if left.is_empty() {
             self.drop_subscriber(&name, origin.from);
         } else {
+            let encoding = encoding_of(&left);
+            self.topics.set_encoding(&name, origin.from, encoding);
             client.subscriptions.insert(name, left);
         }
     }
 
-    fn advertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
-        if Service::from_name(service).is_some() {
-            return Err(Refusal::RuntimeService(service.to_owned()));
+    fn advertise_service(
+        &mut self,
+        origin: &Origin,
+        spelling: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        if Service::from_name(spelling).is_some() {
+            return Err(Refusal::RuntimeService(spelling.to_owned()));
         }
+        let service = &*names::absolute(spelling);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
@@ -216,23 +280,30 @@ impl Registry {
         if let Some(before) = self
             .services
             .provider(service)
+            .map(|provider| provider.connection)
             .filter(|&one| one != origin.from)
             && let Some(before) = self.clients.get_mut(&before)
         {
             before.provided.remove(service);
         }
-        self.services.provide(service, origin.from);
-        let msg = format!("advertised service {service}");
+        let provider = Provider {
+            connection: origin.from,
+            spelling: spelling.into(),
+        };
+        self.services.provide(service, provider);
+        self.tally.provide(service, type_name);
+        let msg = format!("advertised service {spelling}");
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_deref());
         Ok(())
     }
 
     fn unadvertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
-        if !self.services.withdraw(service, origin.from) {
+        let name = &*names::absolute(service);
+        if !self.withdraw_service(name, origin.from) {
             return Err(Refusal::NotProvider(service.to_owned()));
         }
         if let Some(client) = self.clients.get_mut(&origin.from) {
-            client.provided.remove(service);
+            client.provided.remove(name);
         }
         Ok(())
     }
@@ -283,9 +354,10 @@ impl Registry {
         let service = call.service.as_str();
         let provider = self
             .services
-            .provider(service)
-            .and_then(|provider| Some((provider, self.clients.get(&provider)?)));
-        let Some((provider, client)) = provider else {
+            .provider(&names::absolute(service))
+            .cloned()
+            .and_then(|provider| Some((self.clients.get(&provider.connection)?, provider)));
+        let Some((client, provider)) = provider else {
             return Err(Refusal::NoProvider(service.to_owned()));
         };
         if matches!(call.args, Arguments::Neither(_)) {
@@ -298,7 +370,11 @@ impl Registry {
             return Err(Refusal::ProviderBusy(service.to_owned()));
         }
         let number = self.services.next_call();
-        let frame = messages::call(service, &Services::call_id(number), call.args.raw());
+        let frame = messages::call(
+            &provider.spelling,
+            &Services::call_id(number),
+            call.args.raw(),
+        );
         client.send(frame, None);
         let registry = ctx.address();
         let patience = call.timeout.unwrap_or(DEFAULT_TIMEOUT);
@@ -311,7 +387,7 @@ impl Registry {
             Forwarded {
                 caller: origin.from,
                 id: origin.id.clone(),
-                provider,
+                provider: provider.connection,
                 service: service.into(),
                 timer: timer.abort_handle(),
             },
@@ -334,9 +410,10 @@ impl Registry {
             return Ok(());
         };
         if caller.backlog() > MAX_BACKLOG {
-            self.answer_forwarded(&call, &Refusal::CallerBusy(service.to_owned()));
+            let why = Refusal::CallerBusy(call.service.to_string());
+            self.answer_forwarded(&call, &why);
         } else {
-            caller.send(encode(service, call.id.as_deref()), None);
+            caller.send(encode(&call.service, call.id.as_deref()), None);
             self.note_answered(call.caller);
         }
         Ok(())

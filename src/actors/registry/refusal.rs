@@ -13,6 +13,10 @@ pub(super) enum Refusal {
     TooManyAdvertised,
     #[error("topic: a connection holds at most {MAX_SUBSCRIPTIONS} subscriptions")]
     TooManySubscriptions,
+    #[error(
+        "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
+    )]
+    UnknownType,
     #[error("id: a subscription's id has at most {0} bytes")]
     LongSubscriptionId(usize),
     #[error("service: {0} is provided by the runtime itself")]
@@ -39,6 +43,10 @@ pub(super) enum Refusal {
     CallerBusy(String),
     #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
     TooManyWaiting,
+    #[error("action: no action is called {0}")]
+    NoAction(String),
+    #[error("action_type must be {0}")]
+    ActionType(&'static str),
     #[error("{0} is not served by this runtime")]
     NotServed(String),
     #[error("{0}")]

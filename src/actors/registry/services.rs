@@ -9,6 +9,7 @@ use serde_json::value::RawValue;
 use tokio::task::AbortHandle;
 
 use crate::actors::ConnectionId;
+use crate::protocol::names;
 
 /// What the runtime's own ids for forwarded calls begin with, so that a provider's log shows where they come from.
 const CALL_ID_PREFIX: &str = "pendularm:";
@@ -18,14 +19,24 @@ pub(super) struct Forwarded {
     pub(super) caller: ConnectionId,
     pub(super) id: Option<Box<RawValue>>,
     pub(super) provider: ConnectionId,
+    /// The service's name as the caller spells it.
     pub(super) service: Box<str>,
     pub(super) timer: AbortHandle,
+}
+
+/// Who provides a service.
+#[derive(Clone)]
+pub(super) struct Provider {
+    pub(super) connection: ConnectionId,
+    /// The service's name as the provider spells it: what it is called by.
+    pub(super) spelling: Box<str>,
 }
 
 /// Providers and outstanding calls.
 #[derive(Default)]
 pub(super) struct Services {
-    providers: HashMap<Box<str>, ConnectionId>,
+    /// By absolute name.
+    providers: HashMap<Box<str>, Provider>,
     outstanding: BTreeMap<u64, Forwarded>,
     /// Outstanding calls by caller, so that the limit costs no search.
     waiting: HashMap<ConnectionId, usize>,
@@ -33,18 +44,20 @@ pub(super) struct Services {
 }
 
 impl Services {
-    /// Makes `connection` the provider; the newest registration wins.
-    pub(super) fn provide(&mut self, service: &str, connection: ConnectionId) {
-        self.providers.insert(service.into(), connection);
+    /// Makes `provider` the provider; the newest registration wins.
+    pub(super) fn provide(&mut self, service: &str, provider: Provider) {
+        self.providers.insert(service.into(), provider);
     }
 
-    pub(super) fn provider(&self, service: &str) -> Option<ConnectionId> {
-        self.providers.get(service).copied()
+    pub(super) fn provider(&self, service: &str) -> Option<&Provider> {
+        self.providers.get(service)
     }
 
     /// Withdraws the service if `connection` is its provider; true if it was.
     pub(super) fn withdraw(&mut self, service: &str, connection: ConnectionId) -> bool {
-        let provides = self.provider(service) == Some(connection);
+        let provides = self
+            .provider(service)
+            .is_some_and(|provider| provider.connection == connection);
         if provides {
             self.providers.remove(service);
         }
@@ -82,7 +95,7 @@ impl Services {
         let id: String = serde_json::from_str(id?.get()).ok()?;
         let number: u64 = id.strip_prefix(CALL_ID_PREFIX)?.parse().ok()?;
         let call = self.outstanding.get(&number)?;
-        if call.provider != provider || &*call.service != service {
+        if call.provider != provider || names::absolute(&call.service) != names::absolute(service) {
             return None;
         }
         self.take(number)

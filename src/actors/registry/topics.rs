@@ -11,6 +11,8 @@ use actix::prelude::*;
 
 use crate::actors::ConnectionId;
 use crate::actors::connection::Deliver;
+use crate::protocol::names;
+use crate::protocol::op::Encoding;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,6 +20,7 @@ pub(super) struct Subscription {
     pub(super) id: Option<Box<str>>,
     pub(super) throttle: Duration,
     pub(super) queue_length: usize,
+    pub(super) encoding: Encoding,
 }
 
 /// What a connection's subscriptions to one topic come to: the smallest of each value.
@@ -46,16 +49,24 @@ impl Throttle {
 pub(super) struct Subscriber {
     pub(super) connection: ConnectionId,
     pub(super) outlet: Recipient<Deliver>,
+    /// What its subscriptions come to.
+    pub(super) encoding: Encoding,
 }
 
-/// Every topic that somebody subscribes to.
+/// What a connection's subscriptions to one topic come to.
+pub(super) fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
+    let all = subscriptions.iter().map(|one| one.encoding);
+    all.reduce(Encoding::merged).unwrap_or_default()
+}
+
+/// Every topic that somebody subscribes to, by the spelling that the subscriber used.
 #[derive(Default)]
 pub(super) struct Topics {
     subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
 }
 
 impl Topics {
-    /// Adds a subscriber. Gives the topic's shared name, and whether it is the topic's first.
+    /// Adds a subscriber under its spelling of the topic. Gives the spelling, shared, and whether that is new to this subscriber.
     pub(super) fn add(
         &mut self,
         topic: &str,
@@ -67,27 +78,47 @@ impl Topics {
             .get_key_value(topic)
             .map_or_else(|| Arc::from(topic), |(name, _)| Arc::clone(name));
         let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
-        let first = subscribers.is_empty();
-        if !subscribers.iter().any(|one| one.connection == connection) {
-            subscribers.push(Subscriber { connection, outlet });
+        let new = !subscribers.iter().any(|one| one.connection == connection);
+        if new {
+            subscribers.push(Subscriber {
+                connection,
+                outlet,
+                encoding: Encoding::default(),
+            });
         }
-        (name, first)
+        (name, new)
     }
 
-    /// Removes a subscriber; true if it was the topic's last.
-    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) -> bool {
+    /// Sets how a subscriber's messages are written.
+    pub(super) fn set_encoding(
+        &mut self,
+        topic: &Arc<str>,
+        connection: ConnectionId,
+        encoding: Encoding,
+    ) {
+        let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
+        for subscriber in subscribers.filter(|one| one.connection == connection) {
+            subscriber.encoding = encoding;
+        }
+    }
+
+    /// Removes a subscriber.
+    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
         let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
-            return false;
+            return;
         };
         entry.get_mut().retain(|one| one.connection != connection);
-        let last = entry.get().is_empty();
-        if last {
+        if entry.get().is_empty() {
             entry.remove();
         }
-        last
     }
 
-    /// The topic's shared name and its subscribers, if it has any.
+    /// Whether anybody subscribes to the topic of that absolute name, under whichever spelling.
+    pub(super) fn has_subscribers(&self, topic: &str) -> bool {
+        names::spellings(topic).any(|spelling| self.subscribers.contains_key(spelling))
+    }
+
+    /// A spelling, shared, and those who subscribed with it, if there are any.
     pub(super) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
         self.subscribers
             .get_key_value(topic)

@@ -2,7 +2,9 @@
 //!
 //! **Invariant:** a service without an entry does not compile.
 
+use super::rosapi::Rosapi;
 use super::{Field, Node, optional, required};
+use crate::protocol::names;
 
 /// A service of the runtime's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -17,6 +19,10 @@ pub enum Service {
     Pause,
     /// Back to the starting pose at time 0.
     Reset,
+    /// Takes single steps of a paused arm.
+    Step,
+    /// Pushes the arm for a while.
+    Disturb,
     /// The controller on or off.
     Enable,
     /// The controller's gains.
@@ -33,16 +39,20 @@ pub enum Service {
     TrialSkip,
     /// Ends the trial.
     TrialStop,
+    /// A question of rosapi, under either of its prefixes.
+    Rosapi(Rosapi),
 }
 
 impl Service {
-    /// All services, in the order in which they are documented.
-    pub const ALL: [Self; 13] = [
+    /// The arm's own services, in the order in which they are documented; the others are [`Rosapi::ALL`].
+    pub const ALL: [Self; 15] = [
         Self::IntegrationStep,
         Self::SetIntegrator,
         Self::SetParams,
         Self::Pause,
         Self::Reset,
+        Self::Step,
+        Self::Disturb,
         Self::Enable,
         Self::SetGains,
         Self::Solve,
@@ -60,6 +70,8 @@ impl Service {
             Self::SetParams => &SET_PARAMS,
             Self::Pause => &PAUSE,
             Self::Reset => &RESET,
+            Self::Step => &STEP,
+            Self::Disturb => &DISTURB,
             Self::Enable => &ENABLE,
             Self::SetGains => &SET_GAINS,
             Self::Solve => &SOLVE,
@@ -68,6 +80,7 @@ impl Service {
             Self::TrialStart => &TRIAL_START,
             Self::TrialSkip => &TRIAL_SKIP,
             Self::TrialStop => &TRIAL_STOP,
+            Self::Rosapi(question) => question.entry(),
         }
     }
 
@@ -77,10 +90,12 @@ impl Service {
         self.entry().name
     }
 
-    /// The service of that name, if it is the runtime's own.
+    /// The service of that name, if it is the runtime's own; the leading slash may be left out.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|service| service.name() == name)
+        let name = names::absolute(name);
+        let own = Self::ALL.into_iter().find(|service| service.name() == name);
+        own.or_else(|| Rosapi::from_name(&name).map(Self::Rosapi))
     }
 
     /// The service type, as ROS writes it.
@@ -106,7 +121,12 @@ impl Service {
     pub const fn all_or_nothing(self) -> bool {
         matches!(
             self,
-            Self::IntegrationStep | Self::Solve | Self::SendGoal | Self::TrialStart
+            Self::IntegrationStep
+                | Self::Step
+                | Self::Disturb
+                | Self::Solve
+                | Self::SendGoal
+                | Self::TrialStart
         )
     }
 
@@ -123,12 +143,12 @@ impl Service {
     }
 }
 
-struct ServiceEntry {
-    name: &'static str,
-    type_name: &'static str,
-    owner: Node,
-    request: &'static [Field],
-    response: &'static [Field],
+pub(super) struct ServiceEntry {
+    pub(super) name: &'static str,
+    pub(super) type_name: &'static str,
+    pub(super) owner: Node,
+    pub(super) request: &'static [Field],
+    pub(super) response: &'static [Field],
 }
 
 const INTEGRATION_STEP: ServiceEntry = ServiceEntry {
@@ -197,6 +217,27 @@ const RESET: ServiceEntry = ServiceEntry {
         required("velocity", "float64[]", "rad/s"),
     ],
 };
+const STEP: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/step",
+    type_name: "pendularm_interfaces/srv/Step",
+    owner: Node::ArmSim,
+    request: &[required("steps", "uint64", "")],
+    response: &[
+        required("steps", "uint64", ""),
+        required("time", "float64", "s"),
+    ],
+};
+const DISTURB: ServiceEntry = ServiceEntry {
+    name: "/arm_sim/disturb",
+    type_name: "pendularm_interfaces/srv/Disturb",
+    owner: Node::ArmSim,
+    request: &DISTURBANCE,
+    response: &DISTURBANCE,
+};
+const DISTURBANCE: [Field; 2] = [
+    required("effort", "float64[]", "N m"),
+    required("duration", "float64", "s"),
+];
 const SET_GAINS: ServiceEntry = ServiceEntry {
     name: "/pid_controller/set_gains",
     type_name: "pendularm_interfaces/srv/SetGains",

@@ -3,6 +3,7 @@
 //! **Invariant:** a topic without an entry does not compile.
 
 use super::{Direction, Field, Node, optional, required};
+use crate::protocol::names;
 
 /// A topic of the runtime's own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -21,11 +22,19 @@ pub enum Topic {
     IkResult,
     /// The timed trial, 10 Hz and at every change.
     TrialStatus,
+    /// Where the links are, 60 Hz.
+    Tf,
+    /// Where the hand is on its link.
+    TfStatic,
+    /// The arm as URDF.
+    RobotDescription,
+    /// The runtime's warnings.
+    Rosout,
 }
 
 impl Topic {
     /// All topics, in the order in which they are documented.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 11] = [
         Self::JointTrajectory,
         Self::JointStates,
         Self::Clock,
@@ -33,6 +42,10 @@ impl Topic {
         Self::IkFeedback,
         Self::IkResult,
         Self::TrialStatus,
+        Self::Tf,
+        Self::TfStatic,
+        Self::RobotDescription,
+        Self::Rosout,
     ];
 
     const fn entry(self) -> &'static TopicEntry {
@@ -44,6 +57,10 @@ impl Topic {
             Self::IkFeedback => &IK_FEEDBACK,
             Self::IkResult => &IK_RESULT,
             Self::TrialStatus => &TRIAL_STATUS,
+            Self::Tf => &TF,
+            Self::TfStatic => &TF_STATIC,
+            Self::RobotDescription => &ROBOT_DESCRIPTION,
+            Self::Rosout => &ROSOUT,
         }
     }
 
@@ -53,9 +70,16 @@ impl Topic {
         self.entry().name
     }
 
-    /// The topic of that name, if it is the runtime's own.
+    /// The same without its leading slash, as some clients spell it.
+    #[must_use]
+    pub const fn short_name(self) -> &'static str {
+        self.entry().name.split_at(1).1
+    }
+
+    /// The topic of that name, if it is the runtime's own; the leading slash may be left out.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
+        let name = names::absolute(name);
         Self::ALL.into_iter().find(|topic| topic.name() == name)
     }
 
@@ -76,6 +100,12 @@ impl Topic {
     #[must_use]
     pub const fn owner(self) -> Node {
         self.entry().owner
+    }
+
+    /// Whether a new subscriber gets the last message.
+    #[must_use]
+    pub const fn is_latched(self) -> bool {
+        matches!(self, Self::TfStatic | Self::RobotDescription)
     }
 
     /// The fields of a message.
@@ -177,5 +207,46 @@ const TRIAL_STATUS: TopicEntry = TopicEntry {
         required("error", "float64", "m"),
         required("desired_positions", "float64[]", "rad"),
         required("action_status", "string", ""),
+    ],
+};
+const TF: TopicEntry = TopicEntry {
+    name: "/tf",
+    type_name: "tf2_msgs/msg/TFMessage",
+    direction: Direction::Published,
+    owner: Node::ArmSim,
+    fields: &TRANSFORMS,
+};
+const TF_STATIC: TopicEntry = TopicEntry {
+    name: "/tf_static",
+    type_name: "tf2_msgs/msg/TFMessage",
+    direction: Direction::Published,
+    owner: Node::ArmSim,
+    fields: &TRANSFORMS,
+};
+const TRANSFORMS: [Field; 1] = [required(
+    "transforms",
+    "geometry_msgs/msg/TransformStamped[]",
+    "",
+)];
+const ROBOT_DESCRIPTION: TopicEntry = TopicEntry {
+    name: "/robot_description",
+    type_name: "std_msgs/msg/String",
+    direction: Direction::Published,
+    owner: Node::ArmSim,
+    fields: &[required("data", "string", "")],
+};
+const ROSOUT: TopicEntry = TopicEntry {
+    name: "/rosout",
+    type_name: "rcl_interfaces/msg/Log",
+    direction: Direction::Published,
+    owner: Node::Gateway,
+    fields: &[
+        required("stamp", "builtin_interfaces/msg/Time", "s, ns"),
+        required("level", "uint8", ""),
+        required("name", "string", ""),
+        required("msg", "string", ""),
+        required("file", "string", ""),
+        required("function", "string", ""),
+        required("line", "uint32", ""),
     ],
 };

@@ -8,16 +8,18 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 use super::{
-    Arguments, CallService, Incoming, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
-    OpError, Problem, Subscribe,
+    ActionGoal, Arguments, CallService, Compression, Encoding, Incoming, MAX_NAME,
+    MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, Subscribe, Verbosity,
 };
+use crate::protocol::fragments::Piece;
+use crate::protocol::messages::Level;
 use crate::protocol::{json, text};
 
 /// Characters of the JSON parser's complaint that go into a message: it may quote the client.
 const MAX_COMPLAINT: usize = 160;
 
 /// The members of a frame that mean something to us.
-const KEYS: [&str; 13] = [
+const KEYS: [&str; 23] = [
     "op",
     "id",
     "topic",
@@ -31,10 +33,20 @@ const KEYS: [&str; 13] = [
     "values",
     "result",
     "status",
+    "level",
+    "token",
+    "compression",
+    "fragment_size",
+    "data",
+    "num",
+    "total",
+    "action",
+    "action_type",
+    "feedback",
 ];
 
 /// The operations that we know.
-const OPS: [&str; 9] = [
+const OPS: [&str; 14] = [
     "advertise",
     "unadvertise",
     "publish",
@@ -44,6 +56,11 @@ const OPS: [&str; 9] = [
     "unadvertise_service",
     "call_service",
     "service_response",
+    "set_level",
+    "auth",
+    "fragment",
+    "send_action_goal",
+    "cancel_action_goal",
 ];
 
 /// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
@@ -122,6 +139,23 @@ impl<'a> Reader<'a> {
             "unadvertise_service" => Op::UnadvertiseService {
                 service: self.name("service")?,
             },
+            "send_action_goal" => Op::SendActionGoal(ActionGoal {
+                action: self.name("action")?,
+                type_name: self.optional_text("action_type")?,
+                args: self.args(),
+                feedback: match self.get("feedback") {
+                    Some(_) => self.boolean("feedback")?,
+                    None => false,
+                },
+            }),
+            "cancel_action_goal" => Op::CancelActionGoal {
+                action: self.name("action")?,
+            },
+            "fragment" => Op::Fragment(self.piece()?),
+            "set_level" => Op::SetLevel(self.verbosity()?),
+            "auth" => Op::Auth {
+                token: self.secret()?,
+            },
             _ => self.response()?,
         })
     }
@@ -135,7 +169,81 @@ impl<'a> Reader<'a> {
             type_name: self.optional_text("type")?,
             throttle: self.throttle()?,
             queue_length: self.queue_length()?,
+            encoding: Encoding {
+                compression: self.compression()?,
+                fragment_size: self.fragment_size()?,
+            },
         })
+    }
+
+    fn compression(&self) -> Result<Compression, Problem> {
+        let Some(raw) = self.get("compression") else {
+            return Ok(Compression::None);
+        };
+        match json::text(raw).as_deref() {
+            Some("none" | "png") => Ok(Compression::None),
+            Some("cbor") => Ok(Compression::Cbor),
+            Some("cbor-raw") => Ok(Compression::CborRaw),
+            _ => Err(self.mistyped("compression", "none, png, cbor or cbor-raw", raw)),
+        }
+    }
+
+    fn fragment_size(&self) -> Result<Option<usize>, Problem> {
+        let Some(raw) = self.get("fragment_size").filter(|raw| raw.get() != "null") else {
+            return Ok(None);
+        };
+        let size = json::integer(raw)
+            .filter(|size| *size > 0)
+            .ok_or_else(|| self.mistyped("fragment_size", "an integer, at least 1", raw))?;
+        Ok(usize::try_from(size).ok())
+    }
+
+    fn piece(&self) -> Result<Piece, Problem> {
+        let id = self.required("id")?;
+        self.short("id", id.get())?;
+        let raw = self.required("data")?;
+        let data = json::text(raw).ok_or_else(|| self.mistyped("data", "a string", raw))?;
+        Ok(Piece {
+            id: id.get().to_owned(),
+            data: data.into_owned(),
+            num: self.index("num")?,
+            total: self.index("total")?,
+        })
+    }
+
+    /// A count; a larger one than fits is refused as too large a little later.
+    fn index(&self, field: &'static str) -> Result<usize, Problem> {
+        let raw = self.required(field)?;
+        let number = json::integer(raw)
+            .ok_or_else(|| self.mistyped(field, "an integer, at least 0", raw))?;
+        Ok(usize::try_from(number).unwrap_or(usize::MAX))
+    }
+
+    fn verbosity(&self) -> Result<Verbosity, Problem> {
+        let raw = self.required("level")?;
+        let name = json::text(raw);
+        let level = Level::ALL
+            .into_iter()
+            .find(|level| name.as_deref() == Some(level.name()));
+        match level {
+            None if name.as_deref() != Some("none") => {
+                Err(self.mistyped("level", "info, warning, error or none", raw))
+            }
+            level => Ok(Verbosity(level)),
+        }
+    }
+
+    /// What a client shows to be let in. What is wrong with it is told without repeating it.
+    fn secret(&self) -> Result<String, Problem> {
+        let raw = self.required("token")?;
+        let token = json::text(raw).ok_or(Problem::Mistyped {
+            op: self.op,
+            field: "token",
+            expected: "a string",
+            found: "something else".to_owned(),
+        })?;
+        self.short("token", &token)?;
+        Ok(token.into_owned())
     }
 
     fn response(&self) -> Result<Op, Problem> {

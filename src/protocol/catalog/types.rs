@@ -1,0 +1,252 @@
+//! The message types: what the runtime's own topics carry, and what is inside.
+//!
+//! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its end.
+
+use super::{Field, Topic, required};
+use crate::protocol::names;
+
+/// Stands between the definitions of a type and of the types in it: 80 of these in a line.
+const SEPARATOR: &str = "=";
+
+/// A message type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Type {
+    /// Its name, as ROS writes it: `std_msgs/msg/Header`.
+    pub name: &'static str,
+    /// Its fields, in the order of the definition.
+    pub fields: &'static [Field],
+    /// Its constants.
+    pub constants: &'static [Constant],
+}
+
+/// A named value of a type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Constant {
+    /// `WARN`.
+    pub name: &'static str,
+    /// `byte`.
+    pub kind: &'static str,
+    /// `30`.
+    pub value: &'static str,
+}
+
+/// How often a field's type is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Count {
+    /// Once.
+    One,
+    /// Any number of times: `float64[]`.
+    Any,
+}
+
+impl Field {
+    /// The field's type without brackets, and how often it is there.
+    #[must_use]
+    pub fn element(&self) -> (&'static str, Count) {
+        match self.kind.strip_suffix("[]") {
+            Some(kind) => (kind, Count::Any),
+            None => (self.kind, Count::One),
+        }
+    }
+}
+
+/// All message types: those of the topics, then those inside.
+pub fn all() -> impl Iterator<Item = Type> {
+    let of_topics = Topic::ALL.into_iter().map(|topic| Type {
+        name: topic.type_name(),
+        fields: topic.fields(),
+        constants: constants(topic.type_name()),
+    });
+    let inside = PARTS.into_iter().map(|(name, fields)| Type {
+        name,
+        fields,
+        constants: constants(name),
+    });
+    of_topics.chain(inside)
+}
+
+/// The type of that name; its middle part may be left out.
+#[must_use]
+pub fn find(name: &str) -> Option<Type> {
+    all().find(|one| names::same_type(one.name, name))
+}
+
+/// `first`, and every type inside it, each once, in the order of first mention.
+#[must_use]
+pub fn with_parts(first: Type) -> Vec<Type> {
+    let mut found = vec![first];
+    let mut at = 0;
+    while let Some(one) = found.get(at).copied() {
+        for field in one.fields {
+            let (kind, _) = field.element();
+            if let Some(part) = find(kind)
+                && !found.iter().any(|known| known.name == part.name)
+            {
+                found.push(part);
+            }
+        }
+        at += 1;
+    }
+    found
+}
+
+/// The text that defines a type and all types in it, as `.msg` files have it, units in comments.
+#[must_use]
+pub fn full_text(name: &str) -> Option<String> {
+    let mut text = String::new();
+    for (index, one) in with_parts(find(name)?).into_iter().enumerate() {
+        if index > 0 {
+            text.push_str(&SEPARATOR.repeat(80));
+            text.push_str("\nMSG: ");
+            text.push_str(&names::short_type(one.name));
+            text.push('\n');
+        }
+        text.push_str(&own_text(one));
+    }
+    Some(text)
+}
+
+fn own_text(one: Type) -> String {
+    let constants = one
+        .constants
+        .iter()
+        .map(|one| format!("{} {}={}\n", one.kind, one.name, one.value));
+    let fields = one.fields.iter().map(|field| {
+        let kind = names::short_type(field.kind);
+        match field.unit {
+            "" => format!("{kind} {}\n", field.name),
+            unit => format!("{kind} {}  # {unit}\n", field.name),
+        }
+    });
+    constants.chain(fields).collect()
+}
+
+const TIME: [Field; 2] = [
+    required("sec", "int32", "s"),
+    required("nanosec", "uint32", "ns"),
+];
+
+/// The types inside others.
+const PARTS: [(&str, &[Field]); 12] = [
+    (
+        "std_msgs/msg/Header",
+        &[
+            required("stamp", "builtin_interfaces/msg/Time", "s, ns"),
+            required("frame_id", "string", ""),
+        ],
+    ),
+    ("builtin_interfaces/msg/Time", &TIME),
+    ("builtin_interfaces/msg/Duration", &TIME),
+    (
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        &[
+            required("positions", "float64[]", "rad"),
+            required("velocities", "float64[]", "rad/s"),
+            required("accelerations", "float64[]", "rad/s^2"),
+            required("effort", "float64[]", "N m"),
+            required(
+                "time_from_start",
+                "builtin_interfaces/msg/Duration",
+                "s, ns",
+            ),
+        ],
+    ),
+    (
+        "diagnostic_msgs/msg/DiagnosticStatus",
+        &[
+            required("level", "byte", ""),
+            required("name", "string", ""),
+            required("message", "string", ""),
+            required("hardware_id", "string", ""),
+            required("values", "diagnostic_msgs/msg/KeyValue[]", ""),
+        ],
+    ),
+    (
+        "diagnostic_msgs/msg/KeyValue",
+        &[
+            required("key", "string", ""),
+            required("value", "string", ""),
+        ],
+    ),
+    (
+        "pendularm_interfaces/msg/Target",
+        &[
+            required("x", "float64", "m"),
+            required("y", "float64", "m"),
+            required("phi", "float64", "rad"),
+        ],
+    ),
+    (
+        "geometry_msgs/msg/TransformStamped",
+        &[
+            required("header", "std_msgs/msg/Header", ""),
+            required("child_frame_id", "string", ""),
+            required("transform", "geometry_msgs/msg/Transform", "m"),
+        ],
+    ),
+    (
+        "geometry_msgs/msg/Transform",
+        &[
+            required("translation", "geometry_msgs/msg/Vector3", "m"),
+            required("rotation", "geometry_msgs/msg/Quaternion", ""),
+        ],
+    ),
+    ("geometry_msgs/msg/Vector3", &XYZ),
+    (
+        "geometry_msgs/msg/Quaternion",
+        &[
+            required("x", "float64", "1"),
+            required("y", "float64", "1"),
+            required("z", "float64", "1"),
+            required("w", "float64", "1"),
+        ],
+    ),
+    (
+        "rosapi_msgs/msg/TypeDef",
+        &[
+            required("type", "string", ""),
+            required("fieldnames", "string[]", ""),
+            required("fieldtypes", "string[]", ""),
+            required("fieldarraylen", "int32[]", ""),
+            required("examples", "string[]", ""),
+            required("constnames", "string[]", ""),
+            required("constvalues", "string[]", ""),
+        ],
+    ),
+];
+
+const XYZ: [Field; 3] = [
+    required("x", "float64", "m"),
+    required("y", "float64", "m"),
+    required("z", "float64", "m"),
+];
+
+fn constants(name: &str) -> &'static [Constant] {
+    match name {
+        "rcl_interfaces/msg/Log" => &LOG_LEVELS,
+        "diagnostic_msgs/msg/DiagnosticStatus" => &HEALTH,
+        _ => &[],
+    }
+}
+
+const fn byte(name: &'static str, value: &'static str) -> Constant {
+    Constant {
+        name,
+        kind: "byte",
+        value,
+    }
+}
+
+const LOG_LEVELS: [Constant; 5] = [
+    byte("DEBUG", "10"),
+    byte("INFO", "20"),
+    byte("WARN", "30"),
+    byte("ERROR", "40"),
+    byte("FATAL", "50"),
+];
+const HEALTH: [Constant; 4] = [
+    byte("OK", "0"),
+    byte("WARN", "1"),
+    byte("ERROR", "2"),
+    byte("STALE", "3"),
+];

@@ -1,0 +1,71 @@
+//! Names as clients spell them: topics and services with and without the leading slash, types with and without their
+//! middle part.
+//!
+//! **Invariant:** two spellings of one thing lead to the same [`absolute`] name or the same [`short_type`]; an answer
+//! keeps the spelling of the question.
+
+use std::borrow::Cow;
+
+/// The name with its leading slash: what the registry and the catalog know it by.
+#[must_use]
+pub fn absolute(name: &str) -> Cow<'_, str> {
+    if name.starts_with('/') {
+        Cow::Borrowed(name)
+    } else {
+        Cow::Owned(format!("/{name}"))
+    }
+}
+
+/// The name without its leading slash, as some clients spell it; as it is where that would be the name of another thing.
+#[must_use]
+pub fn relative(name: &str) -> &str {
+    name.strip_prefix('/')
+        .filter(|rest| !rest.starts_with('/'))
+        .unwrap_or(name)
+}
+
+/// Every spelling of an absolute name, that one first.
+pub fn spellings(name: &str) -> impl Iterator<Item = &str> {
+    let short = Some(relative(name)).filter(|short| *short != name);
+    std::iter::once(name).chain(short)
+}
+
+/// A type without its middle part: `std_msgs/Header` of `std_msgs/msg/Header` and of itself.
+#[must_use]
+pub fn short_type(name: &str) -> String {
+    match (name.split_once('/'), name.rsplit_once('/')) {
+        (Some((package, _)), Some((_, last))) => format!("{package}/{last}"),
+        _ => name.to_owned(),
+    }
+}
+
+/// Whether two names mean one type; a middle part that only one of them has is left out of account.
+#[must_use]
+pub fn same_type(one: &str, other: &str) -> bool {
+    let parts = |name: &'_ str| name.split('/').count();
+    one == other || (parts(one) != parts(other) && short_type(one) == short_type(other))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_the_same_with_and_without_its_slash() {
+        assert_eq!(absolute("rosapi/topics"), "/rosapi/topics");
+        assert_eq!(absolute("/rosapi/topics"), "/rosapi/topics");
+        assert_eq!(relative("/x"), "x");
+        assert_eq!(relative("x"), "x");
+        assert_eq!(relative("//x"), "//x", "/x is another");
+        assert_eq!(spellings("/x").collect::<Vec<_>>(), ["/x", "x"]);
+    }
+
+    #[test]
+    fn a_type_is_the_same_with_and_without_its_middle_part() {
+        assert!(same_type("std_msgs/Header", "std_msgs/msg/Header"));
+        assert!(same_type("a/b", "a/b"));
+        assert!(!same_type("std_msgs/msg/Header", "std_msgs/srv/Header"));
+        assert!(!same_type("std_msgs/Header", "other_msgs/msg/Header"));
+        assert_eq!(short_type("plain"), "plain");
+    }
+}

@@ -1,0 +1,139 @@
+//! The parameters, as `get_param` and `set_param` know them: what the arm's services read and set, by name.
+//!
+//! **Invariant:** a parameter has no value of its own: it is a field of the service that sets it.
+
+use super::catalog::{Node, Service};
+use super::names;
+
+/// A parameter of the arm.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Parameter {
+    /// Gravity \[m/s²\].
+    Gravity,
+    /// Masses of the links \[kg\].
+    Masses,
+    /// Lengths of the links \[m\].
+    Lengths,
+    /// Proportional gains.
+    Kp,
+    /// Integral gains.
+    Ki,
+    /// Derivative gains.
+    Kd,
+    /// The integration method.
+    Integrator,
+    /// The timestep \[s\].
+    Timestep,
+    /// The arm as URDF, made from lengths and masses; can't be set.
+    RobotDescription,
+}
+
+/// The node that has the parameters.
+const NODE: Node = Node::ArmSim;
+/// The node to which the description belongs elsewhere, and which tools therefore ask.
+const DESCRIBING_NODE: &str = "robot_state_publisher";
+
+impl Parameter {
+    /// All parameters.
+    pub const ALL: [Self; 9] = [
+        Self::Gravity,
+        Self::Masses,
+        Self::Lengths,
+        Self::Kp,
+        Self::Ki,
+        Self::Kd,
+        Self::Integrator,
+        Self::Timestep,
+        Self::RobotDescription,
+    ];
+
+    /// The name without a node.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Gravity => "gravity",
+            Self::Masses => "masses",
+            Self::Lengths => "lengths",
+            Self::Kp => "kp",
+            Self::Ki => "ki",
+            Self::Kd => "kd",
+            Self::Integrator => "integrator",
+            Self::Timestep => "timestep",
+            Self::RobotDescription => "robot_description",
+        }
+    }
+
+    /// The name as `get_param_names` lists it: `/arm_sim:gravity`.
+    #[must_use]
+    pub fn full_name(self) -> String {
+        format!("/{}:{}", NODE.name(), self.name())
+    }
+
+    /// The parameter of that name: `gravity`, `/gravity`, `arm_sim:gravity` or `/arm_sim:gravity`.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        let (node, name) = match name.rsplit_once(':') {
+            Some((node, name)) => (Some(names::relative(node)), name),
+            None => (None, names::relative(name)),
+        };
+        let found = Self::ALL.into_iter().find(|one| one.name() == name)?;
+        let described = found == Self::RobotDescription && node == Some(DESCRIBING_NODE);
+        (described || node.is_none_or(|node| node == NODE.name())).then_some(found)
+    }
+
+    /// The service that answers for the parameter, and the field that is its value; none for what is made from others.
+    #[must_use]
+    pub const fn field(self) -> Option<(Service, &'static str)> {
+        Some(match self {
+            Self::Gravity | Self::Masses | Self::Lengths => (Service::SetParams, self.name()),
+            Self::Kp | Self::Ki | Self::Kd => (Service::SetGains, self.name()),
+            Self::Integrator => (Service::SetIntegrator, "method"),
+            Self::Timestep => (Service::SetIntegrator, self.name()),
+            Self::RobotDescription => return None,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_goes_by_its_name_with_a_slash_or_its_node_before_it() {
+        for one in Parameter::ALL {
+            let name = one.name();
+            for spelled in [
+                name.to_owned(),
+                format!("/{name}"),
+                format!("arm_sim:{name}"),
+                one.full_name(),
+            ] {
+                assert_eq!(Parameter::from_name(&spelled), Some(one), "{spelled}");
+            }
+        }
+        let described = Parameter::from_name("/robot_state_publisher:robot_description");
+        assert_eq!(described, Some(Parameter::RobotDescription));
+        for other in [
+            "",
+            "/",
+            "ik:gravity",
+            "gravity:",
+            "robot_state_publisher:gravity",
+        ] {
+            assert_eq!(Parameter::from_name(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn every_field_of_a_parameter_is_one_that_its_service_takes_and_answers() {
+        for (service, field) in Parameter::ALL.into_iter().filter_map(Parameter::field) {
+            assert!(service.fields().iter().any(|one| one.name == field));
+            assert!(
+                service
+                    .response_fields()
+                    .iter()
+                    .any(|one| one.name == field)
+            );
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The web door: HTTP and the WebSocket upgrade, on the port that also speaks raw JSON.
+//!
+//! | file | what |
+//! | --- | --- |
+//! | [`head`] | bytes into a request |
+//! | [`authority`], [`access`] | who may ask: `Host`, `Origin`, the token |
+//! | [`page`], [`report`] | what there is to see |
+//! | [`upgrade`] | the WebSocket handshake |
+//! | [`response`] | answers, with the headers that keep a browser strict |
+//! | [`serve`] | one request from a stream, one answer to it |
+//! | [`message`] | a WebSocket message into a frame |
+//!
+//! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. What speaks over an upgraded stream is
+//! the same connection as over a plain one.
+//!
+//! **Invariant:** one request a connection, then it is closed: what follows a request is never read as another one.
+
+pub mod access;
+pub mod authority;
+pub mod head;
+pub mod message;
+pub mod page;
+pub mod report;
+pub mod response;
+pub mod serve;
+pub mod upgrade;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use tokio::sync::Semaphore;
+
+use self::access::Access;
+
+/// Requests that are read or answered at once. A browser opens six connections; the rest is for other people's.
+pub const MAX_REQUESTS: usize = 64;
+/// Folder of the report, unless another is named.
+pub const DEFAULT_REPORT: &str = "report";
+
+/// What is served over HTTP, and to whom.
+#[derive(Debug)]
+pub struct Door {
+    /// Who may ask.
+    pub access: Access,
+    /// Folder of the last report.
+    pub report: PathBuf,
+    /// Places for requests.
+    pub(crate) places: Arc<Semaphore>,
+}
+
+impl Door {
+    /// A door with these rules, and the report that is in that folder.
+    #[must_use]
+    pub fn new(access: Access, report: PathBuf) -> Self {
+        Self {
+            access,
+            report,
+            places: Arc::new(Semaphore::new(MAX_REQUESTS)),
+        }
+    }
+}
+
+impl Default for Door {
+    fn default() -> Self {
+        Self::new(Access::default(), DEFAULT_REPORT.into())
+    }
+}
