@@ -16,7 +16,7 @@ use tables::{steps_table, table};
 use super::super::Desk;
 use super::super::csv::Csv;
 use super::super::section::{Block, Figure, Section, Verdict};
-use super::super::svg::{Bars, number, seconds};
+use super::super::svg::{Bars, number};
 use super::super::timing::{Effort, Timing, time};
 use crate::math::arm::{Arm, State};
 use crate::math::expression::Expression;
