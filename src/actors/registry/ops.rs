@@ -73,10 +73,8 @@ impl Registry {
                 }
                 Ok(())
             }
-            // Put together before it gets here.
-            Op::Fragment(_) => Ok(()),
-            // Asked of a client before it gets here; where nothing is asked, anything shown will do.
-            Op::Auth { .. } => Ok(()),
+            // Put together, and asked of a client, before they get here; where nothing is asked, anything shown will do.
+            Op::Fragment(_) | Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
                 service,
                 values,

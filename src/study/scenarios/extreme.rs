@@ -1,6 +1,6 @@
 //! S27 to S35: gravity, timesteps, angles and parameters far from the ordinary.
 //!
-//! **Invariant:** a scene ends finite or with the step that was not taken; either is said, neither panics.
+//! **Invariant:** what no arm can have is refused by name; whatever is taken stays finite, or the scene falls short.
 
 #![allow(
     clippy::indexing_slicing,

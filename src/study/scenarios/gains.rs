@@ -1,6 +1,6 @@
 //! S07 to S10: stiff, overdamped and undamped gains.
 //!
-//! **Invariant:** what is measured is the nonlinear arm; what it is held against is the linearised loop, which knows nothing of the run.
+//! **Invariant:** a limit is predicted before it is measured, and both are shown.
 
 #![allow(
     clippy::indexing_slicing,

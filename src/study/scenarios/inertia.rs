@@ -1,6 +1,6 @@
 //! S16 to S26: light and heavy tips, short and long links, stretched, folded, whirling.
 //!
-//! **Invariant:** digits are counted against accelerations that were reckoned with twice as many.
+//! **Invariant:** accelerations are compared with ones in twice the digits, measured limits with predicted ones.
 
 #![allow(
     clippy::indexing_slicing,

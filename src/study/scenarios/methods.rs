@@ -1,6 +1,6 @@
 //! S36 to S39: the methods themselves.
 //!
-//! **Invariant:** each of these is a statement about all four methods, and fails if one of them leaves its order.
+//! **Invariant:** whatever a scene compares starts from the same state.
 
 #![allow(
     clippy::indexing_slicing,

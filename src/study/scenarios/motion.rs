@@ -1,6 +1,6 @@
 //! S01 to S06: at rest, swinging, chaotic, with nobody at the controls.
 //!
-//! **Invariant:** what a scene expects is stated before it runs, from theory or from the reference, never from an earlier run.
+//! **Invariant:** no scene has a controller; what moves, moves by itself.
 
 #![allow(
     clippy::indexing_slicing,

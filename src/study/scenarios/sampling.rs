@@ -1,6 +1,6 @@
 //! S11 to S15: what the controller's own clock, its delay and its integral do, whatever the method.
 //!
-//! **Invariant:** the controller acts once per period, whatever number of steps the plant takes in it.
+//! **Invariant:** every verdict is about the control law; the methods only step the arm.
 
 #![allow(
     clippy::indexing_slicing,

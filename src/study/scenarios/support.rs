@@ -1,6 +1,6 @@
 //! What scenes share: settings, random states, growth rates.
 //!
-//! **Invariant:** noise is seeded: a scene run twice sees the same states.
+//! **Invariant:** what is random comes from a seed in the source, so a scene does the same every time.
 
 #![allow(
     clippy::indexing_slicing,

@@ -87,7 +87,7 @@ pub(super) fn growth(desk: &mut Desk<'_>, meter: &mut Meter) -> Growth {
         apart: 0.0,
         plots: Vec::new(),
     };
-    let dots = desk.choose(24, 6);
+    let dots = desk.choose(12, 4);
     for method in Method::ALL {
         growth.panel(method, dots);
         meter.add(desk, 3);
@@ -101,6 +101,18 @@ const LOOKS: [(&str, Marker); 3] = [
     ("c3", Marker::Triangle),
     ("c1", Marker::Circle),
 ];
+
+/// Control periods near the limit that are measured too, as parts of it.
+const AROUND: [f64; 6] = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
+
+/// Which of three turns the dots of so many steps per period take.
+fn turn_of(substeps: u32) -> u32 {
+    match substeps {
+        1 => 0,
+        10 => 1,
+        _ => 2,
+    }
+}
 
 fn between(index: u32, count: u32) -> f64 {
     PERIODS.0 * (PERIODS.1 / PERIODS.0).powf(f64::from(index) / f64::from(count))
@@ -128,10 +140,15 @@ impl Growth {
                 .filter(|(_, growth)| *growth <= GROWTH.1);
             plot.series.push(Series::line(class, curve));
             let mut points = Vec::new();
-            for index in 0..=dots {
-                let period = between(index, dots);
+            // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
+            let turn = turn_of(substeps);
+            let along = (0..dots).map(|index| between(3 * index + turn, 3 * dots));
+            let limit = largest_period(&linear, method, substeps).unwrap_or(f64::NAN);
+            let steep = AROUND.map(|part| limit * (part + 0.002 * f64::from(turn)));
+            for period in along.chain(steep) {
                 let expected = predicted(period);
-                if expected > GROWTH.1 {
+                // NaN where there is no limit to look around.
+                if expected.is_nan() || expected > GROWTH.1 {
                     continue;
                 }
                 let measured = growth_per_period(&setting, period, substeps);

@@ -16,7 +16,7 @@ use tables::{steps_table, table};
 use super::super::Desk;
 use super::super::csv::Csv;
 use super::super::section::{Block, Figure, Section, Verdict};
-use super::super::svg::{Bars, number, seconds};
+use super::super::svg::{Bars, number};
 use super::super::timing::{Effort, Timing, time};
 use crate::math::arm::{Arm, State};
 use crate::math::expression::Expression;
@@ -61,7 +61,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     desk.keep("left-out", csv);
     let table = table(&kinds, &counts, same_bits);
     Section {
-        findings: findings(&kinds, &counts),
+        findings: findings(&counts),
         verdicts: verdicts(&counts, same_bits),
         blocks: vec![
             Block::Figure(figure(&kinds, &counts)),
@@ -252,23 +252,27 @@ fn figure(kinds: &[Kind], counts: &Counts) -> Figure {
     )
 }
 
-fn findings(kinds: &[Kind], counts: &Counts) -> Vec<String> {
-    let time = |name| {
-        kinds
-            .iter()
-            .find(|kind| kind.name == name)
-            .map(|kind| kind.timing.minimum / in_f64(STEPS))
-    };
+fn findings(counts: &Counts) -> Vec<String> {
     let mut findings = Vec::new();
-    if let (Some(free), Some(pid)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid"))
-        && let (Some(free_time), Some(pid_time)) = (time("step-2-rk4-free"), time("step-2-rk4-pid"))
-    {
+    if let (Some((none, _)), Some((one, each)), Some((eleven, again))) = (
+        server::encoded(counts, "server-running"),
+        server::encoded(counts, "server-1-subscriber"),
+        server::encoded(counts, "server-11-subscribers"),
+    ) {
         findings.push(format!(
-            "**Without control a 2-link RK4 step is {} instructions instead of {}** ({} instead of {}).",
-            number(free.round()),
-            number(pid.round()),
-            seconds(free_time),
-            seconds(pid_time)
+            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} instructions each, for eleven {} at {}.",
+            number(none),
+            number(one),
+            number(each.round()),
+            number(eleven),
+            number(again.round())
+        ));
+    }
+    if let (Some(off), Some(on)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid")) {
+        findings.push(format!(
+            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} instructions instead of {}.",
+            number(off.round()),
+            number(on.round())
         ));
     }
     findings
