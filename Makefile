@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test lint doc report clean vendor submission test-submission
+.PHONY: help build run test test-clients lint doc report clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -22,6 +22,10 @@ run: build ## Build, then serve clients in the foreground until SIGINT or SIGTER
 test: ## Run every test
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) test --locked
+
+test-clients: build ## Run clients that nobody here wrote against it: roslibpy, roslib 1 and 2, Lichtblick's packages, roslibrust
+	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
+	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
