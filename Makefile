@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-clients lint doc report clean vendor submission test-submission
+.PHONY: help build run test test-browser test-clients lint doc report bench bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -19,9 +19,13 @@ run: build ## Build, then serve clients in the foreground until SIGINT or SIGTER
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
-test: ## Run every test
+test: ## Run every test but those of the page
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) test --locked
+
+test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
+	@echo "make test-browser: the page in headless Chromium"
+	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
 test-clients: build ## Run clients that nobody here wrote against it: roslibpy, roslib 1 and 2, Lichtblick's packages, roslibrust
 	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
@@ -33,15 +37,24 @@ lint: ## Check formatting and lints; any warning fails
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 
-# Private items are documented too, for whoever reads the source, so links to them are as good as any.
+# What is public must not link to what is not; then private items too, for whoever reads the source.
 doc: ## Build the documentation; any warning fails
 	@echo "make doc: $(TARGET_DIR)/doc/pendularm/index.html"
-	RUSTDOCFLAGS="-D warnings -A rustdoc::private_intra_doc_links" $(CARGO) doc --locked --no-deps --document-private-items
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 
 report: build ## Measure error against run time and stability, and write report/index.html; ARGS="--quick" or "--only error"
 	@echo "make report: report/index.html"
 	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
+
+bench: ## Measure our own speed and size; KEEP=1 keeps the figures in benches/results/
+	@echo "make bench: some minutes; the fewer other programs run, the better"
+	@KEEP="$(KEEP)" bash benches/run.sh
+
+bench-peers: ## Measure beside Pinocchio and MuJoCo, installed from PyPI into benches/peers/.venv; KEEP=1 as above
+	@echo "make bench-peers: downloads about 100 MB once, compiles, then some minutes"
+	@KEEP="$(KEEP)" bash benches/peers/run.sh
 
 clean: ## Remove what was built and packed; vendored sources stay
 	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"

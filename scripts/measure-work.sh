@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Counts instructions and allocations of the work that a scene does or leaves out, and the server's own with nobody and
-# somebody listening. Writes DIRECTORY/work.csv for `pendularm report --only work`. Needs valgrind; a minute.
+# Counts instructions and allocations of the work that a scene does or leaves out, the server's own with nobody and
+# somebody listening, how often its gateway wakes, and what a build without the web feature lacks. Writes DIRECTORY/work.csv for
+# `pendularm report --only work`. Needs valgrind; a minute beside building.
 # usage: scripts/measure-work.sh DIRECTORY
 set -euo pipefail
 
@@ -14,8 +15,13 @@ server=
 trap 'if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; fi; rm -rf "$scratch"' EXIT
 
 (cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work --bin allocations)
-(cd "$root" && cargo build --release --locked --quiet)
 program=${CARGO_TARGET_DIR:-$root/target}/release/pendularm
+if grep -q '^web = ' "$root/Cargo.toml"; then
+    (cd "$root" && cargo build --release --locked --quiet --no-default-features)
+    cp "$program" "$scratch/bare"
+fi
+# Last, so that the program left behind is the whole one.
+(cd "$root" && cargo build --release --locked --quiet)
 
 instructions() { # command...: instructions executed
     valgrind --tool=callgrind --callgrind-out-file=/dev/null "$@" 2>&1 >/dev/null | awk '/Collected/ { print $NF }'
@@ -32,6 +38,25 @@ for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd
     put "$variant" "$(awk "BEGIN { print ($twice - $once) / $count }")" "instructions per step"
 done
 
+# Whose instructions they are: those of the arm, in a step of the arm and in one of the 1-DOF service.
+of_functions() { # pattern, file of callgrind: instructions in functions whose name matches, without what they call
+    awk -v pattern="$1" '
+        /^c?fn=/ { id = $1; sub(/^c?fn=/, "", id); name = $0; if (sub(/^[^ ]* /, "", name)) names[id] = name; if (/^fn=/) current = names[id]; next }
+        /^calls=/ { getline; next }
+        /^[0-9+*-]/ { if (current ~ pattern) sum += $2 }
+        END { printf "%d", sum }' "$2"
+}
+calls_of() { # pattern, file of callgrind: calls of functions whose name matches
+    awk -v pattern="$1" '
+        /^c?fn=/ { id = $1; sub(/^c?fn=/, "", id); name = $0; if (sub(/^[^ ]* /, "", name)) names[id] = name; called = names[id]; next }
+        /^calls=/ { calls = $1; sub(/^calls=/, "", calls); if (called ~ pattern) sum += calls }
+        END { printf "%d", sum }' "$2"
+}
+for variant in step-2-rk4-free particle-rk4-constant; do
+    valgrind --tool=callgrind --callgrind-out-file="$scratch/functions" "$target/release/work" "$variant" $count >/dev/null 2>&1
+    put "arm-in-$variant" "$(awk "BEGIN { print $(of_functions 'Simulation|dynamics|articulated_body|work::step' "$scratch/functions") / $count }")" "instructions per step"
+done
+
 # The counting allocator's own words: "2 links, rk4 PID true 1000000 steps 0 allocations".
 "$target/release/allocations" >"$scratch/allocations"
 put allocations-in-steps "$(awk '/steps/ { sum += $(NF - 1) } END { print sum }' "$scratch/allocations")" allocations
@@ -40,8 +65,8 @@ put allocations-per-subscriber "$(awk '/^200 bytes/ { print $3 }' "$scratch/allo
 
 # The server under callgrind for some seconds of real time: simulated steps keep pace with the clock, so counts are per second.
 seconds=4
-serve() { # name, frames to send first, clients subscribed to /joint_states
-    local name=$1 first=$2 clients=$3 counts="$scratch/counts" client pids=()
+serve() { # name, frames to send first, subscribers, their topic
+    local name=$1 first=$2 clients=$3 topic=${4:-/joint_states} counts="$scratch/counts" client pids=()
     valgrind --tool=callgrind --callgrind-out-file="$counts" "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
     server=$!
     for _ in $(seq 100); do grep -q listening "$scratch/address" && break || sleep 0.1; done
@@ -50,7 +75,7 @@ serve() { # name, frames to send first, clients subscribed to /joint_states
     exec 3<>"/dev/tcp/127.0.0.1/$port"
     printf '%s' "$first" >&3
     for ((client = 0; client < clients; client++)); do
-        (exec 4<>"/dev/tcp/127.0.0.1/$port"; printf '{"op":"subscribe","topic":"/joint_states"}\n' >&4; exec cat <&4 >/dev/null) &
+        (exec 4<>"/dev/tcp/127.0.0.1/$port"; printf '{"op":"subscribe","topic":"%s"}\n' "$topic" >&4; exec cat <&4 >/dev/null) &
         pids+=($!)
     done
     sleep 1
@@ -64,6 +89,8 @@ serve() { # name, frames to send first, clients subscribed to /joint_states
     server=
     exec 3>&-
     for client in "${pids[@]}"; do kill "$client" 2>/dev/null || true; wait "$client" 2>/dev/null || true; done
+    put "$name-encoded" "$(awk "BEGIN { print $(calls_of 'messages::publish$' "$counts".1) / $seconds }")" "messages per second"
+    put "$name-json" "$(awk "BEGIN { printf \"%.0f\", $(of_functions 'serde_json|zmij|messages::publish' "$counts".1) / $seconds }")" "instructions per second"
     rm -f "$counts"*
     put "$name" "$(awk "BEGIN { printf \"%.0f\", ${total:-0} / $seconds }")" "instructions per second"
 }
@@ -73,6 +100,44 @@ if command -v callgrind_control >/dev/null; then
 ' 0
     serve server-1-subscriber "" 1
     serve server-11-subscribers "" 11
+    if grep -q '"/arm_sim/error_estimate"' "$root/src/protocol/catalog.rs"; then
+        serve server-error-estimate "" 1 /arm_sim/error_estimate
+    fi
+fi
+
+# Timers: how often the gateway's thread, where goals and trials live, goes to sleep and is woken. Nothing else happens there.
+wakes() { # name, frames to send first
+    "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
+    server=$!
+    for _ in $(seq 100); do grep -q listening "$scratch/address" && break || sleep 0.1; done
+    local port before after
+    port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$scratch/address")
+    exec 3<>"/dev/tcp/127.0.0.1/$port"
+    printf '%s' "$2" >&3
+    sleep 1
+    slept() { awk '/^voluntary/ { print $2 }' "/proc/$server/task/$server/status"; }
+    before=$(slept)
+    sleep $seconds
+    after=$(slept)
+    kill "$server"; wait "$server" 2>/dev/null || true
+    server=
+    exec 3>&-
+    put "$1" "$(awk "BEGIN { print ($after - $before) / $seconds }")" "wake-ups per second"
+}
+if [ -r /proc/self/task ]; then
+    wakes wakes-idle ""
+    wakes wakes-trial '{"op":"subscribe","topic":"/ik_trial/status"}
+{"op":"call_service","service":"/ik_trial/start"}
+'
+fi
+
+if [ -e "$scratch/bare" ]; then
+    put program-size-bare "$(stat -c %s "$scratch/bare")" bytes
+    for variant in bare whole; do
+        binary=$scratch/bare
+        [ $variant = bare ] || binary=$program
+        put "web-symbols-$variant" "$(nm -C "$binary" 2>/dev/null | grep -ciE 'tungstenite|httparse|websocket' || true)" symbols
+    done
 fi
 
 put program-size "$(stat -c %s "$program")" bytes

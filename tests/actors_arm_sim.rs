@@ -296,7 +296,18 @@ fn a_microsecond_is_followed_step_by_step() {
         let began = Instant::now();
         for _ in 0..20 {
             sleep(ms(10)).await;
-            assert_eq!(u128::from(bench.steps().await), began.elapsed().as_micros());
+            // Ten thousand steps may be more than a wake-up's budget on a busy machine: then the next ones bring the rest.
+            let mut steps = u128::from(bench.steps().await);
+            for _ in 0..100 {
+                let due = began.elapsed().as_micros();
+                assert!(steps <= due, "{steps} steps where {due} are due");
+                if steps == due {
+                    break;
+                }
+                sleep(ms(1)).await;
+                steps = u128::from(bench.steps().await);
+            }
+            assert_eq!(steps, began.elapsed().as_micros());
         }
     });
 }

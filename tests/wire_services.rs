@@ -137,3 +137,18 @@ fn a_name_that_only_resembles_a_service_is_none() {
     assert!(answer.to_string().contains("service"), "{answer}");
     client.settle();
 }
+
+#[test]
+fn a_number_that_is_not_finite_is_quoted_as_it_was_sent() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for literal in ["NaN", "Infinity", "-Infinity"] {
+        let frame = format!(
+            "{{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"args\":{{\"data\":{literal}}}}}\n"
+        );
+        client.send_bytes(frame.as_bytes());
+        let response = client.receive();
+        let status = response["status"].as_str().unwrap();
+        assert!(status.ends_with(&format!("got {literal}")), "{status}");
+    }
+}

@@ -222,3 +222,16 @@ fn a_new_timestep_starts_its_step_afresh() {
     }
     assert_eq!(stamp(&state(&mut client)), 0.0);
 }
+
+/// At a timestep of 1e-8 s no machine keeps up. Were each call to bring 5 ms of steps of its own, there could not be more than 200
+/// answers a second; while only wake-ups step, there are thousands.
+#[test]
+fn calls_to_an_arm_that_cannot_keep_up_do_not_each_cost_a_wake_up() {
+    let runtime = Runtime::start();
+    let mut caller = runtime.connect();
+    caller.ask("/arm_sim/set_integrator", json!({"timestep": 1e-8}));
+    let call = b"{\"op\":\"call_service\",\"service\":\"/pid_controller/enable\",\"id\":\"p\"}\n";
+    caller.send_bytes(&call.repeat(5_000));
+    let answered = caller.receive_for(Duration::from_secs(1)).len();
+    assert!(answered > 400, "{answered} calls were answered in a second");
+}

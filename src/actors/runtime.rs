@@ -205,7 +205,9 @@ async fn bind(options: &Options) -> Result<Vec<TcpListener>, RunError> {
 /// The one line on stdout. Nobody may be reading it: that is no reason to end.
 fn announce(address: SocketAddr) {
     let mut stdout = std::io::stdout();
-    let _ = writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush());
+    if let Err(error) = writeln!(stdout, "listening on {address}").and_then(|()| stdout.flush()) {
+        tracing::warn!(%address, %error, "standard output can't be told where this listens");
+    }
     tracing::info!(%address, "serving rosbridge clients");
 }
 

@@ -13,9 +13,9 @@ use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_json::value::RawValue;
 
 /// What `NaN` becomes on the way in. Reads as an infinity: nothing that we accept tells the two apart.
-const NAN: &str = "9e999";
+pub(super) const NAN: &str = "9e999";
 /// What `Infinity` becomes on the way in; the sign before it stays.
-const INFINITY: &str = "1e999";
+pub(super) const INFINITY: &str = "1e999";
 /// The largest finite `f64` has 309 digits: a number of fewer, without an exponent, can't overflow.
 const SAFE_DIGITS: usize = 308;
 

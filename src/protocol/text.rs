@@ -6,6 +6,8 @@ use std::fmt::Write as _;
 
 use serde_json::value::RawValue;
 
+use super::json;
+
 /// Characters of client text that a message of ours repeats: enough to recognise it by, one line on a terminal.
 pub(super) const EXCERPT: usize = 48;
 
@@ -34,9 +36,13 @@ pub(super) fn shortened(text: &str, limit: usize) -> String {
 
 /// What a JSON value is, in words a sentence can end with: the value itself if it is short, else its kind.
 pub(super) fn found(raw: &RawValue) -> String {
-    match raw.get().as_bytes().first() {
-        Some(b'{') => "an object".to_owned(),
-        Some(b'[') => "an array".to_owned(),
+    match raw.get() {
+        object if object.starts_with('{') => "an object".to_owned(),
+        array if array.starts_with('[') => "an array".to_owned(),
+        // What the reader has put in the place of names that JSON does not have.
+        json::NAN => "NaN".to_owned(),
+        json::INFINITY => "Infinity".to_owned(),
+        negative if negative.strip_prefix('-') == Some(json::INFINITY) => "-Infinity".to_owned(),
         _ => excerpt(raw.get()),
     }
 }

@@ -71,8 +71,19 @@ impl Figure {
         legend: &[Key],
         plots: &[Plot],
     ) -> Self {
+        let panels = plots.iter().map(Plot::render).collect();
+        Self::of_panels(name, title, caption, legend, panels)
+    }
+
+    /// As [`Figure::new`] from panels that are drawn already.
+    pub(crate) fn of_panels(
+        name: &str,
+        title: impl Into<String>,
+        caption: impl Into<String>,
+        legend: &[Key],
+        panels: Vec<String>,
+    ) -> Self {
         let title = title.into();
-        let panels: Vec<String> = plots.iter().map(Plot::render).collect();
         Self {
             name: name.to_owned(),
             sheet: sheet(&title, legend, &panels),

@@ -22,7 +22,7 @@ use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
 use crate::math::simulation::Simulation;
 
 /// Steps for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold meanwhile.
-const STEPS: u64 = 4000;
+pub const STEPS: u64 = 4000;
 
 /// The nudge \[rad\]; small, so that what is linear shows, and a billion units of rounding.
 const NUDGE: f64 = 1e-6;
@@ -181,7 +181,7 @@ impl<const N: usize> Setting<N> {
 }
 
 /// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the velocity.
-fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
+pub(super) fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
     let mut state = State {
         position: *position,
         velocity: [0.0; N],
@@ -195,7 +195,7 @@ fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
     state
 }
 
-fn moved<const N: usize>(state: &State<N>, dq: &[f64; N], dv: &[f64; N]) -> State<N> {
+pub(super) fn moved<const N: usize>(state: &State<N>, dq: &[f64; N], dv: &[f64; N]) -> State<N> {
     State {
         position: std::array::from_fn(|i| state.position[i] + dq[i]),
         velocity: std::array::from_fn(|i| state.velocity[i] + dv[i]),

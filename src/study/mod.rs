@@ -4,6 +4,7 @@
 //! | --- | --- |
 //! | [`stability`] | the largest stable timestep, predicted from the linearised loop ([`linear`], [`matrix`]) |
 //! | [`measure`] | the same, measured on the arm itself |
+//! | [`growth`] | growth per control period, measured |
 //! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
 //! | [`reference`](mod@reference) | the true motion, with twice the digits and a bound on its own error |
 //! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
@@ -23,6 +24,7 @@ pub mod conditioning;
 pub mod error;
 pub mod error_estimate;
 pub mod extrapolation;
+pub mod growth;
 pub mod linear;
 pub mod matrix;
 pub mod measure;

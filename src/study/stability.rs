@@ -160,6 +160,16 @@ pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) ->
     stepping.search(&Modes::of(linear))
 }
 
+/// What one control period \[s\] of `substeps` steps of the method does to a deviation; states as in [`Linear::flow`].
+#[must_use]
+pub fn period_matrix(linear: &Linear, method: Method, substeps: u32, period: f64) -> Matrix {
+    let stepping = Stepping {
+        substeps: substeps.max(1),
+        ..Stepping::new(linear, method, Sampling::Held)
+    };
+    stepping.generator(period).shifted_identity(period)
+}
+
 /// The step matrix itself, over one step of `h` \[s\]; states as in [`Linear::flow`].
 #[must_use]
 pub fn step_matrix(linear: &Linear, method: Method, sampling: Sampling, h: f64) -> Matrix {

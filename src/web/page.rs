@@ -15,9 +15,12 @@ pub struct Asset {
     pub bytes: &'static [u8],
 }
 
-/// An entry of the table, by the file's name.
+/// An entry of the table, by the file's name, which is its path too unless another is given.
 macro_rules! asset {
-    ($path:literal, $file:literal, $kind:expr) => {
+    ($file:literal, $kind:expr) => {
+        asset!(concat!("/", $file), $file, $kind)
+    };
+    ($path:expr, $file:literal, $kind:expr) => {
         Asset {
             path: $path,
             file: $file,
@@ -29,13 +32,46 @@ macro_rules! asset {
 
 const HTML: &str = "text/html; charset=utf-8";
 const CSS: &str = "text/css; charset=utf-8";
+const SVG: &str = "image/svg+xml";
 const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 
 /// Every file of the page.
 pub const ASSETS: &[Asset] = &[
     asset!("/", "index.html", HTML),
-    asset!("/style.css", "style.css", CSS),
-    asset!("/main.js", "main.js", JAVASCRIPT),
+    asset!("icon.svg", SVG),
+    asset!("style.css", CSS),
+    asset!("aim.js", JAVASCRIPT),
+    asset!("announce.js", JAVASCRIPT),
+    asset!("arm_view.js", JAVASCRIPT),
+    asset!("axis.js", JAVASCRIPT),
+    asset!("backdrop.js", JAVASCRIPT),
+    asset!("compare.js", JAVASCRIPT),
+    asset!("compare_view.js", JAVASCRIPT),
+    asset!("controls.js", JAVASCRIPT),
+    asset!("csv.js", JAVASCRIPT),
+    asset!("dom.js", JAVASCRIPT),
+    asset!("field.js", JAVASCRIPT),
+    asset!("format.js", JAVASCRIPT),
+    asset!("goal_panel.js", JAVASCRIPT),
+    asset!("keyboard.js", JAVASCRIPT),
+    asset!("latest.js", JAVASCRIPT),
+    asset!("main.js", JAVASCRIPT),
+    asset!("mechanics.js", JAVASCRIPT),
+    asset!("phase_plot.js", JAVASCRIPT),
+    asset!("plots.js", JAVASCRIPT),
+    asset!("readouts.js", JAVASCRIPT),
+    asset!("recorder.js", JAVASCRIPT),
+    asset!("resample.js", JAVASCRIPT),
+    asset!("ring.js", JAVASCRIPT),
+    asset!("rosbridge.js", JAVASCRIPT),
+    asset!("runtime.js", JAVASCRIPT),
+    asset!("share.js", JAVASCRIPT),
+    asset!("store.js", JAVASCRIPT),
+    asset!("strip_chart.js", JAVASCRIPT),
+    asset!("surface.js", JAVASCRIPT),
+    asset!("theme.js", JAVASCRIPT),
+    asset!("transport.js", JAVASCRIPT),
+    asset!("trial_panel.js", JAVASCRIPT),
 ];
 
 /// The file that is served at `path`.

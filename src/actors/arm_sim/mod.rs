@@ -242,6 +242,11 @@ impl<const N: usize> ArmSim<N> {
         if self.paused || self.simulation.divergence().is_some() {
             return;
         }
+        // One budget for all that comes before the breather is over: were each message to cost one, a client that sends
+        // many would keep the arm from everybody else.
+        if self.catching_up {
+            return;
+        }
         let due = self.pacer.due(self.epoch.elapsed());
         if due == 0 {
             return;
@@ -253,7 +258,7 @@ impl<const N: usize> ArmSim<N> {
             return;
         }
         self.telemetry.owes(due - taken, self.simulation.timestep());
-        if taken < due && !self.catching_up {
+        if taken < due {
             self.catching_up = true;
             ctx.run_later(BREATHER, |arm, ctx| {
                 arm.catching_up = false;

@@ -73,10 +73,9 @@ impl Registry {
                 }
                 Ok(())
             }
-            // Put together before it gets here.
-            Op::Fragment(_) => Ok(()),
-            // Asked of a client before it gets here; where nothing is asked, anything shown will do.
-            Op::Auth { .. } => Ok(()),
+            // Pieces are put together before they get here; a token is asked for before, and where nothing is asked,
+            // anything shown will do.
+            Op::Fragment(_) | Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
                 service,
                 values,

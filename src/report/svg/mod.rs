@@ -6,10 +6,12 @@
 //! **Invariant:** whatever has no place on the axes is drawn at the edge as lost, never dropped in silence.
 
 mod axis;
+mod bars;
 mod heat;
 mod plot;
 
 pub(crate) use axis::{Axis, Unit, number, power, scientific, seconds};
+pub(crate) use bars::Bars;
 pub(crate) use heat::Heat;
 pub(crate) use plot::Plot;
 

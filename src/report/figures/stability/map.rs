@@ -10,14 +10,12 @@ use super::{Meter, setting};
 use crate::math::integrator::Method;
 use crate::study::linear::Linear;
 use crate::study::matrix::Matrix;
+use crate::study::measure::STEPS;
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
 
 /// Ends of the axes: timestep \[s\], factor on the shipped gains.
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
-
-/// Steps that a measurement of `study::measure` watches.
-const WATCHED: f64 = 4000.0;
 
 /// The map as it is made.
 pub(super) struct Map {
@@ -116,15 +114,15 @@ impl Map {
                 growth.into(),
                 limit.into(),
             ]);
-            let agrees = growth.is_some_and(|growth| growth < 1.0) == (h < limit);
-            if !agrees && undecided(&step_matrix(&linear, method, sampling, h)) {
+            // Asked before anybody looks at whether prediction and measurement agree.
+            if undecided(&step_matrix(&linear, method, sampling, h)) {
                 self.undecided += 1;
                 row.push(0);
                 continue;
             }
             row.push(level(growth));
             self.cells += 1;
-            if !agrees {
+            if growth.is_some_and(|growth| growth < 1.0) != (h < limit) {
                 let told = format!("predicted limit {}", seconds(limit));
                 disagreeing.push(Point::new(h, factor, told));
             }
@@ -143,8 +141,9 @@ impl Map {
             ),
             "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power of 3/2: \
              the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows (orange), the darker \
-             the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: cells that \
-             the watch of some thousand steps is too short to judge, by the prediction itself. In the lowest rows the gains are too \
+             the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: not judged, because by the prediction the \
+             slowest mode changes its energy by less than a factor e in the 4000 steps watched; that is asked of every cell alike, before \
+             looking at whether it agrees. In the lowest rows the gains are too \
              weak to carry the arm against gravity: no timestep is stable.",
             &[Key::line("ink", "predicted limit")],
             &self.plots,
@@ -152,10 +151,12 @@ impl Map {
     }
 }
 
-/// Whether the watch of some thousand steps is too short to tell: by the prediction itself the slowest mode changes its energy by
-/// less than a factor e meanwhile, so that where in its swing it is looked at decides.
+/// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor e
+/// meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
 fn undecided(step: &Matrix) -> bool {
-    2.0 * WATCHED * step.spectral_radius().ln().abs() < 1.0
+    #[allow(clippy::cast_precision_loss, reason = "a few thousand")]
+    let watched = STEPS as f64;
+    2.0 * watched * step.spectral_radius().ln().abs() < 1.0
 }
 
 /// Colour of a growth of energy over a few thousand steps.

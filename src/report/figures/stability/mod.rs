@@ -8,7 +8,7 @@ mod radius;
 mod words;
 
 use map::map;
-use period::{period_table, periods};
+use period::{growth, period_table, periods};
 use radius::radius_figure;
 use words::{findings, verdicts};
 
@@ -47,7 +47,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     // Lines of the table count 3 each beside the rows of the maps.
     let mut meter = Meter {
         done: 0,
-        of: 3 * 56 + 3 * 12 + 8 * cells,
+        of: 3 * 56 + 3 * 12 + 3 * 4 + 8 * cells,
     };
     let mut lines = Vec::new();
     let bent = |position| Setpoint {
@@ -85,12 +85,15 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     let periods = periods(desk, &mut meter);
     let (radius, csv) = radius_figure(&lines);
     desk.keep("spectral-radius", csv);
+    let growth = growth(desk, &mut meter);
+    desk.keep("control-period", growth.csv.clone());
     Section {
         findings: findings(&lines),
-        verdicts: verdicts(&lines, &map, &periods),
+        verdicts: verdicts(&lines, &map, &periods, &growth),
         glance: vec![edges(&lines)],
         blocks: vec![
             Block::Figure(radius),
+            Block::Figure(growth.figure()),
             Block::Figure(map.figure()),
             Block::Table(table(&lines)),
             Block::Table(period_table(&periods)),

@@ -1,14 +1,22 @@
-//! The largest stable control period, however many steps it is cut into.
+//! The largest stable control period and the growth per period, however many steps it is cut into.
 //!
 //! **Invariant:** what takes too long to measure is called not measured.
 
 use super::super::super::Desk;
-use super::super::super::section::{Cell, Table};
-use super::super::super::svg::seconds;
+use super::super::super::csv::Csv;
+use super::super::super::section::{Cell, Figure, Table};
+use super::super::super::svg::{
+    Axis, Key, Mark, Marker, Plot, Point, Series, Unit, number, seconds,
+};
 use super::{Meter, setting};
 use crate::math::integrator::Method;
+use crate::study::growth::growth_per_period;
 use crate::study::linear::Linear;
-use crate::study::stability::{Sampling, largest_period};
+use crate::study::stability::{Sampling, largest_period, period_matrix};
+
+/// Ends of the axis of control periods \[s\], and the growth up to which curves are drawn.
+const PERIODS: (f64, f64) = (5e-4, 2e-2);
+const GROWTH: (f64, f64) = (0.85, 1.15);
 
 /// Steps per control period.
 const SUBSTEPS: [u32; 3] = [1, 10, 100];
@@ -37,7 +45,7 @@ pub(super) fn periods(desk: &mut Desk<'_>, meter: &mut Meter) -> Vec<Period> {
 
 pub(super) fn period_table(periods: &[Period]) -> Table {
     let mut table = Table::new(
-        "control-period",
+        "period-limits",
         "The limit belongs to the control period",
         "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the method (2 links, shipped gains). Smaller steps at the \
          same control period buy nothing; Euler only moves to the limit of the others.",
@@ -57,4 +65,134 @@ pub(super) fn period_table(periods: &[Period]) -> Table {
         table.rows.push(row);
     }
     table
+}
+
+/// Growth per control period: what was predicted and measured, and the figure of it.
+pub(super) struct Growth {
+    pub(super) csv: Csv,
+    /// Dots, and how far the furthest lies from its curve, as a part of the growth.
+    pub(super) dots: usize,
+    pub(super) furthest: f64,
+    /// How far the curves of 1, 10 and 100 steps are apart at most, for methods of order 2 and more.
+    apart: f64,
+    plots: Vec<Plot>,
+}
+
+/// Curves and dots for every method and number of steps per period.
+pub(super) fn growth(desk: &mut Desk<'_>, meter: &mut Meter) -> Growth {
+    let mut growth = Growth {
+        csv: Csv::new("method,substeps,period,growth_predicted,growth_measured"),
+        dots: 0,
+        furthest: 0.0,
+        apart: 0.0,
+        plots: Vec::new(),
+    };
+    let dots = desk.choose(24, 6);
+    for method in Method::ALL {
+        growth.panel(method, dots);
+        meter.add(desk, 3);
+    }
+    growth
+}
+
+/// Curve and dots of one number of steps per period.
+const LOOKS: [(&str, Marker); 3] = [
+    ("c2", Marker::Square),
+    ("c3", Marker::Triangle),
+    ("c1", Marker::Circle),
+];
+
+fn between(index: u32, count: u32) -> f64 {
+    PERIODS.0 * (PERIODS.1 / PERIODS.0).powf(f64::from(index) / f64::from(count))
+}
+
+impl Growth {
+    fn panel(&mut self, method: Method, dots: u32) {
+        let setting = setting(1.0, method, Sampling::Held);
+        let linear = Linear::at_setpoint(&setting.arm, &setting.gains, &setting.setpoint);
+        let x = Axis::log_between("control period", Unit::Seconds, PERIODS.0, PERIODS.1);
+        let y = Axis::linear("growth per control period", GROWTH.0, GROWTH.1);
+        let mut plot = Plot::new(method.name(), x, y);
+        plot.marks.push(Mark::Horizontal {
+            y: 1.0,
+            class: "ink",
+            label: "unstable above".to_owned(),
+            right: false,
+        });
+        for (substeps, (class, marker)) in SUBSTEPS.into_iter().zip(LOOKS) {
+            let predicted =
+                |period| period_matrix(&linear, method, substeps, period).spectral_radius();
+            let curve = (0..=200)
+                .map(|index| between(index, 200))
+                .map(|period| (period, predicted(period)))
+                .filter(|(_, growth)| *growth <= GROWTH.1);
+            plot.series.push(Series::line(class, curve));
+            let mut points = Vec::new();
+            for index in 0..=dots {
+                let period = between(index, dots);
+                let expected = predicted(period);
+                if expected > GROWTH.1 {
+                    continue;
+                }
+                let measured = growth_per_period(&setting, period, substeps);
+                self.csv.row(&[
+                    method.name().into(),
+                    u64::from(substeps).into(),
+                    period.into(),
+                    expected.into(),
+                    measured.into(),
+                ]);
+                let measured = measured.unwrap_or(f64::INFINITY);
+                if method != Method::Euler {
+                    let whole = period_matrix(&linear, method, 1, period).spectral_radius();
+                    self.apart = self.apart.max((expected / whole - 1.0).abs());
+                }
+                self.dots += 1;
+                self.furthest = self.furthest.max((measured / expected - 1.0).abs());
+                let told = format!(
+                    "{substeps} steps in {}: {measured:.5} measured, {expected:.5} predicted",
+                    seconds(period)
+                );
+                points.push(Point::new(period, measured, told));
+            }
+            plot.series.push(Series {
+                class,
+                marker,
+                line: false,
+                dashed: false,
+                points,
+            });
+        }
+        self.plots.push(plot);
+    }
+
+    pub(super) fn figure(&self) -> Figure {
+        let keys: Vec<Key> = SUBSTEPS
+            .into_iter()
+            .zip(LOOKS)
+            .map(|(substeps, (class, marker))| Key {
+                class,
+                marker,
+                dashed: false,
+                label: match substeps {
+                    1 => "1 step per period".to_owned(),
+                    more => format!("{more} steps per period"),
+                },
+            })
+            .collect();
+        Figure::new(
+            "control-period",
+            format!(
+                "1, 10 and 100 steps per control period give the same growth to {} % from order 2 on; {} measurements lie on their curves to {} %",
+                number(100.0 * self.apart),
+                self.dots,
+                number(100.0 * self.furthest)
+            ),
+            "2 links, shipped gains, effort held over the period. Curves: spectral radius of one control period of the linearised loop. \
+             Dots: how much a nudge of the arm itself grows per period, over 4000 periods. Only Euler with one step per period has a \
+             curve of its own.",
+            &keys,
+            &self.plots,
+        )
+    }
 }

@@ -5,6 +5,7 @@
 //!
 //! **Invariant:** no number in here that was not measured for this report.
 
+mod server;
 mod tables;
 
 use std::collections::HashMap;
@@ -14,8 +15,8 @@ use tables::{steps_table, table};
 
 use super::super::Desk;
 use super::super::csv::Csv;
-use super::super::section::{Block, Section, Verdict};
-use super::super::svg::{number, seconds};
+use super::super::section::{Block, Figure, Section, Verdict};
+use super::super::svg::{Bars, number, seconds};
 use super::super::timing::{Effort, Timing, time};
 use crate::math::arm::{Arm, State};
 use crate::math::expression::Expression;
@@ -63,6 +64,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
         findings: findings(&kinds, &counts),
         verdicts: verdicts(&counts, same_bits),
         blocks: vec![
+            Block::Figure(figure(&kinds, &counts)),
             Block::Table(table),
             Block::Table(steps_table(&kinds, &counts)),
         ],
@@ -203,6 +205,53 @@ where
     })
 }
 
+/// Bars of what a step and the server execute, and of how long a step takes.
+fn figure(kinds: &[Kind], counts: &Counts) -> Figure {
+    let of_kinds = |value: &dyn Fn(&Kind) -> Option<f64>| {
+        kinds
+            .iter()
+            .map(|kind| (kind.name.to_owned(), value(kind)))
+            .collect()
+    };
+    let server = [
+        ("paused", "server-paused"),
+        ("running, nobody listens", "server-running"),
+        ("1 subscriber", "server-1-subscriber"),
+        ("11 subscribers", "server-11-subscribers"),
+        ("error estimate", "server-error-estimate"),
+    ];
+    let panels = [
+        Bars {
+            title: "Instructions per step".to_owned(),
+            class: "c1",
+            rows: of_kinds(&|kind| counts.get(kind.name).map(|count| count.round())),
+        },
+        Bars {
+            title: "Time per step [ns]".to_owned(),
+            class: "c2",
+            rows: of_kinds(&|kind| Some(1e9 * kind.step_time())),
+        },
+        Bars {
+            title: "The server: million instructions per second".to_owned(),
+            class: "c3",
+            rows: server
+                .map(|(label, name)| (label.to_owned(), counts.get(name).map(|n| n / 1e6)))
+                .into(),
+        },
+    ];
+    let allocations = counts.get("allocations-in-steps").map_or_else(
+        || "Allocations were not counted.".to_owned(),
+        |count| format!("Allocations in these steps: {}.", number(*count)),
+    );
+    Figure::of_panels(
+        "left-out",
+        "What a step and the server do, scene by scene",
+        format!("Instructions by callgrind, time as the minimum of repeats. {allocations}"),
+        &[],
+        panels.iter().map(Bars::render).collect(),
+    )
+}
+
 fn findings(kinds: &[Kind], counts: &Counts) -> Vec<String> {
     let time = |name| {
         kinds
@@ -225,30 +274,82 @@ fn findings(kinds: &[Kind], counts: &Counts) -> Vec<String> {
     findings
 }
 
+/// Claims about a count: its name, its unit, and what it must be below. Whole numbers below one half are none.
+const BELOW: [(&str, &str, &str, f64); 5] = [
+    (
+        "A physics step allocates nothing",
+        "allocations-in-steps",
+        "allocations",
+        0.5,
+    ),
+    (
+        "The 1-DOF service runs none of the arm's code",
+        "arm-in-particle-rk4-constant",
+        "instructions a step",
+        0.5,
+    ),
+    (
+        "Nothing is encoded while nobody subscribes",
+        "server-running-json",
+        "instructions of JSON a second",
+        0.5,
+    ),
+    (
+        "The gateway does not wake while nothing is asked of it (less than once a second)",
+        "wakes-idle",
+        "wake-ups a second",
+        1.0,
+    ),
+    (
+        "Without its feature no web code is in the program",
+        "web-symbols-bare",
+        "symbols of HTTP and WebSocket",
+        0.5,
+    ),
+];
+
 fn verdicts(counts: &Counts, same_bits: bool) -> Vec<Verdict> {
     let mut verdicts = vec![Verdict {
         claim: "Leaving out the control law changes no bit".to_owned(),
         seen: "5000 steps of every method, 2 and 3 links".to_owned(),
         holds: same_bits,
     }];
-    if let Some(allocations) = counts.get("allocations-in-steps") {
+    for (claim, name, unit, bound) in BELOW {
+        if let Some(count) = counts.get(name) {
+            verdicts.push(Verdict {
+                claim: claim.to_owned(),
+                seen: format!("{} {unit}", number(*count)),
+                holds: *count < bound,
+            });
+        }
+    }
+    if let (Some((_, one)), Some((_, eleven))) = (
+        server::encoded(counts, "server-1-subscriber"),
+        server::encoded(counts, "server-11-subscribers"),
+    ) {
         verdicts.push(Verdict {
-            claim: "A physics step allocates nothing".to_owned(),
-            seen: format!("{} allocations", number(*allocations)),
-            holds: *allocations < 0.5,
+            claim: "A message is encoded once, for eleven subscribers as for one (within 1 %)"
+                .to_owned(),
+            seen: format!(
+                "{} and {} instructions of JSON a message",
+                number(eleven.round()),
+                number(one.round())
+            ),
+            holds: (eleven / one - 1.0).abs() <= 0.01,
         });
     }
     if let (Some(running), Some(paused)) =
         (counts.get("server-running"), counts.get("server-paused"))
     {
         verdicts.push(Verdict {
-            claim: "A paused server works less than a running one".to_owned(),
+            claim: "A paused server executes less than half the instructions of a running one"
+                .to_owned(),
             seen: format!(
-                "{} against {} million instructions a second",
+                "{} against {} million a second",
                 number(paused / 1e6),
                 number(running / 1e6)
             ),
-            holds: paused < running,
+            holds: paused < &(0.5 * running),
         });
     }
     verdicts

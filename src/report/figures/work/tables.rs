@@ -1,9 +1,10 @@
-//! The tables of work left out.
+//! The tables of work left out; the rows about the server are next door.
 //!
 //! **Invariant:** what was not counted for this report is called not measured.
 
 use super::super::super::section::{Cell, Table};
 use super::super::super::svg::{number, seconds};
+use super::server;
 use super::{Counts, Kind, STEPS, in_f64};
 
 /// Something left out: what, where, and the names of the counts with it and without it.
@@ -14,7 +15,7 @@ struct Row {
     without: &'static str,
 }
 
-const ROWS: [Row; 5] = [
+const ROWS: [Row; 4] = [
     Row {
         work: "Control law with the controller off",
         place: "math::simulation asks the law only while it is on",
@@ -23,13 +24,13 @@ const ROWS: [Row; 5] = [
     },
     Row {
         work: "Integral with ki = 0",
-        place: "not left out: one product and one clamp a joint",
+        place: "kept: what gathers at ki = 0 acts as soon as ki is set, so it must gather; one product and one clamp a joint",
         with: "step-2-rk4-pid",
         without: "step-2-rk4-pd",
     },
     Row {
         work: "Gravity load without gravity",
-        place: "not left out: one number that the recursion starts from, not a term of its own",
+        place: "nothing to leave out: the recursion starts from gravity as the acceleration of the base, two products whatever its value",
         with: "step-2-rk4-free",
         without: "step-2-rk4-weightless",
     },
@@ -39,21 +40,15 @@ const ROWS: [Row; 5] = [
         with: "step-3-rk4-free",
         without: "step-2-rk4-free",
     },
-    Row {
-        work: "Mass matrix in the 1-DOF service",
-        place: "math::particle knows no arm; here with a constant force, so that no formula is counted",
-        with: "step-2-rk4-free",
-        without: "particle-rk4-constant",
-    },
 ];
 
 const UNMEASURED: &str = "not measured in this run";
 
-fn unmeasured() -> Cell {
+pub(super) fn unmeasured() -> Cell {
     Cell::new(UNMEASURED).class("soft")
 }
 
-fn percent_saved(with: Option<f64>, without: Option<f64>) -> Cell {
+pub(super) fn percent_saved(with: Option<f64>, without: Option<f64>) -> Cell {
     match (with, without) {
         (Some(with), Some(without)) => Cell::new(format!(
             "{} %",
@@ -82,10 +77,8 @@ pub(super) fn table(kinds: &[Kind], counts: &Counts, same_bits: bool) -> Table {
     for row in &ROWS {
         table.rows.push(step_row(row, kinds, counts));
     }
-    table.rows.push(paused_row(counts));
-    table.rows.push(unheard_row(counts));
-    table.rows.push(encoding_row(counts));
-    table.rows.push(further_row(counts));
+    table.rows.push(particle_row(counts));
+    table.rows.extend(server::rows(counts));
     table.rows.push(allocation_row(counts));
     table.rows.push(vec![
         Cell::new("The same bits without the control law"),
@@ -98,32 +91,27 @@ pub(super) fn table(kinds: &[Kind], counts: &Counts, same_bits: bool) -> Table {
             Cell::new("bits differ").class("bad")
         },
     ]);
-    for (work, place) in NOT_COUNTED {
-        let row = [Cell::new(work), Cell::new(place), unmeasured()];
-        table.rows.push(
-            row.into_iter()
-                .chain([Cell::default(), Cell::default()])
-                .collect(),
-        );
-    }
     table
 }
 
-/// What has no count yet.
-const NOT_COUNTED: [(&str, &str); 3] = [
-    (
-        "Goal and trial timers while nothing is asked for",
-        "no count of it yet",
-    ),
-    (
-        "Local error estimate without a subscriber",
-        "no count of it yet",
-    ),
-    (
-        "Web code without its feature",
-        "there is no such feature to leave out",
-    ),
-];
+fn particle_row(counts: &Counts) -> Vec<Cell> {
+    let cell = |name| {
+        counts.get(name).map_or_else(unmeasured, |count| {
+            Cell::new(format!("{} instructions", number(count.round())))
+                .detail("of the arm's code, a step")
+        })
+    };
+    vec![
+        Cell::new("Mass matrix in the 1-DOF service"),
+        Cell::new("math::particle knows no arm: none of the arm's functions runs"),
+        cell("arm-in-step-2-rk4-free"),
+        cell("arm-in-particle-rk4-constant"),
+        percent_saved(
+            counts.get("arm-in-step-2-rk4-free").copied(),
+            counts.get("arm-in-particle-rk4-constant").copied(),
+        ),
+    ]
+}
 
 fn step_row(row: &Row, kinds: &[Kind], counts: &Counts) -> Vec<Cell> {
     let cell = |name| {
@@ -144,77 +132,6 @@ fn step_row(row: &Row, kinds: &[Kind], counts: &Counts) -> Vec<Cell> {
         cell(row.with),
         cell(row.without),
         percent_saved(count(row.with), count(row.without)),
-    ]
-}
-
-/// Instructions that the server executed per second, if they were counted.
-fn per_second(counts: &Counts, name: &str) -> Option<f64> {
-    counts.get(name).copied().filter(|count| *count > 0.0)
-}
-
-fn rate(count: Option<f64>, detail: &str) -> Cell {
-    count.map_or_else(unmeasured, |count| {
-        Cell::new(format!(
-            "{} million instructions a second",
-            number(count / 1e6)
-        ))
-        .detail(detail)
-    })
-}
-
-fn paused_row(counts: &Counts) -> Vec<Cell> {
-    let running = per_second(counts, "server-running");
-    let paused = per_second(counts, "server-paused");
-    vec![
-        Cell::new("Stepping while paused"),
-        Cell::new("actors::arm_sim asks the pacer for no steps"),
-        rate(running, "running, nobody subscribed"),
-        rate(paused, "paused"),
-        percent_saved(running, paused),
-    ]
-}
-
-fn unheard_row(counts: &Counts) -> Vec<Cell> {
-    let one = per_second(counts, "server-1-subscriber");
-    let none = per_second(counts, "server-running");
-    vec![
-        Cell::new("JSON that nobody subscribes to"),
-        Cell::new("the registry tells the arm which topics are wanted"),
-        rate(one, "one subscriber of /joint_states"),
-        rate(none, "none"),
-        percent_saved(one, none),
-    ]
-}
-
-fn encoding_row(counts: &Counts) -> Vec<Cell> {
-    let none = per_second(counts, "server-running");
-    let one = per_second(counts, "server-1-subscriber");
-    let eleven = per_second(counts, "server-11-subscribers");
-    // Were each subscriber's message encoded anew, ten more would cost ten times what the first one did.
-    let further = match (none, one, eleven) {
-        (Some(none), Some(one), Some(eleven)) => Cell::new(format!(
-            "a further one costs {} of the first",
-            number((eleven - one) / 10.0 / (one - none))
-        )),
-        _ => Cell::default(),
-    };
-    vec![
-        Cell::new("Encoding once more for each further subscriber"),
-        Cell::new("one frame of shared bytes goes to every outbox"),
-        rate(eleven, "eleven subscribers"),
-        rate(one, "one"),
-        further,
-    ]
-}
-
-fn further_row(counts: &Counts) -> Vec<Cell> {
-    let each = counts.get("allocations-per-subscriber");
-    vec![
-        Cell::new("Allocations for each further subscriber of a message"),
-        Cell::new("counting allocator, 10 against 110 subscribers"),
-        each.map_or_else(unmeasured, |each| Cell::new(number(*each))),
-        Cell::default(),
-        Cell::default(),
     ]
 }
 

@@ -1,0 +1,38 @@
+# Sourced by run.sh and peers/run.sh: where results go, and on what they were measured.
+# Needs: `root` (this project). Sets: `benches`, `built`. A kept run names the processor, never the machine or a path.
+
+benches=$root/benches
+built=${CARGO_TARGET_DIR:-$benches/target}/release
+
+say() { echo "bench: $*"; }
+fail() { echo "bench: $*" >&2; exit 1; }
+
+# The processor's name, as a file name.
+machine() {
+    local name
+    name=$(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1)
+    [ -n "$name" ] || name=$(uname -m)
+    echo "$name-$(getconf _NPROCESSORS_ONLN)-cores" | tr '[:upper:]' '[:lower:]' | tr -cs 'a-z0-9\n' '-'
+}
+
+# Where this run writes: a kept folder with KEEP=1, else one that is forgotten.
+results_folder() {
+    if [ "${KEEP:-}" = 1 ]; then
+        mkdir -p "$benches/results/$(date +%F)-$(machine)"
+        echo "$benches/results/$(date +%F)-$(machine)"
+    else
+        mkdir -p "$benches/target/results"
+        echo "$benches/target/results"
+    fi
+}
+
+# What the figures hang on. $1: the command that was given.
+environment() {
+    echo "command:   $1"
+    echo "date:      $(date -u +%FT%TZ)"
+    echo "commit:    $(git -C "$root" describe --always --dirty 2>/dev/null || echo unknown)"
+    echo "processor: $(sed -n 's/^model name[^:]*: //p' /proc/cpuinfo 2>/dev/null | head -n 1), $(getconf _NPROCESSORS_ONLN) cores"
+    echo "system:    $(uname -s) $(uname -r | cut -d- -f1)"
+    echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the release profile"
+    echo "load:      $(cut -d' ' -f1-3 /proc/loadavg 2>/dev/null || uptime) (1, 5, 15 minutes, at the start)"
+}

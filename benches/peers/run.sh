@@ -1,0 +1,107 @@
+#!/usr/bin/env bash
+# `make bench-peers`: the same 2- and 3-link rod arm in pendularm, Pinocchio and MuJoCo, checked, then timed, in one run.
+#
+# Installs both peers' headers and libraries from PyPI into benches/peers/.venv (nothing outside it is touched), compiles the programs
+# of this folder against them, compares all results, and only then times: every program in turn, PASSES times, on one
+# core. KEEP=1 keeps results and times in benches/results/<date>-<processor>/peers/. Needs python3, gcc and g++ (or CC, CXX).
+set -euo pipefail
+root=$(cd "$(dirname "$0")/../.." && pwd)
+source "$root/benches/common.sh"
+here=$benches/peers
+passes=${PASSES:-5}
+core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
+cc=${CC:-gcc}
+cxx=${CXX:-g++}
+pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }
+
+for tool in python3 "$cc" "$cxx" cargo; do
+    command -v "$tool" >/dev/null || fail "$tool is needed"
+done
+
+say "installing the peers into benches/peers/.venv"
+[ -x "$here/.venv/bin/python" ] || python3 -m venv "$here/.venv"
+if ! cmp -s "$here/requirements.txt" "$here/.venv/installed.txt"; then
+    "$here/.venv/bin/python" -m pip install --quiet --disable-pip-version-check --only-binary :all: --no-deps \
+        -r "$here/requirements.txt"
+    cp "$here/requirements.txt" "$here/.venv/installed.txt"
+fi
+packages=$("$here/.venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
+prefix=$packages/cmeel.prefix
+mujoco=$(echo "$packages"/mujoco/libmujoco.so.*)
+[ -e "$mujoco" ] || fail "the wheel of MuJoCo has no library for this system"
+
+# Compiles $1 from the source $2 with the rest, unless it is newer than source, harness and this script.
+program() {
+    local output=$benches/target/peers/$1 source=$here/$2
+    shift 2
+    if [ ! "$output" -nt "$source" ] || [ ! "$output" -nt "$here/harness.h" ] || [ ! "$output" -nt "$here/run.sh" ]; then
+        say "compiling ${output##*/}"
+        "$@" "$source" -o "$output" "${libraries[@]}"
+    fi
+}
+mkdir -p "$benches/target/peers"
+# The definitions are those of Pinocchio's own CMake files. Against the library: no -march, for the alignment of Eigen's
+# types hangs on it and must be the library's.
+pinocchio=("$cxx" -std=c++17 -O3 -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30
+    -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12
+    -isystem "$prefix/include" -isystem "$prefix/include/eigen3")
+libraries=(-L"$prefix/lib" -lpinocchio_default -Wl,-rpath,"$prefix/lib")
+program pinocchio-wheel pinocchio.cpp "${pinocchio[@]}" -DPINOCCHIO_ENABLE_TEMPLATE_INSTANTIATION
+libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
+program pinocchio-native pinocchio.cpp "${pinocchio[@]}" -march=native
+libraries=("$mujoco" -Wl,-rpath,"$(dirname "$mujoco")")
+program mujoco mujoco.c "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_C_SOURCE=200809L \
+    -isystem "$packages/mujoco/include"
+say "building ours (release)"
+(cd "$benches" && cargo build --release --locked --quiet --bin peers)
+
+folder=$(results_folder)/peers
+rm -rf "$folder"
+mkdir -p "$folder"
+cd "$folder"
+{
+    environment "make bench-peers"
+    echo "compilers: $("$cc" --version | head -n 1); $("$cxx" --version | head -n 1)"
+    echo "peers:     $(sed -n '/^libpinocchio\|^cmeel-eigen\|^mujoco/p' "$here/requirements.txt" | paste -sd ' ')"
+    echo "flags:     wheel: -O3; native, mujoco: -O3 -march=native; the wheels' libraries as they come"
+    echo "passes:    $passes, one pinned core, every program in turn"
+} >environment.txt
+
+# Runs a system by its name in the tables: $1 name, $2 links, $3 check or time.
+system() {
+    local states=states-$2.txt
+    case $1 in
+        pendularm) "$built/peers" "$3" "$2" "$states" ;;
+        "pinocchio wheel") "$benches/target/peers/pinocchio-wheel" "$1" "$2" "$states" "$3" ;;
+        "pinocchio native") "$benches/target/peers/pinocchio-native" "$1" "$2" "$states" "$3" ;;
+        mujoco) "$benches/target/peers/mujoco" "$1" "$2" "$states" "$3" ;;
+        "mujoco bare") "$benches/target/peers/mujoco" "$1" "$2" "$states" "$3" bare ;;
+    esac
+}
+export -f system
+export built benches
+systems=(pendularm "pinocchio wheel" "pinocchio native" mujoco "mujoco bare")
+
+for links in 2 3; do
+    "$built/peers" states "$links" >"states-$links.txt"
+    for name in "${systems[@]}"; do
+        system "$name" "$links" check >"check-$links-$name.txt"
+    done
+done
+echo 'system,links,"what",shortest_ns,median_ns' >times.csv
+for ((pass = 1; pass <= passes; pass++)); do
+    say "pass $pass of $passes, core $core"
+    for links in 2 3; do
+        for name in "${systems[@]}"; do
+            # shellcheck disable=SC2016 # expanded by the inner shell
+            pinned bash -c 'system "$@"' bash "$name" "$links" time >>times.csv
+        done
+    done
+done
+{
+    cat environment.txt
+    echo
+    "$built/peers" compare .
+} | tee summary.txt
+# Kept are times and verdict; the results can be made again, to the bit.
+[ "${KEEP:-}" != 1 ] || { rm -f check-*.txt states-*.txt; say "kept in benches/results/$(basename "$(dirname "$folder")")/peers"; }

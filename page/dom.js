@@ -1,0 +1,23 @@
+// Makes elements from code: text is always text, never markup, whatever the runtime sends.
+// Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need.
+
+/** `el("p", { class: "note" }, "text", child)`; `on...` properties are listeners. */
+export function el(tag, attributes = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [name, value] of Object.entries(attributes)) {
+    if (name.startsWith("on")) element.addEventListener(name.slice(2), value);
+    else if (value === true) element.setAttribute(name, "");
+    else if (value !== false && value != null) element.setAttribute(name, value);
+  }
+  element.append(...children);
+  return element;
+}
+
+export function byId(id) {
+  return document.getElementById(id);
+}
+
+/** Writes text only where it differs: most readouts stay as they are from one time to the next. */
+export function setText(element, text) {
+  if (element.textContent !== text) element.textContent = text;
+}

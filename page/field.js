@@ -1,0 +1,122 @@
+// A number that belongs to the runtime: label, slider, input, and what the runtime said to the last change.
+// Invariant: what stands in the field is the value in force, except while somebody is changing it.
+
+import { warn } from "./announce.js";
+import { el, setText } from "./dom.js";
+import { plain } from "./format.js";
+import { latestOnly } from "./latest.js";
+
+const SLIDER_STEPS = 400;
+const SEND_MS = 70;
+let nextId = 1;
+
+/** Where a refusal is shown; `describes` are the controls that it is about. */
+export function refusal(...describes) {
+  const text = el("p", { class: "refusal", id: `refusal-${nextId}` });
+  nextId += 1;
+  for (const one of describes) one.setAttribute("aria-describedby", text.id);
+  return {
+    element: text,
+    show(status) {
+      setText(text, status);
+      for (const one of describes) {
+        if (status) one.setAttribute("aria-invalid", "true");
+        else one.removeAttribute("aria-invalid");
+      }
+      if (status) warn(status);
+    },
+  };
+}
+
+/**
+ * @param {object} options
+ * @param {string} options.label what it is, for everybody
+ * @param {string} [options.short] what is shown instead of the label, where its place says the rest
+ * @param {string} options.unit
+ * @param {number} options.low left end of the slider @param {number} options.high right end
+ * @param {boolean} [options.log] whether the slider goes by ratios; with `low` > 0, or `zero` at its left end
+ * @param {boolean} [options.zero] whether the left end means 0
+ * @param {(value: number) => Promise<{result: boolean, status: string}>} options.commit
+ */
+export function numberField({ label, short = label, unit, low, high, log = false, zero = false, commit, className = "" }) {
+  const id = `field-${nextId}`;
+  nextId += 1;
+  const input = el("input", { type: "number", step: "any", id, inputmode: "decimal", autocomplete: "off" });
+  const slider = el("input", { type: "range", min: "0", max: String(SLIDER_STEPS), step: "1", "aria-label": `${label}, slider`, class: className });
+  slider.value = String(SLIDER_STEPS / 2);
+  input.placeholder = "–"; // until the runtime has said
+  const said = refusal(input);
+  let accepted = NaN;
+  let pending = 0;
+
+  const fromSlider = (at) => {
+    if (zero && at === 0) return 0;
+    const part = at / SLIDER_STEPS;
+    return Number((log ? low * (high / low) ** part : low + part * (high - low)).toPrecision(3));
+  };
+  const toSlider = (value) => {
+    const part = log ? Math.log(Math.max(value, low) / low) / Math.log(high / low) : (value - low) / (high - low);
+    return Math.round(SLIDER_STEPS * Math.min(1, Math.max(0, part)));
+  };
+  const show = () => {
+    if (pending > 0) return;
+    input.value = plain(accepted);
+    slider.value = String(toSlider(accepted));
+    slider.setAttribute("aria-valuetext", `${plain(accepted)} ${unit}`);
+  };
+  const submit = async (value) => {
+    pending += 1;
+    const answer = await commit(value);
+    pending -= 1;
+    said.show(answer.result ? "" : answer.status);
+    show();
+  };
+  const slide = latestOnly(submit, SEND_MS);
+
+  slider.addEventListener("input", () => {
+    input.value = plain(fromSlider(Number(slider.value)));
+    slide(Number(input.value));
+  });
+  const typed = () => {
+    if (input.value === plain(accepted)) return;
+    if (input.value === "") {
+      said.show(`${label} must be a number`);
+      show();
+    } else {
+      submit(Number(input.value));
+    }
+  };
+  input.addEventListener("change", typed);
+  input.addEventListener("keydown", (event) => {
+    if (event.key !== "Escape") return;
+    show();
+    said.show("");
+  });
+
+  return {
+    element: el("div", { class: "field" },
+      el("label", { for: id, title: label }, el("span", { class: "visually-hidden" }, label), el("span", { "aria-hidden": "true" }, short)),
+      slider, input, el("span", { class: "unit" }, unit), said.element),
+    input,
+    /** The runtime's value. Not shown while its own change is under way or somebody types. */
+    accept(value) {
+      if (value === accepted) return;
+      const typing = document.activeElement === input && input.value !== plain(accepted);
+      accepted = value;
+      if (!typing) show();
+    },
+    value: () => accepted,
+    refuse: said.show,
+  };
+}
+
+/** A number that only a later request needs: nothing is sent when it changes. Empty: left out. */
+export function option({ label, unit = "", value = "", placeholder = "" }) {
+  const input = el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
+  return {
+    element: el("label", { class: "option" }, el("span", {}, label), el("span", { class: "with-unit" }, input, el("span", { class: "unit" }, unit))),
+    input,
+    /** `undefined` where nothing is given. */
+    number: () => (input.value === "" ? undefined : Number(input.value)),
+  };
+}

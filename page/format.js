@@ -1,0 +1,37 @@
+// Numbers as people read them: few digits, a true minus, powers of ten where a number is huge or tiny.
+// Invariant: a value that is not finite is shown as a dash, never as text of the language.
+
+const MINUS = "\u2212";
+
+export function fixed(value, digits) {
+  if (!Number.isFinite(value)) return "–";
+  if (Math.abs(value) >= 1e6) return significant(value, 3);
+  const text = value.toFixed(digits);
+  return text.startsWith("-") ? (Number(text) === 0 ? text.slice(1) : MINUS + text.slice(1)) : text;
+}
+
+export function significant(value, digits) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e6 || size < 1e-4) {
+    const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
+    return `${Number(mantissa)}e${Number(exponent)}`.replace(/-/g, MINUS);
+  }
+  return String(Number(value.toPrecision(digits))).replace("-", MINUS);
+}
+
+/** Seconds in the unit that suits them: 500 µs, 4.2 ms, 1 s. */
+export function duration(seconds) {
+  if (!Number.isFinite(seconds)) return "–";
+  const size = Math.abs(seconds);
+  if (size === 0 || size >= 1) return `${significant(seconds, 3)} s`;
+  if (size >= 1e-3) return `${significant(seconds * 1e3, 3)} ms`;
+  if (size >= 1e-6) return `${significant(seconds * 1e6, 3)} µs`;
+  return `${significant(seconds * 1e9, 3)} ns`;
+}
+
+/** A number that an input can hold and a student can edit. */
+export function plain(value) {
+  return Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "";
+}

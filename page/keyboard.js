@@ -1,0 +1,93 @@
+// Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
+// Invariant: no shortcut acts while somebody types, and all can be switched off.
+
+import { announce } from "./announce.js";
+import { METHODS, chooseJoint, nudgeSetpoint, push, switchServo } from "./controls.js";
+import { byId, el } from "./dom.js";
+import { togglePlots } from "./plots.js";
+import { cancelGoal, setIntegrator } from "./runtime.js";
+import { state } from "./store.js";
+import { resetArm, setPaused, singleStep, togglePause } from "./transport.js";
+
+const NUDGE = 0.05; // rad, as on the classic page
+/** A held key repeats faster than a push is worth sending. */
+const PUSH_MS = 90;
+const SWITCH = "pendularm-shortcuts";
+
+let stoppedByZero = false;
+let lastPush = -Infinity;
+let lastSign = 0;
+
+const shortcuts = [
+  ["0", "no integrator: pause", () => { stoppedByZero = true; setPaused(true); }],
+  ...METHODS.map(([method, name], i) => [String(i + 1), name, () => useMethod(method, name)]),
+  ["a", "push the joint counter-clockwise", () => pushNow(1)],
+  ["d", "push the joint clockwise", () => pushNow(-1)],
+  ["q", "setpoint of the joint − 0.05 rad", () => nudgeSetpoint(-NUDGE)],
+  ["e", "setpoint of the joint + 0.05 rad", () => nudgeSetpoint(NUDGE)],
+  ["c", "servo on", () => switchServo(true)],
+  ["x", "servo on", () => switchServo(true)],
+  ["s", "servo off", () => switchServo(false)],
+  ["j", "next joint", () => { chooseJoint(state.joint + 1); announce(`Joint ${state.joint + 1}.`); }],
+  [" ", "pause or run", togglePause],
+  [".", "single step", singleStep],
+  ["r", "reset", resetArm],
+  ["g", "cancel the goal", cancelGoal],
+  ["p", "pause the plots", togglePlots],
+  ["?", "this list", toggleHelp],
+];
+const actions = new Map(shortcuts.map(([key, , act]) => [key, act]));
+
+/** After key 0, choosing an integrator sets the arm going again, as it did there. */
+async function useMethod(method, name) {
+  const goOn = stoppedByZero;
+  stoppedByZero = false;
+  if ((await setIntegrator({ method })).result) announce(`${name}.`);
+  if (goOn) setPaused(false);
+}
+
+function pushNow(sign) {
+  const now = performance.now();
+  if (sign === lastSign && now - lastPush < PUSH_MS) return;
+  lastPush = now;
+  lastSign = sign;
+  push(sign);
+}
+
+export function startKeyboard() {
+  const rows = shortcuts.map(([key, text]) => el("tr", {}, el("td", {}, el("kbd", {}, key === " " ? "space" : key)), el("td", {}, text)));
+  rows.push(el("tr", {}, el("td", {}, el("kbd", {}, "← ↑ ↓ →")), el("td", {}, "in the view: move the target; with shift, the setpoint")));
+  byId("help-keys").append(...rows);
+  byId("help-button").addEventListener("click", toggleHelp);
+  byId("help-close").addEventListener("click", toggleHelp);
+  const box = byId("shortcuts-on");
+  try {
+    box.checked = localStorage.getItem(SWITCH) !== "off";
+    box.addEventListener("change", () => localStorage.setItem(SWITCH, box.checked ? "on" : "off"));
+  } catch {
+    // then the choice lasts as long as the page
+  }
+  document.addEventListener("keydown", pressed);
+}
+
+function pressed(event) {
+  if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing) return;
+  const { target, key } = event;
+  const typing = target.matches("input:not([type=range], [type=radio], [type=checkbox]), select, textarea");
+  // What has the focus keeps the keys that it needs itself.
+  const own = key === " " && target.matches("button, input, summary, select");
+  if (typing || own) return;
+  if (!byId("shortcuts-on").checked && key !== "?") return;
+  if (byId("help").open && key !== "?") return;
+  const act = actions.get(key.length === 1 ? key.toLowerCase() : key);
+  if (!act) return;
+  event.preventDefault();
+  if (event.repeat && !["a", "d", "q", "e", "."].includes(key.toLowerCase())) return;
+  act();
+}
+
+function toggleHelp() {
+  const help = byId("help");
+  if (help.open) help.close();
+  else help.showModal();
+}

@@ -1,0 +1,69 @@
+// The arm's geometry, gravity load and energy from its state, for drawing only: the runtime reckons the motion.
+// Angles in rad, each relative to the link before; link i has length l[i], mass m[i], its centre in the middle.
+// Invariant: nothing is allocated; results go into arrays that the caller owns.
+
+/** Ends of each link into `x`, `y`: entry 0 is the base, entry i the end of link i. */
+export function joints(n, q, l, x, y) {
+  let phi = 0;
+  x[0] = 0;
+  y[0] = 0;
+  for (let i = 0; i < n; i += 1) {
+    phi += q[i];
+    x[i + 1] = x[i] + l[i] * Math.cos(phi);
+    y[i + 1] = y[i] + l[i] * Math.sin(phi);
+  }
+}
+
+/** Gravity load G(q) [N m] into `load` from index `at`: the effort that holds the arm still. */
+export function gravityLoad(n, q, arm, load, at = 0) {
+  const { gravity, masses, lengths } = arm;
+  let phi = 0;
+  for (let i = 0; i < n; i += 1) phi += q[i];
+  let beyond = 0; // mass beyond link k
+  let sum = 0;
+  for (let k = n - 1; k >= 0; k -= 1) {
+    sum += (masses[k] / 2 + beyond) * lengths[k] * Math.cos(phi);
+    load[at + k] = gravity * sum;
+    beyond += masses[k];
+    phi -= q[k];
+  }
+}
+
+/** Kinetic and potential energy together [J]; 0 at rest in the starting pose. */
+export function energy(n, q, qd, arm) {
+  const { gravity, masses, lengths } = arm;
+  let phi = 0;
+  let omega = 0;
+  let vx = 0; // velocity of the joint before the link
+  let vy = 0;
+  let y = 0;
+  let total = 0;
+  for (let i = 0; i < n; i += 1) {
+    phi += q[i];
+    omega += qd[i];
+    const c = (lengths[i] * Math.cos(phi)) / 2;
+    const s = (lengths[i] * Math.sin(phi)) / 2;
+    const cx = vx - s * omega;
+    const cy = vy + c * omega;
+    const spin = (lengths[i] * lengths[i] * omega * omega) / 12;
+    total += masses[i] * ((cx * cx + cy * cy + spin) / 2 + gravity * (y + s));
+    vx -= 2 * s * omega;
+    vy += 2 * c * omega;
+    y += 2 * s;
+  }
+  return total;
+}
+
+export function reach(lengths) {
+  return lengths.reduce((sum, one) => sum + one, 0);
+}
+
+/** Radius of the disc around the base that the tip can't enter; 0 where there is none. */
+export function innerReach(lengths) {
+  return Math.max(0, 2 * Math.max(...lengths) - reach(lengths));
+}
+
+/** `angle` shifted by whole turns to within pi of `near`. */
+export function nearestTurn(angle, near) {
+  return angle + 2 * Math.PI * Math.round((near - angle) / (2 * Math.PI));
+}

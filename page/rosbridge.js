@@ -1,0 +1,109 @@
+// A rosbridge client over WebSocket: calls as promises, subscriptions that outlive a lost connection.
+// Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason where there is no answer.
+
+const FIRST_RETRY_MS = 300;
+const LAST_RETRY_MS = 4000;
+const CALL_TIMEOUT_MS = 15000;
+/** Calls that may wait for an answer; a runtime that answers nothing must not fill the memory. */
+const MOST_CALLS = 256;
+
+export class Rosbridge {
+  /** @param {string} url @param {(state: "connecting"|"open"|"lost") => void} onState */
+  constructor(url, onState) {
+    this.url = url;
+    this.onState = onState;
+    this.handlers = new Map(); // topic -> function
+    this.calls = new Map(); // id -> { settle, timer }
+    this.nextId = 1;
+    this.retryMs = FIRST_RETRY_MS;
+    this.onStatus = () => {};
+    this.connect();
+  }
+
+  get open() {
+    return this.socket.readyState === WebSocket.OPEN;
+  }
+
+  connect() {
+    this.onState("connecting");
+    const socket = new WebSocket(this.url);
+    this.socket = socket;
+    socket.onopen = () => {
+      this.retryMs = FIRST_RETRY_MS;
+      // Errors about what we publish are worth showing; over WebSocket they come only when asked for.
+      this.send({ op: "set_level", level: "error" });
+      for (const topic of this.handlers.keys()) this.send({ op: "subscribe", topic });
+      this.onState("open");
+    };
+    socket.onmessage = (event) => this.receive(event.data);
+    socket.onclose = () => this.lost();
+  }
+
+  lost() {
+    for (const id of [...this.calls.keys()]) this.answer(id, failure("the connection was lost"));
+    this.onState("lost");
+    const wait = this.retryMs * (0.75 + 0.5 * Math.random()); // many pages must not all return at once
+    this.retryMs = Math.min(2 * this.retryMs, LAST_RETRY_MS);
+    setTimeout(() => this.connect(), wait);
+  }
+
+  receive(text) {
+    let frame;
+    try {
+      frame = JSON.parse(text);
+    } catch {
+      return;
+    }
+    if (frame.op === "publish") {
+      const handler = this.handlers.get(frame.topic);
+      if (handler) handler(frame.msg);
+    } else if (frame.op === "service_response") {
+      this.answer(frame.id, frame);
+    } else if (frame.op === "status" && frame.level === "error") {
+      this.onStatus(String(frame.msg));
+    }
+  }
+
+  answer(id, { values, result, status }) {
+    const call = this.calls.get(id);
+    if (!call) return;
+    this.calls.delete(id);
+    clearTimeout(call.timer);
+    call.settle({ values: values ?? {}, result: result === true, status: status ?? "" });
+  }
+
+  send(frame) {
+    if (this.open) this.socket.send(JSON.stringify(frame));
+  }
+
+  subscribe(topic, handler) {
+    this.handlers.set(topic, handler);
+    this.send({ op: "subscribe", topic });
+  }
+
+  publish(topic, msg) {
+    this.send({ op: "publish", topic, msg });
+  }
+
+  /** @returns {Promise<{values: object, result: boolean, status: string}>} */
+  call(service, args = {}, timeoutMs = CALL_TIMEOUT_MS) {
+    if (!this.open) return Promise.resolve(failure("not connected"));
+    if (this.calls.size >= MOST_CALLS) return Promise.resolve(failure("too many calls wait for an answer"));
+    const id = `page-${this.nextId}`;
+    this.nextId += 1;
+    return new Promise((settle) => {
+      const timer = setTimeout(() => this.answer(id, failure(`${service} did not answer in time`)), timeoutMs);
+      this.calls.set(id, { settle, timer });
+      this.send({ op: "call_service", service, id, args });
+    });
+  }
+}
+
+function failure(status) {
+  return { values: {}, result: false, status };
+}
+
+/** Whether an answer says that nobody provides the service. */
+export function nobodyProvides(answer) {
+  return !answer.result && /no provider|not served|does not exist/i.test(answer.status);
+}

@@ -1,0 +1,49 @@
+// What the page knows about the runtime, in one place; whoever shows a part of it watches that part.
+// Invariant: only what the runtime has said is stored here, never what was merely asked for.
+
+export const MOST_LINKS = 3;
+
+export const state = {
+  connection: "connecting", // or "open", "lost"
+  links: 0, // 0 until the runtime has said
+  // The latest joint state. Written in place 60 times a second; `version` counts them.
+  version: 0,
+  time: 0, // s, simulation time
+  position: new Float64Array(MOST_LINKS), // rad
+  velocity: new Float64Array(MOST_LINKS), // rad/s
+  effort: new Float64Array(MOST_LINKS), // N m
+  rate: 0, // joint states per second
+  // The setpoint is known once somebody has sent one, or after a reset.
+  setpoint: new Float64Array(MOST_LINKS), // rad
+  setpointKnown: false,
+  params: null, // { gravity, masses, lengths }
+  integrator: null, // { method, timestep }
+  gains: null, // { kp, ki, kd }
+  paused: null,
+  enabled: null, // is PID on
+  diagnostics: null, // { level, message, state, ...numbers }
+  stability: null, // values of /study/stability
+  stabilityMissing: false,
+  estimate: null, // message of /arm_sim/error_estimate
+  goal: null, // { id, target, epsilon, distance, elapsed, outcome }
+  trial: null, // message of /ik_trial/status
+  joint: 0, // the joint that keys and the phase plot are about
+};
+
+const watchers = new Map(); // key -> functions
+
+export function watch(key, react) {
+  if (!watchers.has(key)) watchers.set(key, []);
+  watchers.get(key).push(react);
+}
+
+export function set(key, value) {
+  state[key] = value;
+  tell(key);
+}
+
+/** Tells those who watch `key`; for what is written in place. */
+export function tell(key) {
+  const reacts = watchers.get(key);
+  if (reacts) for (const react of reacts) react(state[key]);
+}

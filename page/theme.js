@@ -1,0 +1,52 @@
+// Light and dark, and the colours that the canvases take from the style sheet.
+// Invariant: colours are spelled in `style.css` only.
+
+import { byId } from "./dom.js";
+
+const KEY = "pendularm-theme";
+const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "first", "second"];
+const dark = matchMedia("(prefers-color-scheme: dark)");
+const listeners = [];
+
+/** Colours by name, always of the present theme; `joints` in joint order. */
+export const colors = { joints: [] };
+
+export function onTheme(react) {
+  listeners.push(react);
+}
+
+function read() {
+  const style = getComputedStyle(document.documentElement);
+  for (const name of NAMES) colors[name] = style.getPropertyValue(`--${name}`).trim();
+  colors.joints = [colors.joint1, colors.joint2, colors.joint3];
+  for (const react of listeners) react();
+}
+
+function stored() {
+  try {
+    return localStorage.getItem(KEY);
+  } catch {
+    return null; // storage may be forbidden
+  }
+}
+
+function apply(choice) {
+  if (choice) document.documentElement.dataset.theme = choice;
+  else delete document.documentElement.dataset.theme;
+  read();
+}
+
+export function startTheme() {
+  apply(stored());
+  dark.addEventListener("change", read);
+  byId("theme").addEventListener("click", () => {
+    const isDark = (document.documentElement.dataset.theme ?? (dark.matches ? "dark" : "light")) === "dark";
+    const choice = isDark ? "light" : "dark";
+    try {
+      localStorage.setItem(KEY, choice);
+    } catch {
+      // then the choice lasts as long as the page
+    }
+    apply(choice);
+  });
+}

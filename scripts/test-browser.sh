@@ -1,0 +1,18 @@
+#!/usr/bin/env bash
+# The page, tried in headless Chromium (Debian's `chromium`), which is installed if it is missing and this may be done.
+# Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's `browser/`.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+if ! command -v chromium >/dev/null; then
+    echo "test-browser: installing chromium"
+    apt-get update && apt-get install -y --no-install-recommends chromium || {
+        echo "test-browser: no chromium: install it, or put one on the PATH under that name" >&2
+        exit 1
+    }
+fi
+
+"${CARGO:-cargo}" build --locked
+target=${CARGO_TARGET_DIR:-target}
+PENDULARM="$target/debug/pendularm" ARTEFACTS="$target/browser" PYTHONDONTWRITEBYTECODE=1 python3 tests/browser/run.py "$@"
+echo "test-browser: screenshots are in $target/browser/"

@@ -1,0 +1,118 @@
+"""Starts and stops the runtime under test, and speaks to it over TCP past the page.
+
+Invariant: the process that was started is the one that is stopped, by its id.
+"""
+
+import json
+import math
+import os
+import signal
+import socket
+import subprocess
+import threading
+
+BINARY = os.environ.get("PENDULARM", "target/debug/pendularm")
+
+
+class Runtime:
+    """A pendularm process; use it with `with`. Without a port it takes a free one, and keeps it through `restart`."""
+
+    def __init__(self, *options, links=2, port=0):
+        self.options, self.links, self.port = options, links, port
+        self.start()
+
+    def start(self):
+        command = [BINARY, "--links", str(self.links), "--bind", f"127.0.0.1:{self.port}", "--seed", "7", *self.options]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        line = self.process.stdout.readline()
+        if not line.startswith("listening on "):
+            raise RuntimeError(f"{command}: said {line!r}, status {self.process.wait(5)}")
+        self.port = int(line.rsplit(":", 1)[1])
+
+    def stop(self):
+        self.process.send_signal(signal.SIGTERM)
+        self.process.wait(5)
+        self.process.stdout.close()
+
+    def restart(self, links=None):
+        self.stop()
+        self.links = links or self.links
+        self.start()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        if self.process.poll() is None:
+            self.stop()
+
+    @property
+    def url(self):
+        return f"http://127.0.0.1:{self.port}/"
+
+    def call(self, service, **args):
+        """The response to a call over raw TCP."""
+        with socket.create_connection(("127.0.0.1", self.port), 5) as tcp, tcp.makefile("rw") as lines:
+            lines.write(json.dumps({"op": "call_service", "service": service, "args": args}) + "\n")
+            lines.flush()
+            while (frame := json.loads(lines.readline()))["op"] != "service_response":
+                pass
+            return frame
+
+    def offers(self, service):
+        """Whether anybody provides the service."""
+        answer = self.call(service)
+        return answer["result"] or "no provider" not in answer["status"]
+
+    def next(self, topic):
+        """The next message on a topic."""
+        with socket.create_connection(("127.0.0.1", self.port), 5) as tcp, tcp.makefile("rw") as lines:
+            lines.write(json.dumps({"op": "subscribe", "topic": topic}) + "\n")
+            lines.flush()
+            while (frame := json.loads(lines.readline()))["op"] != "publish":
+                pass
+            return frame["msg"]
+
+    def joints(self):
+        """Where each link ends [m], from the published state and the lengths: the base first, the tip last."""
+        lengths = self.call("/arm_sim/set_params")["values"]["lengths"]
+        ends, angle = [(0.0, 0.0)], 0.0
+        for length, q in zip(lengths, self.next("/joint_states")["position"]):
+            angle += q
+            x, y = ends[-1]
+            ends.append((x + length * math.cos(angle), y + length * math.sin(angle)))
+        return ends
+
+    def tip(self):
+        return self.joints()[-1]
+
+
+class Provider:
+    """A client that provides services, each a function from arguments to values; use it with `with`."""
+
+    def __init__(self, port, services):
+        self.tcp = socket.create_connection(("127.0.0.1", port), 5)
+        self.tcp.settimeout(None)
+        # For reading only: writing through the same object would drop the lines that it has read ahead.
+        self.lines = self.tcp.makefile("r")
+        self.services = services
+        for name in services:
+            self._send({"op": "advertise_service", "service": name})
+        threading.Thread(target=self._answer, daemon=True).start()
+
+    def _send(self, frame):
+        self.tcp.sendall(json.dumps(frame).encode() + b"\n")
+
+    def _answer(self):
+        for line in self.lines:
+            call = json.loads(line)
+            if call["op"] == "call_service":
+                values = self.services[call["service"]](call["args"])
+                self._send({"op": "service_response", "service": call["service"], "id": call["id"], "values": values, "result": True})
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.tcp.shutdown(socket.SHUT_RDWR)
+        self.tcp.close()

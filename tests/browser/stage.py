@@ -1,0 +1,97 @@
+"""What every browser test stands on: one browser for all, a runtime and a page for each, and a silent console at the end.
+
+Invariant: a test passes only if its page's console said nothing: no exception, no error, no violation of the policy.
+"""
+
+import os
+import pathlib
+import time
+import unittest
+
+from chromium import Browser
+from png import Image, named
+from runtime import Runtime
+
+ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
+# A host name that is ours in this browser only: a page from there is foreign, since its origin is no loopback address.
+FOREIGN = "elsewhere.example"
+
+_browser = None
+
+
+def browser():
+    global _browser
+    if _browser is None:
+        _browser = Browser(extra=[f"--host-resolver-rules=MAP {FOREIGN} 127.0.0.1"])
+    return _browser
+
+
+def close_browser():
+    if _browser is not None:
+        _browser.__exit__()
+
+
+class PageTest(unittest.TestCase):
+    """A runtime with `links` links and a page on it, connected."""
+
+    links = 2
+    view = {}
+
+    def setUp(self):
+        self.runtime = Runtime(links=self.links)
+        self.addCleanup(self.runtime.__exit__)
+        self.page = self.open(**self.view)
+
+    def open(self, fragment="", **view):
+        page = browser().page(self.runtime.url + fragment, **view)
+        self.addCleanup(page.close)
+        self.addCleanup(lambda: self.assertEqual(page.complaints, []))
+        self.connected(page)
+        return page
+
+    def connected(self, page=None, links=None):
+        page = page or self.page
+        page.until("document.querySelector('#connection').className === 'pill open'", why="connected")
+        page.until(f"document.querySelectorAll('#kp-fields input[type=number]').length === {links or self.links}")
+        page.until("document.querySelector('#kp-fields input[type=number]').value !== ''", why="gains shown")
+
+    def keep(self, name, **how):
+        """A screenshot, kept as an artefact."""
+        ARTEFACTS.mkdir(parents=True, exist_ok=True)
+        return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
+
+    def image(self, selector):
+        """What the element looks like now."""
+        box = self.page.run(
+            f"(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}});"
+            " const b = e.getBoundingClientRect(); return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()")
+        return Image(self.page.screenshot(clip=[round(one) for one in box]))
+
+    def color(self, name):
+        """A colour of the style sheet, in the theme that is on."""
+        return named(self.page.run(f"getComputedStyle(document.documentElement).getPropertyValue('--{name}').trim()"))
+
+    def settle(self, positions):
+        """The servo holds the arm at `positions`, and then it is paused: a picture that does not change."""
+        self.runtime.call("/pid_controller/enable", data=True)
+        self.page.run(f"""import('/runtime.js').then((arm) => arm.sendSetpoint({positions}))""")
+        self.wait(lambda: all(abs(q - p) < 2e-3 for q, p in zip(self.runtime.next("/joint_states")["position"], positions)), "settled")
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+
+    def wait(self, done, why, seconds=15):
+        """Waits for something of the runtime."""
+        end = time.monotonic() + seconds
+        while not done():
+            if time.monotonic() > end:
+                self.fail(f"after {seconds} s still not: {why}")
+            time.sleep(0.05)
+
+    def on_canvas(self, place):
+        """Where a place in metres is on the page, in CSS pixels; the same sums as the page's, written again."""
+        lengths = self.runtime.call("/arm_sim/set_params")["values"]["lengths"]
+        self.page.run("document.querySelector('#arm').scrollIntoView({block: 'center'})")
+        left, top, width, height = self.page.run(
+            "(() => { const b = document.querySelector('#arm').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        scale = min(width, height) / (2 * 1.14 * sum(lengths))
+        return left + width / 2 + scale * place[0], top + height / 2 - scale * place[1]

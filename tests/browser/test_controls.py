@@ -1,0 +1,324 @@
+"""What is done: drags, settings, refusals, keys, the trial, the comparison; the runtime is asked what came of it."""
+
+import math
+
+from runtime import Provider
+from stage import PageTest
+
+NUMBER = "input[type=number]"
+
+
+def stability(_):
+    """Limits as the study would answer them; the numbers are made up."""
+    return {"timestep_limit_held": 0.018, "timestep_limit_continuous": 0.024, "minimum_over_poses_held": 0.009,
+            "minimum_over_poses_continuous": 0.012, "advised_timestep": 0.004}
+
+
+def rollout(args):
+    """A swing as the study would answer it, made up; Euler's grows."""
+    count = round(args["duration"] / args["timestep"])
+    times = [k * args["timestep"] for k in range(0, count + 1, max(1, count // (args["samples"] - 1)))]
+    growth = 0.2 if args["integrator"] == "euler" else 0.0
+    joints = range(len(args["q0"]))
+    phase = [[(2 + i) * t for i in joints] for t in times]
+    return {
+        "times": times,
+        "positions": [[math.exp(growth * t) * math.cos(a) - 1.5 for a in p] for t, p in zip(times, phase)],
+        "velocities": [[math.exp(growth * t) * (growth * math.cos(a) - (2 + i) * math.sin(a)) for i, a in enumerate(p)] for t, p in zip(times, phase)],
+        "efforts": [[0 for _ in joints] for _ in times], "energy": [growth * t for t in times],
+        "evaluations": count, "wall_time": 1e-3, "error": growth,
+    }
+
+
+class Controls(PageTest):
+    def values(self, service):
+        return self.runtime.call(service)["values"]
+
+    def field(self, name, joint=None):
+        return f"#{name} {NUMBER}" if joint is None else f"#{name} .field:nth-of-type({joint}) {NUMBER}"
+
+    # The view
+
+    def test_a_drag_sends_the_tip_to_where_it_ends(self):
+        self.page.click("#servo")
+        self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((0.7, 1.2)))
+        self.wait(lambda: math.dist(self.runtime.tip(), (0.7, 1.2)) < 0.02, "tip at the target")
+        self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
+
+    def test_a_shift_drag_places_the_setpoint_without_a_goal(self):
+        self.page.click("#servo")
+        self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)), shift=True)
+        self.wait(lambda: math.dist(self.runtime.tip(), (-0.4, 1.3)) < 0.02, "tip at the setpoint")
+        self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
+
+    def test_a_target_out_of_reach_is_refused_in_words(self):
+        self.page.drag(self.on_canvas((1.5, 0.0)), self.on_canvas((2.2, 0.3)))
+        refusal = self.page.until("document.querySelector('#goal-body .refusal').textContent", why="refusal shown")
+        # What the runtime says itself to such a goal.
+        said = self.runtime.call("/ik_action/send_goal", x=9, y=0)["status"]
+        self.assertEqual(refusal.split(" ")[0], said.split(" ")[0])
+        self.page.until("document.querySelector('#announce-assertive').textContent !== ''")
+
+    def test_arrow_keys_in_the_view_move_the_target(self):
+        self.page.click("#servo")
+        self.page.run("document.querySelector('#arm').focus()")
+        self.runtime.call("/arm_sim/reset")
+        for _ in range(4):
+            self.page.key("ArrowLeft")
+        self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
+        self.assertLess(self.runtime.tip()[0], 1.9)
+
+    # Settings
+
+    def test_settings_reach_the_runtime_and_show_what_it_took(self):
+        self.page.click("input[value=euler]")
+        self.page.fill(self.field("timestep-field"), "0.002")
+        self.wait(lambda: self.values("/arm_sim/set_integrator") == {"method": "euler", "timestep": 0.002}, "integrator")
+        self.page.fill(self.field("masses-fields", 2), "2.5")
+        self.page.fill(self.field("lengths-fields", 1), "0.8")
+        self.page.fill(self.field("gravity-field"), "3.3")
+        self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 3.3, "masses": [1, 2.5], "lengths": [0.8, 1]}, "parameters")
+        before = self.values("/pid_controller/set_gains")
+        for gain, joint, value in (("kp", 1, 900), ("ki", 2, 0), ("kd", 1, 77)):
+            self.page.fill(self.field(f"{gain}-fields", joint), str(value))
+            before[gain][joint - 1] = value
+        self.wait(lambda: self.values("/pid_controller/set_gains") == before, "gains")
+        self.page.until("document.querySelector('#out-timestep').textContent === '2 ms'")
+
+    def test_a_preset_and_a_slider_set_gravity(self):
+        self.page.click("#gravity-places button:nth-of-type(2)")
+        self.wait(lambda: self.values("/arm_sim/set_params")["gravity"] == 1.62, "the Moon's")
+        self.page.until(f"document.querySelector('#gravity-field {NUMBER}').value === '1.62'")
+        self.page.run("document.querySelector('#gravity-field input[type=range]').focus()")
+        self.page.key("ArrowRight")
+        self.wait(lambda: 1.62 < self.values("/arm_sim/set_params")["gravity"] < 1.8, "a little more")
+
+    def test_what_others_change_is_shown_too(self):
+        self.runtime.call("/arm_sim/set_params", gravity=5)
+        self.runtime.call("/pid_controller/enable", data=True)
+        self.page.until(f"document.querySelector('#gravity-field {NUMBER}').value === '5'")
+        self.page.until("document.querySelector('#servo').getAttribute('aria-checked') === 'true'")
+
+    def test_a_refusal_is_shown_beside_its_field_which_goes_back(self):
+        for field, wrong, service, shown in (
+            ("masses-fields", "-2", "/arm_sim/set_params", "1"), ("timestep-field", "0", "/arm_sim/set_integrator", "0.001"),
+            ("kp-fields", "-1", "/pid_controller/set_gains", "1000"), ("gravity-field", "-9", "/arm_sim/set_params", "9.81"),
+        ):
+            before = self.values(service)
+            self.page.fill(self.field(field), wrong)
+            text = self.page.until(f"document.querySelector('#{field} .refusal').textContent", why=f"refusal of {wrong}")
+            self.assertIn(f"got {wrong}", text)
+            self.assertEqual(self.page.run(f"document.querySelector('#{field} {NUMBER}').value"), shown)
+            self.assertEqual(self.page.run(f"document.querySelector('#{field} {NUMBER}').getAttribute('aria-invalid')"), "true")
+            self.assertEqual(self.values(service), before)
+        self.keep("refusals", whole=True)
+        self.page.fill(self.field("masses-fields"), "2")
+        self.page.until("document.querySelector('#masses-fields .refusal').textContent === ''")
+
+    def test_pause_steps_and_reset(self):
+        self.page.click("#pause")
+        self.page.until("document.querySelector('#pause-text').textContent === 'Run'")
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        began = self.time()
+        self.page.click("#step")
+        self.wait(lambda: abs(self.time() - began - 0.001) < 1e-9, "one step")
+        self.page.fill("#step-count", "250")
+        self.page.click("#step")
+        self.wait(lambda: abs(self.time() - began - 0.251) < 1e-9, "250 more")
+        self.page.click("#reset")
+        self.wait(lambda: self.time() == 0, "reset")
+        self.page.until("document.querySelector('#sim-time').textContent === '0.00'")
+
+    def time(self):
+        stamp = self.runtime.next("/joint_states")["header"]["stamp"]
+        return stamp["sec"] + stamp["nanosec"] * 1e-9
+
+    def test_divergence_is_unmistakable_and_offers_reset(self):
+        # Four times what held control bears at these gains: it must leave the finite numbers.
+        self.runtime.call("/arm_sim/set_integrator", method="euler", timestep=0.05)
+        self.page.click("#servo")
+        self.page.until("document.querySelector('#stage').classList.contains('diverged')", why="diverged")
+        self.assertTrue(self.page.text("#notice").startswith("Diverged."))
+        self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
+        self.keep("diverged")
+        self.assertGreater(self.image("#arm").count(self.color("bad")), 500)
+        self.runtime.call("/arm_sim/set_integrator", method="rk4", timestep=0.001)
+        self.page.click("#notice button")
+        self.page.until("document.querySelector('#run-state').textContent === 'running'")
+        self.page.until("!document.querySelector('#stage').classList.contains('diverged')")
+
+    def study(self):
+        """The study's services: the runtime's own, or a stand-in's of the same fields where it has none."""
+        if not self.runtime.offers("/study/stability"):
+            self.assertEqual(self.page.until("document.querySelector('#out-limit').textContent"), "not offered")
+            self.page.click("#compare-form button")
+            self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('no provider')")
+            provider = Provider(self.runtime.port, {"/study/stability": stability, "/study/rollout": rollout})
+            self.addCleanup(provider.__exit__)
+            self.page.go(self.runtime.url)  # a page asks again only now and then
+            self.connected()
+
+    def test_a_timestep_above_the_stability_limit_is_warned_of(self):
+        self.study()
+        self.page.click("#servo")
+        self.page.until("document.querySelector('#out-servo').textContent === 'on'")
+        limit = self.runtime.call("/study/stability")["values"]["timestep_limit_held"]
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.page.until("document.querySelector('#limit-bar').className === 'limit-bar good'")
+        self.runtime.call("/arm_sim/set_integrator", timestep=2 * limit)
+        self.page.until("document.querySelector('#notice').textContent.includes('above the predicted stability limit')")
+        self.assertTrue(self.page.run("document.querySelector('#out-limit').classList.contains('bad')"))
+        self.keep("limit")
+        self.page.click("#notice button")
+        self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] < limit, "the advised timestep")
+        self.page.until("document.querySelector('#notice').hidden")
+
+    # Trial
+
+    def test_the_trial_runs_counts_skips_and_stops(self):
+        self.page.click("#servo")
+        self.page.fill("#trial-body .option:nth-of-type(1) input", "30")
+        self.page.fill("#trial-body .option:nth-of-type(2) input", "0.05")
+        self.page.fill("#trial-body .option:nth-of-type(3) input", "0")
+        self.page.click("#trial-start")
+        self.page.until("/^[1-9]\\d* reached/.test(document.querySelector('#trial-count').textContent)", 20, "a target reached")
+        self.assertRegex(self.page.text("#trial-clock"), r"^\d+\.\d s left$")
+        before = self.runtime.next("/ik_trial/status")["target"]
+        self.page.click("#trial-skip")
+        self.wait(lambda: self.runtime.next("/ik_trial/status")["target"] != before, "another target")
+        self.keep("trial")
+        self.page.click("#trial-stop")
+        self.page.until("document.querySelector('#trial-clock').textContent.startsWith('ended')")
+        self.assertFalse(self.runtime.next("/ik_trial/status")["running"])
+        self.page.click("#trial-skip")
+        self.page.until("document.querySelector('#trial-body .refusal').textContent", why="refusal of a skip")
+        self.page.fill("#trial-body .option:nth-of-type(1) input", "-4")
+        self.page.click("#trial-start")
+        self.page.until("document.querySelector('#trial-body .refusal').textContent.includes('duration')", why="refusal of a duration")
+
+    # Comparison
+
+    def test_two_integrators_are_compared(self):
+        self.study()
+        self.page.click("#compare-form button")
+        self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
+        self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 20, "played to its end")
+        picture = self.image("#compare-arm")
+        for side in ("first", "second"):
+            self.assertGreater(picture.count(self.color(side)), 200, side)
+        self.assertGreater(self.image("#compare-chart").count(self.color("ink"), 60), 50)
+        self.assertRegex(self.page.text("#compare-text"), r"^At the end the tips are [\d.e\u2212]+ m apart")
+        rows = self.page.run("[...document.querySelectorAll('#compare-table tbody th')].map((one) => one.textContent)")
+        self.assertEqual(rows, ["timestep", "energy gained", "largest error", "evaluations", "reckoned in"])
+        self.keep("compare", whole=True)
+
+    def test_runs_of_different_timesteps_meet_at_common_instants(self):
+        common = "import('/resample.js').then(({ commonSamples }) => commonSamples(%s))"
+        # 5 s in 500 steps of 10 ms, which 1 ms divides; 4 s in 400; nothing fits both 10 ms and 7 ms in 5 s.
+        self.assertEqual(self.page.run(common % "5, [0.01, 0.001]"), 501)
+        self.assertEqual(self.page.run(common % "4, [0.01, 0.005]"), 401)
+        self.assertEqual(self.page.run(common % "5, [0.01, 0.007]"), 601)
+        # Between samples a cubic is met exactly, by its values and slopes at both ends: t^3 at 0.25.
+        value = self.page.run("import('/resample.js').then(({ resample }) => resample({ times: [0, 1], positions: [[0], [1]], velocities: [[0], [3]] }, [0.25, 1, 2]))")
+        self.assertEqual(value, [[0.25 ** 3], [1], None])
+
+    # Keys
+
+    def test_keys_do_what_they_did_on_the_classic_page(self):
+        for key, method in (("1", "euler"), ("2", "midpoint"), ("3", "verlet"), ("4", "rk4")):
+            self.page.key(key)
+            self.wait(lambda: self.values("/arm_sim/set_integrator")["method"] == method, method)
+        self.page.key("0")
+        self.wait(lambda: self.values("/arm_sim/pause")["data"], "0 pauses")
+        self.page.until("document.querySelector('#pause-text').textContent === 'Run'")
+        self.page.key("4")
+        self.wait(lambda: not self.values("/arm_sim/pause")["data"], "a method goes on")
+        for key, on in (("c", True), ("s", False), ("x", True)):
+            self.page.key(key)
+            self.wait(lambda: self.values("/pid_controller/enable")["data"] is on, key)
+
+    def test_q_and_e_move_the_setpoint_of_the_chosen_joint(self):
+        self.page.click("#servo")
+        self.wait(lambda: self.time() > 1, "a second")
+        self.page.click("#reset")
+        self.page.until("document.querySelector('#announce-polite').textContent.startsWith('Reset')")
+        self.page.key("j")
+        for _ in range(3):
+            self.page.key("e")
+        self.page.key("q")
+        self.page.until("document.querySelector('#setpoint-fields .field:nth-of-type(2) input[type=number]').value === '0.1'")
+        self.wait(lambda: abs(self.runtime.next("/joint_states")["position"][1] - 0.1) < 5e-3, "joint 2 at 0.1 rad")
+
+    def test_a_and_d_push_the_arm(self):
+        self.runtime.call("/arm_sim/set_params", gravity=0)
+        self.runtime.call("/arm_sim/reset")
+        self.assertEqual(self.runtime.next("/joint_states")["velocity"], [0, 0])
+        self.page.key("a")
+        self.wait(lambda: self.runtime.next("/joint_states")["velocity"][0] > 0.1, "pushed counter-clockwise")
+        self.runtime.call("/arm_sim/reset")
+        self.page.key("d")
+        self.wait(lambda: self.runtime.next("/joint_states")["velocity"][0] < -0.1, "pushed clockwise")
+
+    def test_keys_are_not_taken_from_who_types_and_can_be_switched_off(self):
+        self.page.run("document.querySelector('#masses-fields input[type=number]').focus()")
+        self.page.key("c")
+        self.page.run("document.activeElement.blur()")
+        self.page.key("?", shift=True)
+        self.page.until("document.querySelector('#help').open")
+        self.keep("keys")
+        self.page.click("#shortcuts-on")
+        self.page.click("#help-close")
+        self.page.key("c")
+        self.page.run("new Promise((done) => setTimeout(done, 300))")
+        self.assertFalse(self.values("/pid_controller/enable")["data"])
+        self.page.run("localStorage.clear()")
+
+    def test_everything_is_reached_by_the_tab_key_and_named(self):
+        named = self.page.run("""[...document.querySelectorAll('button, input, select, summary, canvas[tabindex]')]
+            .filter((one) => one.checkVisibility() && !(one.textContent.trim() || one.ariaLabel || one.labels?.length || one.title)).map((one) => one.outerHTML)""")
+        self.assertEqual(named, [])
+        seen = set()
+        for _ in range(120):
+            self.page.key("Tab")
+            seen.add(self.page.run("document.activeElement.id"))
+        missing = {"share", "theme", "help-button", "arm", "pause", "step", "reset", "servo", "plot-pause", "plot-csv", "trial-start"} - seen
+        self.assertEqual(missing, set())
+
+    # Links to share
+
+    def test_a_link_changes_nothing_until_it_is_applied(self):
+        page = self.open("#method=verlet&timestep=0.002&gravity=1.62&masses=1,2&servo=on")
+        page.until("!document.querySelector('#offer').hidden")
+        page.run("new Promise((done) => setTimeout(done, 500))")
+        self.assertEqual(self.values("/arm_sim/set_params")["gravity"], 9.81)
+        page.click("#offer button")
+        self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 1.62, "masses": [1, 2], "lengths": [1, 1]}, "parameters")
+        self.wait(lambda: self.values("/arm_sim/set_integrator") == {"method": "verlet", "timestep": 0.002}, "integrator")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "servo")
+        page.until("document.querySelector('#offer').hidden")
+
+    def test_a_shared_link_brings_back_what_it_was_made_of(self):
+        self.runtime.call("/arm_sim/set_params", gravity=2.5, lengths=[0.7, 1.1])
+        self.page.until(f"document.querySelector('#gravity-field {NUMBER}').value === '2.5'")
+        self.page.click("#share")
+        fragment = self.page.until("location.hash")
+        self.runtime.call("/arm_sim/set_params", gravity=9.81, lengths=[1, 1])
+        page = self.open(fragment)
+        page.click("#offer button")
+        self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 2.5, "masses": [1, 1], "lengths": [0.7, 1.1]}, "parameters")
+
+
+class ThreeLinks(PageTest):
+    links = 3
+
+    def test_a_drag_sends_the_tip_to_where_it_ends(self):
+        self.page.click("#servo")
+        self.page.drag(self.on_canvas((2.4, 0.2)), self.on_canvas((1.0, 1.6)))
+        self.wait(lambda: math.dist(self.runtime.tip(), (1.0, 1.6)) < 0.02, "tip at the target")
+
+    def test_a_goal_may_have_an_orientation(self):
+        self.page.click("#servo")
+        for i, value in enumerate(("1.2", "1.1", "0.5"), 1):
+            self.page.fill(f"#goal-body .option:nth-of-type({i}) input", value)
+        self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
+        self.assertAlmostEqual(sum(self.runtime.next("/joint_states")["position"]), 0.5, delta=0.06)

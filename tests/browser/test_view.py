@@ -1,0 +1,137 @@
+"""What is seen: the arm where it is, its target, the plots; on dense screens, small ones, in the dark, with three links."""
+
+from png import close
+from stage import PageTest
+
+SMALL = {"width": 360, "height": 740, "density": 2, "touch": True}
+
+
+class View:
+    """Checks that hold for any number of links, theme and size."""
+
+    def pose(self):
+        return [0.9, -1.3, 0.8][:self.links]
+
+    def test_the_arm_is_drawn_where_the_runtime_says_it_is(self):
+        self.settle(self.pose())
+        self.keep(f"{type(self).__name__}-pose")
+        ends = self.runtime.joints()
+        density = self.view.get("density", 1)
+        left, top = self.on_canvas((0, 0))
+        picture = self.image("#arm")
+        for i, (start, end) in enumerate(zip(ends, ends[1:])):
+            middle = self.on_canvas([(a + b) / 2 for a, b in zip(start, end)])
+            # From the canvas's middle, where the base is.
+            x = round(picture.width / 2 + density * (middle[0] - left))
+            y = round(picture.height / 2 + density * (middle[1] - top))
+            self.assertTrue(close(picture[x, y], self.color(f"joint{i + 1}")), f"link {i + 1} at {x}, {y}: {picture[x, y]}")
+
+    def test_every_plot_shows_every_joint(self):
+        # Free swing moves all joints, so that no line covers another.
+        self.page.until("Number(document.querySelector('#sim-time').textContent) > 1.5")
+        self.runtime.call("/arm_sim/pause", data=True)
+        for plot in ("position", "velocity", "phase"):
+            picture = self.image(f"#plot-{plot}")
+            for joint in range(1, self.links + 1):
+                self.assertGreater(picture.count(self.color(f"joint{joint}")), 20, f"joint {joint} in {plot}")
+        self.assertGreater(self.image("#plot-energy").count(self.color("ink"), 60), 20)
+        self.keep(f"{type(self).__name__}-whole", whole=True)
+
+    def test_nothing_sticks_out_to_the_side(self):
+        self.assertLessEqual(self.page.run("document.documentElement.scrollWidth"), self.page.run("innerWidth"))
+
+    def test_canvases_have_a_pixel_for_each_of_the_screen(self):
+        sizes = self.page.run("[...document.querySelectorAll('canvas')].filter((one) => one.clientWidth > 0)"
+                              ".map((one) => [one.width, one.clientWidth, one.height, one.clientHeight])")
+        self.assertGreaterEqual(len(sizes), 6)
+        for width, shown_width, height, shown_height in sizes:
+            self.assertEqual((width, height), (shown_width * self.view.get("density", 1), shown_height * self.view.get("density", 1)))
+
+
+class Sums:
+    """What the page reckons for its plots, against the runtime."""
+
+    def test_energy_and_gravity_load_are_those_of_the_runtime(self):
+        self.settle(self.pose())
+        self.page.until("import('/store.js').then(({ state }) => state.paused && state.diagnostics?.state === 'paused')")
+        load, energy, told = self.page.run("""Promise.all([import('/recorder.js'), import('/store.js')]).then(([r, { state }]) => {
+            const row = r.record.last();
+            return [[...r.record.data.slice(row + r.LOAD, row + r.LOAD + state.links)], r.record.data[row + r.ENERGY], state.diagnostics.energy];
+        })""")
+        # The same state and the same formula: all digits but the last few.
+        self.assertAlmostEqual(energy, told, delta=1e-9 * max(1, abs(told)))
+        # At rest the effort is the gravity load; the arm is within 2 mrad and slower than a crawl.
+        for effort, held in zip(self.runtime.next("/joint_states")["effort"], load):
+            self.assertAlmostEqual(effort, held, delta=1.0)
+
+
+class TwoLinks(View, Sums, PageTest):
+    def test_a_goal_shows_its_target_and_says_when_it_is_reached(self):
+        self.assertLess(self.image("#arm").count(self.color("target")), 5)
+        self.runtime.call("/ik_action/send_goal", x=0.4, y=1.1)
+        self.page.until("document.querySelector('#goal-text').textContent.startsWith('On the way')")
+        self.assertGreater(self.image("#arm").count(self.color("target")), 20)
+        self.assertIn("servo is off", self.page.text("#notice"))
+        self.page.click("#notice button")
+        self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
+        self.page.until("document.querySelector('#announce-polite').textContent === 'Target reached.'")
+        self.assertTrue(self.runtime.call("/pid_controller/enable")["values"]["data"])
+
+    def test_figures_are_those_of_the_runtime(self):
+        self.page.until("document.querySelector('#out-clients').textContent === '1'")
+        self.page.until("document.querySelector('#out-rtf').textContent.endsWith('×')")
+        self.page.until("Math.abs(parseFloat(document.querySelector('#out-rtf').textContent) - 1) < 0.1")
+        self.assertEqual(self.page.text("#out-timestep"), "1 ms")
+        self.assertEqual(self.page.text("#out-method"), "RK 4")
+        self.assertEqual(self.page.text("#out-servo"), "off")
+
+    def test_the_arm_is_told_in_a_sentence(self):
+        self.settle([0.5, 0.5])
+        self.page.until("document.querySelector('#arm-text').textContent.includes('paused, servo on. Joints at 29, 29 degrees')")
+
+    def test_what_is_written_can_be_saved_as_csv(self):
+        self.page.until("import('/recorder.js').then(({ record }) => record.length > 30)")
+        self.runtime.call("/arm_sim/pause", data=True)
+        # The file's text; that the button hands it to the browser is seen by the link that it makes.
+        lines = self.page.run("import('/csv.js').then((csv) => csv.csvText(2))").splitlines()
+        self.assertTrue(lines[0].startswith("time [s],position1 [rad],position2 [rad],setpoint1 [rad]"))
+        self.assertGreater(len(lines), 30)
+        self.assertEqual({line.count(",") for line in lines}, {11})
+        self.page.run("HTMLAnchorElement.prototype.click = function () { window.saved = [this.download, this.href]; }")
+        self.page.click("#plot-csv")
+        self.assertEqual(self.page.run("window.saved[0]"), "pendularm.csv")
+        self.assertTrue(self.page.run("window.saved[1].startsWith('blob:')"))
+
+
+    def test_an_hour_would_take_no_more_than_ten_megabytes(self):
+        # Warm first: what is compiled and cached once is no growth. Then half a minute, at 10 MB an hour, is 83 kB.
+        def heap():
+            self.page.run("gc()")
+            return self.page.run("performance.memory.usedJSHeapSize")
+
+        self.page.run("new Promise((done) => setTimeout(done, 15000))")
+        before = heap()
+        self.page.run("new Promise((done) => setTimeout(done, 30000))")
+        self.assertLess(heap() - before, 83_000)
+
+
+class ThreeLinks(View, Sums, PageTest):
+    links = 3
+
+
+class Dark(View, PageTest):
+    view = {"dark": True}
+
+    def test_the_theme_can_be_chosen(self):
+        dark = self.color("page")
+        self.page.click("#theme")
+        self.assertNotEqual(self.color("page"), dark)
+        self.assertGreater(sum(self.image("#arm")[4, 200]), 600, "light")
+
+
+class SmallScreen(View, PageTest):
+    view = SMALL
+
+
+class DenseScreen(View, PageTest):
+    view = {"density": 3, "width": 900}
