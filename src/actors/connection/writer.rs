@@ -14,6 +14,9 @@ use crate::actors::registry::Registry;
 pub(super) const BATCH_FRAMES: usize = 64;
 /// Bytes offered in one write: after that much the other connections have a turn.
 pub(super) const BATCH_BYTES: usize = 256 * 1024;
+/// Frames beyond this are given back to the system on another thread: for the 60 MB of a million steps that takes
+/// milliseconds, which the other connections would have to wait.
+const LARGE_FRAME: usize = 4 * 1024 * 1024;
 
 /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
 /// True if all that was owed has been written.
@@ -78,6 +81,7 @@ async fn write_batch<O: Outbound>(
     shared: &Shared,
     registry: &Addr<Registry>,
 ) -> bool {
+    let large = batch.iter().any(|frame| frame.len() > LARGE_FRAME);
     let mut first = 0;
     while first < batch.len() {
         let written = tokio::select! {
@@ -105,7 +109,12 @@ async fn write_batch<O: Outbound>(
             tokio::task::yield_now().await;
         }
     }
-    batch.clear();
+    if large {
+        let written = std::mem::take(batch);
+        tokio::task::spawn_blocking(move || drop(written));
+    } else {
+        batch.clear();
+    }
     true
 }
 
