@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-browser lint doc report bench bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-browser test-clients lint doc report bench bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -26,6 +26,10 @@ test: ## Run every test but those of the page
 test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
 	@echo "make test-browser: the page in headless Chromium"
 	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
+
+test-clients: build ## Run clients that nobody here wrote against it: roslibpy, roslib 1 and 2, Lichtblick's packages, roslibrust
+	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
+	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"

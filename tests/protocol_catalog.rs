@@ -27,7 +27,7 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
 }
 
 /// Contract section 3, the table, and what came later: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 15] = [
+const SERVICES: [(&str, &[&str], &[&str]); 17] = [
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -71,6 +71,42 @@ const SERVICES: [(&str, &[&str], &[&str]); 15] = [
     ),
     ("/ik_trial/skip", &[], &[]),
     ("/ik_trial/stop", &[], &[]),
+    (
+        "/study/stability",
+        &["integrator", "gains", "params", "setpoint"],
+        &[
+            "timestep_limit_held",
+            "timestep_limit_continuous",
+            "minimum_over_poses_held",
+            "minimum_over_poses_continuous",
+            "advised_timestep",
+        ],
+    ),
+    (
+        "/study/rollout",
+        &[
+            "q0",
+            "qdot0",
+            "duration",
+            "timestep",
+            "integrator",
+            "params",
+            "gains",
+            "setpoint",
+            "samples",
+            "reference",
+        ],
+        &[
+            "times",
+            "positions",
+            "velocities",
+            "efforts",
+            "energy",
+            "evaluations",
+            "wall_time",
+            "error",
+        ],
+    ),
 ];
 
 #[test]
@@ -140,6 +176,11 @@ fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
                 Direction::Published
             ),
             ("/rosout", "rcl_interfaces/msg/Log", Direction::Published),
+            (
+                "/arm_sim/error_estimate",
+                "pendularm_interfaces/msg/ErrorEstimate",
+                Direction::Published
+            ),
         ]
     );
 }
@@ -159,14 +200,21 @@ fn required_fields_are_those_that_have_no_default() {
 }
 
 #[test]
-fn one_service_computes_and_six_take_all_or_nothing() {
+fn three_services_compute_and_eight_take_all_or_nothing() {
     let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
         Service::ALL
             .into_iter()
             .filter(|&service| chosen(service))
             .collect()
     };
-    assert_eq!(of(Service::is_computation), [Service::IntegrationStep]);
+    assert_eq!(
+        of(Service::is_computation),
+        [
+            Service::IntegrationStep,
+            Service::Stability,
+            Service::Rollout
+        ]
+    );
     assert_eq!(
         of(Service::all_or_nothing),
         [
@@ -175,9 +223,25 @@ fn one_service_computes_and_six_take_all_or_nothing() {
             Service::Disturb,
             Service::Solve,
             Service::SendGoal,
-            Service::TrialStart
+            Service::TrialStart,
+            Service::Stability,
+            Service::Rollout
         ]
     );
+}
+
+#[test]
+fn gains_and_params_have_the_members_that_their_services_have_as_fields() {
+    for service in [Service::Stability, Service::Rollout] {
+        for field in service.fields() {
+            let members = match field.name {
+                "gains" => Service::SetGains.fields(),
+                "params" => Service::SetParams.fields(),
+                _ => &[],
+            };
+            assert_eq!(field.members(), members, "{field:?}");
+        }
+    }
 }
 
 #[test]
@@ -243,6 +307,7 @@ fn every_node_has_a_name_of_its_own() {
             "ik",
             "ik_action",
             "ik_trial",
+            "study",
             "gateway",
             "rosapi"
         ])

@@ -161,6 +161,44 @@ fn null_means_absent_only_in_optional_fields_of_services_that_take_all_or_nothin
 }
 
 #[test]
+fn members_of_an_object_are_read_like_fields_and_named_after_it() {
+    let read = |args: &str| {
+        reading(Service::Stability, args, |fields| {
+            fields.object("params", |params| {
+                let gravity = params.number("gravity", Bound::NonNegative);
+                (gravity, params.numbers("masses", 2, Bound::Positive))
+            })
+        })
+    };
+    let (value, status) = read(r#"{"params":{"gravity":2,"masses":[1,2],"colour":"red"}}"#);
+    assert_eq!(value, Some((Some(2.0), Some(vec![1.0, 2.0]))));
+    assert_eq!(status, "");
+    let (value, status) = read(r#"{"params":{"gravity":-2,"masses":[1,1e999]}}"#);
+    assert_eq!(value, Some((None, None)));
+    assert_eq!(
+        status,
+        "params.gravity must be at least 0, got -2; params.masses[1] must be a finite number"
+    );
+    assert_eq!(read(r#"{"params":{"gravity":null}}"#).0, Some((None, None)));
+    for absent in ["{}", r#"{"params":null}"#] {
+        assert_eq!(read(absent), (None, String::new()));
+    }
+    let (value, status) = read(r#"{"params":[1]}"#);
+    assert_eq!(
+        (value, status.as_str()),
+        (None, "params must be an object, got an array")
+    );
+}
+
+#[test]
+fn a_reason_given_from_outside_for_a_member_names_it_with_its_object() {
+    let (_, status) = reading(Service::Rollout, r#"{"gains":{}}"#, |fields| {
+        fields.object("gains", |gains| gains.refuse("kp", &"is not to my taste"))
+    });
+    assert_eq!(status, "gains.kp is not to my taste");
+}
+
+#[test]
 fn an_array_has_the_right_length() {
     assert_eq!(masses("[1, 2.5]"), accepted(vec![1.0, 2.5]));
     assert_eq!(masses("[]"), rejected("masses must have 2 entries, got 0"));

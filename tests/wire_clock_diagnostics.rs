@@ -22,7 +22,8 @@ use arm::{stamp, time};
 use common::{Client, Runtime};
 use serde_json::{Value, json};
 
-const KEYS: [&str; 7] = [
+/// The contract's, then ours.
+const KEYS: [&str; 9] = [
     "state",
     "sim_time",
     "real_time_factor",
@@ -30,6 +31,8 @@ const KEYS: [&str; 7] = [
     "energy",
     "energy_drift",
     "max_step_time",
+    "timestep_limit",
+    "warning",
 ];
 
 fn status<'a>(message: &'a Value, name: &str) -> &'a Value {
@@ -106,9 +109,10 @@ fn diagnostics_have_the_documented_statuses_and_keys_once_a_second() {
         .collect();
     assert_eq!(keys, KEYS);
     assert_eq!(text(arm, "state"), "running");
-    for key in &KEYS[1..] {
+    for key in &KEYS[1..7] {
         assert!(number(arm, key).is_finite(), "{key}");
     }
+    assert_eq!(text(arm, "warning"), "");
     let gateway = status(&first, "gateway");
     assert_eq!(gateway["level"], 0);
     assert_eq!(number(gateway, "connections"), 1.0);

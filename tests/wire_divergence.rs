@@ -101,7 +101,7 @@ fn nothing_but_a_reset_moves_a_diverged_arm() {
     client.ask("/arm_sim/set_params", json!({"gravity": 1}));
     client.ask(
         "/pid_controller/set_gains",
-        json!({"kp": [1, 1], "kd": [1, 1]}),
+        json!({"kp": [1, 1], "ki": [0, 0], "kd": [1, 1]}),
     );
     for data in [true, false] {
         client.ask("/arm_sim/pause", json!({"data": data}));

@@ -22,6 +22,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
 use common::{PATIENCE, Runtime};
+use pendularm::web::page::ASSETS;
 use serde_json::json;
 use web_client::{Answer, exchange, get, request, rest};
 
@@ -50,14 +51,25 @@ fn the_page_and_its_files_are_served_with_their_types() {
         page.header("content-type"),
         Some("text/html; charset=utf-8")
     );
-    assert!(page.text().starts_with("<!doctype html>"));
+    assert!(
+        page.text()
+            .to_ascii_lowercase()
+            .starts_with("<!doctype html>")
+    );
     let with_query = get(runtime.address, "/?dt=0.001&method=rk4");
     assert_eq!(with_query.body, page.body);
-    for (path, kind) in [("/style.css", "text/css"), ("/main.js", "text/javascript")] {
-        let file = get(runtime.address, path);
-        assert_eq!(file.status, 200, "{path}");
+    for asset in ASSETS {
+        let kind = match Path::new(asset.file).extension().unwrap().to_str() {
+            Some("html") => "text/html",
+            Some("css") => "text/css",
+            Some("js") => "text/javascript",
+            Some("svg") => "image/svg+xml",
+            other => panic!("{other:?} is a kind that this test does not know"),
+        };
+        let file = get(runtime.address, asset.path);
+        assert_eq!(file.status, 200, "{}", asset.path);
         assert!(file.header("content-type").unwrap().starts_with(kind));
-        assert!(!file.body.is_empty());
+        assert_eq!(file.body, asset.bytes, "{}", asset.path);
     }
 }
 

@@ -1,4 +1,5 @@
-//! Counters that one node writes and another reports: what `/diagnostics` says about the gateway.
+//! Counters that one node writes and another reports: what `/diagnostics` says about the gateway, and work whose absence is to
+//! be shown.
 //!
 //! The arm publishes `/diagnostics` from its own thread; asking the registry once a second would make the gateway part
 //! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
@@ -7,11 +8,12 @@
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Numbers about the gateway, shared by reference.
+/// Numbers about the runtime, shared by reference.
 #[derive(Debug, Default)]
 pub struct Gauges {
     connections: AtomicU64,
     messages_dropped: AtomicU64,
+    error_estimates: AtomicU64,
 }
 
 impl Gauges {
@@ -25,6 +27,17 @@ impl Gauges {
     #[must_use]
     pub fn messages_dropped(&self) -> u64 {
         self.messages_dropped.load(Ordering::Relaxed)
+    }
+
+    /// Estimates of the arm's local error made since the start: none without a subscriber.
+    #[must_use]
+    pub fn error_estimates(&self) -> u64 {
+        self.error_estimates.load(Ordering::Relaxed)
+    }
+
+    /// Counts one estimate.
+    pub fn add_estimate(&self) {
+        self.error_estimates.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Sets the number of clients connected.

@@ -5,7 +5,7 @@
 //!              accepts                 Request, Disconnect              ServiceCall, TopicMessage, Interest
 //!  listener ───────────▶ connection ───────────────────────▶ registry ──────────────────────────────────────▶ nodes
 //!                        (one per client)                     (one)                                       arm_sim (own thread)
-//!                            ▲     Deliver, Answer, Finish      │ ▲         Publish, Respond             integration (worker pool)
+//!                            ▲     Deliver, Answer, Finish      │ ▲         Publish, Respond             integration, study (worker pool)
 //!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial, rosapi
 //! ```
 //!
@@ -21,6 +21,9 @@
 //! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: no encoding without |
 //! | [`registry::Publish`] / [`registry::Respond`] | nodes | registry | a topic message; an answer |
 //! | [`arm_sim::ArmPose`] | ik, `ik_trial` | `arm_sim` | lengths, positions and time, asked for every time |
+//! | [`arm_sim::ArmSettings`] | study | `arm_sim` | method, timestep, arm, gains and setpoint, asked for at every call |
+//! | [`arm_sim::HeldLimit`] | `arm_sim` | study | the largest stable timestep of a control loop |
+//! | [`arm_sim::Consult`] | runtime | `arm_sim` | whom to ask for it |
 //! | [`ik::Solve`] | `ik_action` | ik | joint positions for a target |
 //! | [`arm_sim::TrackGoal`] / [`arm_sim::EndGoal`] | `ik_action` | `arm_sim` | a goal to be judged at every step; its end |
 //! | [`arm_sim::GoalJudged`] | `arm_sim` | `ik_action` | progress of a goal, or how it ended |
@@ -47,6 +50,7 @@ pub mod registry;
 pub mod rosapi;
 pub mod rosout;
 pub mod runtime;
+pub mod study;
 pub mod workers;
 
 /// Names one client connection for as long as the process lives; never reused.

@@ -16,7 +16,7 @@ use tokio::runtime::Builder;
 use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::time::{Instant, sleep};
 
-use super::arm_sim::{ArmSim, joint_names};
+use super::arm_sim::{ArmSim, Consult, joint_names};
 use super::connection::gate::Gate;
 use super::gauges::Gauges;
 use super::ik::Ik;
@@ -27,6 +27,7 @@ use super::listener::{Listener, StopListening};
 use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
 use super::rosapi::Rosapi;
 use super::rosout::Rosout;
+use super::study::Study;
 use super::workers::WorkerPool;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -87,10 +88,11 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     let rng = options
         .seed
         .map_or_else(fastrand::Rng::new, fastrand::Rng::with_seed);
-    match options.links {
-        Links::Two => start_nodes::<2>(&registry, &gauges, &arm_thread, rng, &mut nodes),
-        Links::Three => start_nodes::<3>(&registry, &gauges, &arm_thread, rng, &mut nodes),
-    }
+    let start = match options.links {
+        Links::Two => start_nodes::<2>,
+        Links::Three => start_nodes::<3>,
+    };
+    start(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes);
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function: it can't be gone.
@@ -146,6 +148,7 @@ fn start_nodes<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     arm_thread: &Arbiter,
+    workers: &WorkerPool,
     rng: fastrand::Rng,
     nodes: &mut Nodes,
 ) where
@@ -166,6 +169,10 @@ fn start_nodes<const N: usize>(
     Rosapi::attach(&introspection.start(), nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
+
+    let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
+    Study::attach(&study, nodes);
+    arm.do_send(Consult(study.recipient()));
 
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();

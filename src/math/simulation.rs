@@ -194,6 +194,22 @@ impl<const N: usize> Simulation<N> {
         true
     }
 
+    /// The effort that the next step would be taken with \[N m\]: the controller's and the disturbance's together.
+    #[must_use]
+    pub fn effort_of_next_step(&self) -> [f64; N] {
+        let controlled = if self.pid.is_enabled() {
+            self.pid.control(&self.state, self.timestep).effort
+        } else {
+            [0.0; N]
+        };
+        match self.disturbance {
+            Some(push) if self.time() < push.ends => {
+                std::array::from_fn(|i| controlled[i] + push.effort[i])
+            }
+            _ => controlled,
+        }
+    }
+
     /// Adds the disturbance to the effort of the step that begins now, or ends it if its time is over.
     #[cold]
     fn add_disturbance(&mut self, effort: &mut [f64; N]) {

@@ -27,6 +27,8 @@ pub enum Node {
     IkAction,
     /// Timed trials.
     IkTrial,
+    /// Predictions and offline runs.
+    Study,
     /// The rosbridge side: connections and registry.
     Gateway,
     /// Tells what there is.
@@ -35,11 +37,12 @@ pub enum Node {
 
 impl Node {
     /// All nodes.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::ArmSim,
         Self::Ik,
         Self::IkAction,
         Self::IkTrial,
+        Self::Study,
         Self::Gateway,
         Self::Rosapi,
     ];
@@ -52,6 +55,7 @@ impl Node {
             Self::Ik => "ik",
             Self::IkAction => "ik_action",
             Self::IkTrial => "ik_trial",
+            Self::Study => "study",
             Self::Gateway => "gateway",
             Self::Rosapi => "rosapi",
         }
@@ -72,12 +76,21 @@ pub enum Direction {
 pub struct Field {
     /// Its key.
     pub name: &'static str,
-    /// Its type as ROS writes it: `float64`, `float64[]`, `bool`, `string`, `uint64`, `pkg/msg/Type`.
+    /// Its type as ROS writes it: `float64`, `float64[]`, `bool`, `string`, `uint64`, `pkg/msg/Type`. `float64[][]`, one
+    /// array per sample, ROS does not know.
     pub kind: &'static str,
     /// Its unit, empty where it has none. `SI` where it differs from joint to joint or depends on the controller.
     pub unit: &'static str,
     /// Whether a request must have it. In messages and responses every field is there.
     pub required: bool,
+}
+
+impl Field {
+    /// The members of a field that is an object in a request, in documented order; empty for every other field.
+    #[must_use]
+    pub fn members(&self) -> &'static [Self] {
+        services::members(self.kind)
+    }
 }
 
 const fn required(name: &'static str, kind: &'static str, unit: &'static str) -> Field {

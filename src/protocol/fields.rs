@@ -1,7 +1,8 @@
 //! Reads a request field by field and collects what it rejects, by name.
 //!
 //! Every field is read alone: a bad one is left out and remembered, the others still count. The catalog says which fields a
-//! service has, in which order a positional array gives them, and which must be there.
+//! service has, in which order a positional array gives them, and which must be there. A field that is an object is read
+//! member by member in the same way; its members are named `gains.kp`.
 //!
 //! **Invariant:** each rejected field is named once or, where entries of an array are at fault, once for each of these.
 
@@ -118,7 +119,12 @@ pub enum Reason {
 /// The fields of one request.
 #[derive(Debug)]
 pub struct Fields<'a> {
-    service: Service,
+    /// What the catalog lists.
+    fields: &'static [Field],
+    /// Whether `null` in an optional field means absent.
+    null_is_absent: bool,
+    /// What stands before the names: empty, or the name of the object and a full stop.
+    prefix: String,
     /// What came, in the order of the catalog.
     values: Vec<Option<&'a RawValue>>,
     rejections: Vec<Rejection>,
@@ -162,7 +168,9 @@ impl<'a> Fields<'a> {
             }
         }
         Ok(Self {
-            service,
+            fields,
+            null_is_absent: service.all_or_nothing(),
+            prefix: String::new(),
             values,
             rejections: Vec::new(),
         })
@@ -198,8 +206,7 @@ impl<'a> Fields<'a> {
             match finite(entry, bound) {
                 Ok(value) => values.push(value),
                 Err(reason) => {
-                    let field = format!("{name}[{index}]");
-                    self.rejections.push(Rejection { field, reason });
+                    self.rejected_as::<()>(&format!("{name}[{index}]"), reason);
                 }
             }
         }
@@ -260,13 +267,37 @@ impl<'a> Fields<'a> {
         self.mistyped(name, format!("one of {}", names.join(", ")), raw)
     }
 
+    /// An object, whose members `read` reads as it would the fields of a request; `None` if it is absent or no object.
+    /// Which members there are is up to the field's type.
+    pub fn object<T>(
+        &mut self,
+        name: &'static str,
+        read: impl FnOnce(&mut Fields<'a>) -> T,
+    ) -> Option<T> {
+        let raw = self.take(name)?;
+        let field = self.fields.iter().find(|field| field.name == name)?;
+        let fields = field.members();
+        let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+        let mut values = vec![None; fields.len()];
+        if json::members_into(raw.get(), &names, &mut values).is_err() {
+            return self.mistyped(name, "an object", raw);
+        }
+        let mut members = Fields {
+            fields,
+            null_is_absent: self.null_is_absent,
+            prefix: format!("{}{name}.", self.prefix),
+            values,
+            rejections: Vec::new(),
+        };
+        let value = read(&mut members);
+        self.rejections.append(&mut members.rejections);
+        Some(value)
+    }
+
     /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
     pub fn refuse(&mut self, name: &str, reason: &impl fmt::Display) {
         let reason = Reason::Refused(text::shortened(&reason.to_string(), MAX_REASON));
-        self.rejections.push(Rejection {
-            field: name.to_owned(),
-            reason,
-        });
+        self.rejected_as::<()>(name, reason);
     }
 
     /// What has been rejected so far, in the order of reading.
@@ -290,15 +321,12 @@ impl<'a> Fields<'a> {
 
     /// What came under that name. Absent, a required field is rejected.
     fn take(&mut self, name: &'static str) -> Option<&'a RawValue> {
-        let fields = self.service.fields();
-        let index = fields.iter().position(|field| field.name == name);
+        let index = self.fields.iter().position(|field| field.name == name);
         debug_assert!(index.is_some(), "{name} is not in the catalog");
         let index = index?;
-        let required = fields
-            .get(index)
-            .is_some_and(|field: &Field| field.required);
+        let required = self.fields.get(index).is_some_and(|field| field.required);
         let raw = self.values.get(index).copied().flatten();
-        let null_is_absent = self.service.all_or_nothing() && !required;
+        let null_is_absent = self.null_is_absent && !required;
         match raw {
             Some(raw) if null_is_absent && raw.get() == "null" => None,
             None if required => self.rejected_as(name, Reason::Missing),
@@ -321,7 +349,7 @@ impl<'a> Fields<'a> {
 
     fn rejected_as<T>(&mut self, name: &str, reason: Reason) -> Option<T> {
         self.rejections.push(Rejection {
-            field: name.to_owned(),
+            field: format!("{}{name}", self.prefix),
             reason,
         });
         None

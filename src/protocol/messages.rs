@@ -182,6 +182,21 @@ pub struct KeyValue<'a> {
     pub value: String,
 }
 
+/// `pendularm_interfaces/msg/ErrorEstimate`; what is not finite is written as `null`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ErrorEstimate<'a> {
+    /// The method that takes the steps.
+    pub method: &'a str,
+    /// Length of a step \[s\].
+    pub timestep: f64,
+    /// Largest error of a joint position after the next step \[rad\].
+    pub local_error: f64,
+    /// The same per timestep \[rad/s\].
+    pub error_per_second: f64,
+    /// The largest stable timestep at the present setpoint \[s\].
+    pub predicted_limit: f64,
+}
+
 /// A message on a topic.
 #[must_use]
 pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {

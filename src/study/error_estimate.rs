@@ -35,13 +35,7 @@ pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstim
     if simulation.divergence().is_some() {
         return None;
     }
-    let pid = simulation.pid();
-    let effort = if pid.is_enabled() {
-        pid.control(simulation.state(), simulation.timestep())
-            .effort
-    } else {
-        [0.0; N]
-    };
+    let effort = simulation.effort_of_next_step();
     estimate_step(
         simulation.arm(),
         simulation.state(),

@@ -25,6 +25,7 @@ pub mod error;
 pub mod error_estimate;
 pub mod extrapolation;
 pub mod growth;
+mod limits;
 pub mod linear;
 pub mod matrix;
 pub mod measure;

@@ -32,19 +32,77 @@ const MAX_POSES: usize = 1024;
 /// Parts of the smallest limit so far at which a pose must be stable to pass without a search of its own.
 const PROBES: [f64; 3] = [1.0, 0.6, 0.2];
 
-/// The smallest of `bound` and the limits of all poses; `None` if nothing limits.
-pub(super) fn minimum_over_poses<const N: usize>(
-    arm: &Arm<N>,
-    gains: &Gains<N>,
+/// The smallest of a bound and the limits of all poses, looked for pose by pose, so that it can be paused.
+#[derive(Debug, Clone)]
+pub(super) struct PoseSearch<const N: usize> {
+    arm: Arm<N>,
+    gains: Gains<N>,
     method: Method,
     sampling: Sampling,
-    bound: Option<f64>,
-) -> Option<f64> {
-    let mut smallest = bound;
-    let integrating = gains.ki.map(|ki| ki > 0.0);
-    let mut judge = |linear: &Linear, gravity: bool| {
-        let stepping = Stepping::new(linear, method, sampling);
-        let passes = smallest.is_some_and(|limit| {
+    /// The smallest so far \[s\]; `None` while nothing limits.
+    smallest: Option<f64>,
+    /// Judgements made.
+    judged: usize,
+}
+
+impl<const N: usize> PoseSearch<N> {
+    /// A search that begins with `bound` \[s\], the limit at some other pose.
+    pub(super) fn new(
+        arm: &Arm<N>,
+        gains: &Gains<N>,
+        method: Method,
+        sampling: Sampling,
+        bound: Option<f64>,
+    ) -> Self {
+        Self {
+            arm: *arm,
+            gains: *gains,
+            method,
+            sampling,
+            smallest: bound,
+            judged: 0,
+        }
+    }
+
+    /// Judges the loop at one more pose; false once there is none left.
+    pub(super) fn advance(&mut self) -> bool {
+        let directions = if self.arm.gravity() == 0.0 {
+            0
+        } else {
+            DIRECTIONS
+        };
+        // Without gravity the direction of the first joint makes no difference: one judgement, then one for each.
+        let (index, turn) = (
+            self.judged / (directions + 1),
+            self.judged % (directions + 1),
+        );
+        let Some(mut pose) = outer_pose::<N>(index) else {
+            return false;
+        };
+        self.judged += 1;
+        if turn > 0
+            && let Some(first) = pose.first_mut()
+        {
+            *first = part_of_turn(turn - 1, DIRECTIONS);
+        }
+        let integrating = self.gains.ki.map(|ki| ki > 0.0);
+        let linear = Linear::at(&self.arm, &self.gains, &pose, &integrating);
+        if turn > 0 {
+            self.judge(&linear, true);
+        } else {
+            self.judge(&linear.weightless(), false);
+        }
+        true
+    }
+
+    /// The smallest so far \[s\]; `None` if nothing limits.
+    pub(super) fn smallest(&self) -> Option<f64> {
+        self.smallest
+    }
+
+    fn judge(&mut self, linear: &Linear, gravity: bool) {
+        let stepping = Stepping::new(linear, self.method, self.sampling);
+        let passes = self.smallest.is_some_and(|limit| {
             PROBES
                 .iter()
                 .all(|part| limit == 0.0 || stepping.is_stable(part * limit))
@@ -57,29 +115,14 @@ pub(super) fn minimum_over_poses<const N: usize>(
             return;
         }
         if let Some(limit) = stepping.search(&modes) {
-            smallest = Some(smallest.map_or(limit, |smallest| smallest.min(limit)));
-        }
-    };
-    for mut pose in outer_poses::<N>() {
-        let linear = Linear::at(arm, gains, &pose, &integrating);
-        if arm.gravity() == 0.0 {
-            judge(&linear, false);
-            continue;
-        }
-        judge(&linear.weightless(), false);
-        for direction in 0..DIRECTIONS {
-            if let Some(first) = pose.first_mut() {
-                *first = part_of_turn(direction, DIRECTIONS);
-            }
-            judge(&Linear::at(arm, gains, &pose, &integrating), true);
+            self.smallest = Some(self.smallest.map_or(limit, |smallest| smallest.min(limit)));
         }
     }
-    smallest
 }
 
-/// Poses of the outer joints, the first joint at zero. Mirrored about the vertical an arm is the same arm, so the second
-/// joint needs half of its circle only.
-fn outer_poses<const N: usize>() -> impl Iterator<Item = [f64; N]> {
+/// One of the poses of the outer joints, the first joint at zero; none beyond the last. Mirrored about the vertical an arm
+/// is the same arm, so the second joint needs half of its circle only.
+fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
     let half = GRID / 2 + 1;
     let outer = u32::try_from(N.saturating_sub(2)).unwrap_or(u32::MAX);
     let all = if N < 2 {
@@ -88,23 +131,21 @@ fn outer_poses<const N: usize>() -> impl Iterator<Item = [f64; N]> {
         half.saturating_mul(GRID.saturating_pow(outer))
     };
     let taken = all.min(MAX_POSES);
-    (0..taken).map(move |index| {
-        // Beyond three links the grid is thinned evenly.
-        let mut index = index.saturating_mul(all / taken);
-        std::array::from_fn(|joint| match joint {
-            0 => 0.0,
-            1 => {
-                let digit = index % half;
-                index /= half;
-                PI * ratio(digit, GRID / 2)
-            }
-            _ => {
-                let digit = index % GRID;
-                index /= GRID;
-                part_of_turn(digit, GRID)
-            }
-        })
-    })
+    // Beyond three links the grid is thinned evenly.
+    let mut index = (index < taken).then(|| index.saturating_mul(all / taken))?;
+    Some(std::array::from_fn(|joint| match joint {
+        0 => 0.0,
+        1 => {
+            let digit = index % half;
+            index /= half;
+            PI * ratio(digit, GRID / 2)
+        }
+        _ => {
+            let digit = index % GRID;
+            index /= GRID;
+            part_of_turn(digit, GRID)
+        }
+    }))
 }
 
 /// `part / whole` of a turn, from -π \[rad\].

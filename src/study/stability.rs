@@ -22,16 +22,10 @@
     reason = "indices run over the states of matrices that are made for them"
 )]
 
-use super::linear::{Equilibrium, Linear, equilibrium};
+pub use super::limits::{ADVISED_PART, LimitSearch, Limits, limit_held, limits};
+use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
-use super::poses::minimum_over_poses;
-use crate::math::arm::Arm;
 use crate::math::integrator::Method;
-use crate::math::pid::{Gains, Setpoint};
-
-/// Part of the smallest limit over all poses that is advised: what linearisation leaves out (a start of 0.3 rad off
-/// costs up to a third of a stiff limit, poses on the way have limits of their own) stays within it.
-pub const ADVISED_PART: f64 = 0.8;
 
 /// Growth, relative to the fastest eigenvalue, that rounding can feign: eigenvalues of graded 9×9 matrices are good to
 /// some 1e-13.
@@ -71,64 +65,6 @@ impl Sampling {
             Self::Continuous => "continuous",
         }
     }
-}
-
-/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep found unstable, as for a
-/// free arm without gravity, which linear methods carry at any pace.
-///
-/// Gains that are all zero mean an arm left to itself, and its hanging pose.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// At the setpoint's equilibrium, effort held over the step.
-    pub held: Option<f64>,
-    /// At the setpoint's equilibrium, control in every stage.
-    pub continuous: Option<f64>,
-    /// The smallest over a grid of poses, effort held over the step.
-    pub minimum_held: Option<f64>,
-    /// The smallest over a grid of poses, control in every stage.
-    pub minimum_continuous: Option<f64>,
-    /// [`ADVISED_PART`] of the smaller of `held` and `minimum_held`, the live arm's way.
-    pub advised: Option<f64>,
-}
-
-/// All limits of a loop. Some 5 ms of one core for two links, 0.1 s for three (optimised build).
-#[must_use]
-pub fn limits<const N: usize>(
-    arm: &Arm<N>,
-    gains: &Gains<N>,
-    setpoint: &Setpoint<N>,
-    method: Method,
-) -> Limits {
-    let rest = equilibrium(arm, gains, setpoint);
-    let linear = at_rest(arm, gains, &rest);
-    let held = largest_timestep(&linear, method, Sampling::Held);
-    let continuous = largest_timestep(&linear, method, Sampling::Continuous);
-    let over_poses = |sampling, bound| minimum_over_poses(arm, gains, method, sampling, bound);
-    let minimum_held = over_poses(Sampling::Held, held);
-    Limits {
-        held,
-        continuous,
-        minimum_held,
-        minimum_continuous: over_poses(Sampling::Continuous, continuous),
-        advised: minimum_held.map(|limit| ADVISED_PART * limit),
-    }
-}
-
-/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Half a millisecond of one core for two
-/// links, one for three (optimised build).
-#[must_use]
-pub fn limit_held<const N: usize>(
-    arm: &Arm<N>,
-    gains: &Gains<N>,
-    setpoint: &Setpoint<N>,
-    method: Method,
-) -> Option<f64> {
-    let rest = equilibrium(arm, gains, setpoint);
-    largest_timestep(&at_rest(arm, gains, &rest), method, Sampling::Held)
-}
-
-fn at_rest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>, rest: &Equilibrium<N>) -> Linear {
-    Linear::at(arm, gains, &rest.position, &rest.integrating)
 }
 
 /// The largest stable timestep of a linear loop \[s\]: see [`Limits`] for `None` and zero.

@@ -2,7 +2,7 @@
 //!
 //! The actor only asks the clock and says who hears what. What is due is reckoned by `math::pacer`, what happens in a
 //! step by `math::simulation`, requests are read in `services`, messages written in `telemetry`, goals judged in
-//! `goals`.
+//! `goals`, timesteps in `limit`.
 //!
 //! The arm wakes 60 times a second, and before it handles any message it advances to now, so that nobody sees a state
 //! from before the present step. Work per wake-up is bounded by [`WAKE_UP_BUDGET`]; what that leaves owed is taken up after
@@ -12,6 +12,7 @@
 
 mod by_hand;
 mod goals;
+mod limit;
 mod scene;
 mod services;
 mod telemetry;
@@ -25,6 +26,8 @@ use tokio::time::Instant;
 pub use self::by_hand::MAX_STEPS;
 use self::goals::Goals;
 pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
+use self::limit::LimitWatch;
+pub use self::limit::{ArmSettings, Consult, ControlLoop, HeldLimit, Present};
 use self::telemetry::Telemetry;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
@@ -72,6 +75,7 @@ pub struct ArmSim<const N: usize> {
     telemetry: Telemetry,
     joint_names: [&'static str; N],
     goals: Goals<N>,
+    limit: LimitWatch<N>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -96,6 +100,7 @@ impl<const N: usize> ArmSim<N> {
             respond,
             joint_names: joint_names(),
             goals: Goals::default(),
+            limit: LimitWatch::default(),
         }
     }
 
@@ -107,12 +112,11 @@ impl<const N: usize> ArmSim<N> {
                 nodes.services.insert(service, address.clone().recipient());
             }
         }
-        let published = |topic: &Topic| topic.direction() == Direction::Published;
-        for topic in Topic::ALL.into_iter().filter(published) {
-            if topic.owner() != Node::ArmSim {
-                continue;
+        for topic in Topic::ALL {
+            let published = topic.direction() == Direction::Published;
+            if published && topic.owner() == Node::ArmSim {
+                nodes.publishers.insert(topic, address.clone().recipient());
             }
-            nodes.publishers.insert(topic, address.clone().recipient());
         }
         nodes
             .listeners
@@ -198,9 +202,10 @@ impl<const N: usize> Handler<TopicMessage> for ArmSim<N> {
 impl<const N: usize> Handler<Interest> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         self.telemetry.set_wanted(interest.topic, interest.wanted);
         self.publish_lasting(interest.topic);
+        self.ask_limit(ctx);
     }
 }
 
@@ -232,6 +237,7 @@ impl<const N: usize> ArmSim<N> {
         let wait = tick - Duration::from_nanos(u64::try_from(since_tick).unwrap_or(0));
         ctx.run_later(wait, |arm, ctx| {
             arm.advance_to_now(ctx);
+            arm.watch_limit(ctx);
             arm.publish_state();
             arm.schedule_tick(ctx);
         });

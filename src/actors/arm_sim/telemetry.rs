@@ -1,4 +1,5 @@
-//! What the arm publishes: `/joint_states` and `/clock` at every tick, `/diagnostics` once a second and at every change.
+//! What the arm publishes: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth, `/diagnostics`
+//! once a second and at every change.
 //!
 //! **Invariant:** nothing is reckoned or encoded for a topic that nobody subscribes to.
 
@@ -22,6 +23,9 @@ use crate::protocol::messages::{
 const FRAME_ID: &str = "world";
 /// Rates are given over at least this long: over less they say nothing.
 const SHORTEST_WINDOW: Duration = Duration::from_millis(250);
+
+/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for control.
+const ESTIMATE_TICKS: u64 = 6;
 
 /// What is counted between two messages of `/diagnostics`, and who wants what.
 pub(super) struct Telemetry {
@@ -92,6 +96,11 @@ impl Telemetry {
         self.wanted.contains(&topic)
     }
 
+    /// Counts an estimate of the local error.
+    pub(super) fn count_estimate(&self) {
+        self.gauges.add_estimate();
+    }
+
     /// Notes a batch of steps and the processor's time that it took.
     pub(super) fn stepped(&mut self, steps: u64, took: Duration, timestep: f64) {
         if steps == 0 {
@@ -147,6 +156,11 @@ impl<const N: usize> ArmSim<N> {
             self.publish(Topic::Clock, &Clock { clock: stamp });
         }
         self.publish_frames(stamp);
+        if self.telemetry.wants(Topic::ErrorEstimate)
+            && self.telemetry.ticks.is_multiple_of(ESTIMATE_TICKS)
+        {
+            self.publish(Topic::ErrorEstimate, &self.error_estimate());
+        }
         if self.telemetry.ticks.is_multiple_of(u64::from(PUBLISH_RATE)) {
             self.publish_diagnostics();
             self.telemetry.last_rates = self.telemetry.window.rates().unwrap_or_default();
@@ -203,6 +217,8 @@ impl<const N: usize> ArmSim<N> {
     }
 
     fn arm_status(&self) -> DiagnosticStatus<'static> {
+        let warnings = self.warnings();
+        let level = u8::from(!warnings.is_empty());
         let (level, state, message) = match self.simulation.divergence() {
             Some(divergence) => {
                 let message = format!(
@@ -211,11 +227,8 @@ impl<const N: usize> ArmSim<N> {
                 );
                 (2, "diverged", message)
             }
-            None if self.paused => (0, "paused", "paused".to_owned()),
-            None => {
-                let level = u8::from(self.telemetry.lags());
-                (level, "running", "running".to_owned())
-            }
+            None if self.paused => (level, "paused", "paused".to_owned()),
+            None => (level, "running", "running".to_owned()),
         };
         let energy = energy(&self.simulation);
         let rates = self
@@ -230,10 +243,12 @@ impl<const N: usize> ArmSim<N> {
             ("energy", energy),
             ("energy_drift", energy - self.telemetry.energy_reference),
             ("max_step_time", self.telemetry.window.longest.step_time()),
+            ("timestep_limit", self.timestep_limit()),
         ];
         let mut values = vec![entry("state", state)];
         // Debug prints what is huge or tiny with an exponent.
         values.extend(numbers.map(|(key, value)| entry(key, format!("{value:?}"))));
+        values.push(entry("warning", warnings.join("; ")));
         DiagnosticStatus {
             level,
             name: "arm_sim",
@@ -241,6 +256,16 @@ impl<const N: usize> ArmSim<N> {
             hardware_id: "",
             values,
         }
+    }
+
+    /// What is not as it should be, while the arm goes on all the same.
+    fn warnings(&self) -> Vec<String> {
+        let lags = !self.paused && self.telemetry.lags();
+        let late = lags.then(|| {
+            let behind = CATCH_UP.as_millis() / 2;
+            format!("the arm is more than {behind} ms behind wall time")
+        });
+        self.limit_warning().into_iter().chain(late).collect()
     }
 
     fn gateway_status(&self) -> DiagnosticStatus<'static> {

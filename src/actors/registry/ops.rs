@@ -73,7 +73,8 @@ impl Registry {
                 }
                 Ok(())
             }
-            // Put together, and asked of a client, before they get here; where nothing is asked, anything shown will do.
+            // Pieces are put together before they get here; a token is asked for before, and where nothing is asked,
+            // anything shown will do.
             Op::Fragment(_) | Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
                 service,

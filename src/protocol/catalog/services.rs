@@ -39,13 +39,17 @@ pub enum Service {
     TrialSkip,
     /// Ends the trial.
     TrialStop,
+    /// Predicts the largest stable timestep.
+    Stability,
+    /// Runs the arm offline.
+    Rollout,
     /// A question of rosapi, under either of its prefixes.
     Rosapi(Rosapi),
 }
 
 impl Service {
     /// The arm's own services, in the order in which they are documented; the others are [`Rosapi::ALL`].
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::IntegrationStep,
         Self::SetIntegrator,
         Self::SetParams,
@@ -61,6 +65,8 @@ impl Service {
         Self::TrialStart,
         Self::TrialSkip,
         Self::TrialStop,
+        Self::Stability,
+        Self::Rollout,
     ];
 
     const fn entry(self) -> &'static ServiceEntry {
@@ -80,6 +86,8 @@ impl Service {
             Self::TrialStart => &TRIAL_START,
             Self::TrialSkip => &TRIAL_SKIP,
             Self::TrialStop => &TRIAL_STOP,
+            Self::Stability => &STABILITY,
+            Self::Rollout => &ROLLOUT,
             Self::Rosapi(question) => question.entry(),
         }
     }
@@ -113,7 +121,10 @@ impl Service {
     /// Whether it is a pure computation: answered when it is done, perhaps out of order, from a queue of its own.
     #[must_use]
     pub const fn is_computation(self) -> bool {
-        matches!(self, Self::IntegrationStep)
+        matches!(
+            self,
+            Self::IntegrationStep | Self::Stability | Self::Rollout
+        )
     }
 
     /// Whether one bad field rejects the whole request. There, `null` in an optional field means absent.
@@ -127,6 +138,8 @@ impl Service {
                 | Self::Solve
                 | Self::SendGoal
                 | Self::TrialStart
+                | Self::Stability
+                | Self::Rollout
         )
     }
 
@@ -306,4 +319,63 @@ const TRIAL_STOP: ServiceEntry = ServiceEntry {
     owner: Node::IkTrial,
     request: &[],
     response: &[],
+};
+/// The type of a request's `gains`; its members are the fields of `/pid_controller/set_gains`.
+const GAINS_TYPE: &str = "pendularm_interfaces/msg/Gains";
+/// The type of a request's `params`; its members are the fields of `/arm_sim/set_params`.
+const PARAMS_TYPE: &str = "pendularm_interfaces/msg/Params";
+
+/// The members of a type of objects in requests.
+pub(super) fn members(kind: &str) -> &'static [Field] {
+    match kind {
+        GAINS_TYPE => &GAINS,
+        PARAMS_TYPE => &PARAMS,
+        _ => &[],
+    }
+}
+
+const STABILITY: ServiceEntry = ServiceEntry {
+    name: "/study/stability",
+    type_name: "pendularm_interfaces/srv/Stability",
+    owner: Node::Study,
+    request: &[
+        optional("integrator", "string", ""),
+        optional("gains", GAINS_TYPE, "SI"),
+        optional("params", PARAMS_TYPE, "SI"),
+        optional("setpoint", "float64[]", "rad"),
+    ],
+    response: &[
+        required("timestep_limit_held", "float64", "s"),
+        required("timestep_limit_continuous", "float64", "s"),
+        required("minimum_over_poses_held", "float64", "s"),
+        required("minimum_over_poses_continuous", "float64", "s"),
+        required("advised_timestep", "float64", "s"),
+    ],
+};
+const ROLLOUT: ServiceEntry = ServiceEntry {
+    name: "/study/rollout",
+    type_name: "pendularm_interfaces/srv/Rollout",
+    owner: Node::Study,
+    request: &[
+        optional("q0", "float64[]", "rad"),
+        optional("qdot0", "float64[]", "rad/s"),
+        optional("duration", "float64", "s"),
+        optional("timestep", "float64", "s"),
+        optional("integrator", "string", ""),
+        optional("params", PARAMS_TYPE, "SI"),
+        optional("gains", GAINS_TYPE, "SI"),
+        optional("setpoint", "float64[]", "rad"),
+        optional("samples", "uint64", ""),
+        optional("reference", "bool", ""),
+    ],
+    response: &[
+        required("times", "float64[]", "s"),
+        required("positions", "float64[][]", "rad"),
+        required("velocities", "float64[][]", "rad/s"),
+        required("efforts", "float64[][]", "N m"),
+        required("energy", "float64[]", "J"),
+        required("evaluations", "uint64", ""),
+        required("wall_time", "float64", "s"),
+        required("error", "float64", "rad"),
+    ],
 };

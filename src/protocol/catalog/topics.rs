@@ -30,11 +30,13 @@ pub enum Topic {
     RobotDescription,
     /// The runtime's warnings.
     Rosout,
+    /// The local error of the arm's steps, 10 Hz.
+    ErrorEstimate,
 }
 
 impl Topic {
     /// All topics, in the order in which they are documented.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::JointTrajectory,
         Self::JointStates,
         Self::Clock,
@@ -46,6 +48,7 @@ impl Topic {
         Self::TfStatic,
         Self::RobotDescription,
         Self::Rosout,
+        Self::ErrorEstimate,
     ];
 
     const fn entry(self) -> &'static TopicEntry {
@@ -61,6 +64,7 @@ impl Topic {
             Self::TfStatic => &TF_STATIC,
             Self::RobotDescription => &ROBOT_DESCRIPTION,
             Self::Rosout => &ROSOUT,
+            Self::ErrorEstimate => &ERROR_ESTIMATE,
         }
     }
 
@@ -248,5 +252,18 @@ const ROSOUT: TopicEntry = TopicEntry {
         required("file", "string", ""),
         required("function", "string", ""),
         required("line", "uint32", ""),
+    ],
+};
+const ERROR_ESTIMATE: TopicEntry = TopicEntry {
+    name: "/arm_sim/error_estimate",
+    type_name: "pendularm_interfaces/msg/ErrorEstimate",
+    direction: Direction::Published,
+    owner: Node::ArmSim,
+    fields: &[
+        required("method", "string", ""),
+        required("timestep", "float64", "s"),
+        required("local_error", "float64", "rad"),
+        required("error_per_second", "float64", "rad/s"),
+        required("predicted_limit", "float64", "s"),
     ],
 };

@@ -1,0 +1,66 @@
+"""roslibpy, unmodified, over WebSocket: `roslibpy_client.py HOST:PORT`."""
+
+import sys
+import threading
+
+import roslibpy
+
+PATIENCE = 30
+
+
+class Awaited:
+    """A value that a callback brings."""
+
+    def __init__(self, what):
+        self.what, self.event, self.value = what, threading.Event(), None
+
+    def __call__(self, *value):
+        self.value = value[0] if value else None
+        self.event.set()
+
+    def get(self):
+        assert self.event.wait(PATIENCE), f"{self.what} did not come"
+        return self.value
+
+
+host, port = sys.argv[1].rsplit(":", 1)
+ros = roslibpy.Ros(host, int(port))
+ros.run(timeout=PATIENCE)
+
+topics = ros.get_topics()
+assert "/joint_states" in topics and "/rosout" in topics, topics
+assert ros.get_topic_type("/joint_states") == "sensor_msgs/msg/JointState"
+assert "/arm_sim/set_params" in ros.get_services()
+assert ros.get_service_type("/arm_sim/set_params") == "pendularm_interfaces/srv/SetParams"
+assert "/arm_sim" in ros.get_nodes()["nodes"] if isinstance(ros.get_nodes(), dict) else True
+details = ros.get_message_details("sensor_msgs/msg/JointState")
+assert details["typedefs"][0]["fieldnames"][0] == "header", details
+assert ros.get_time()["secs"] >= 0
+
+gravity = roslibpy.Param(ros, "gravity")
+assert gravity.get() == 9.81, gravity.get()
+gravity.set(9.5)
+params = roslibpy.Service(ros, "/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
+assert params.call(roslibpy.ServiceRequest({}))["gravity"] == 9.5
+gravity.set(9.81)
+
+state = Awaited("a state")
+states = roslibpy.Topic(ros, "/joint_states", "sensor_msgs/JointState")
+states.subscribe(state)
+assert state.get()["name"] == ["joint1", "joint2"]
+states.unsubscribe()
+
+enable = roslibpy.Service(ros, "/pid_controller/enable", "pendularm_interfaces/srv/Enable")
+assert enable.call(roslibpy.ServiceRequest({"data": True})) == {"data": True}
+trajectory = roslibpy.Topic(ros, "/joint_trajectory", "trajectory_msgs/JointTrajectory")
+trajectory.publish(roslibpy.Message({"points": [{"positions": [0.2, 0.3]}]}))
+
+result, feedback = Awaited("a result"), Awaited("feedback")
+action = roslibpy.ActionClient(ros, "/ik_action", "pendularm_interfaces/action/MoveTo")
+goal = roslibpy.Goal({"x": 0.5, "y": 1.2})
+action.send_goal(goal, result, feedback, lambda error: print("refused:", error))
+assert result.get()["values"]["outcome"] == "reached", result.value
+assert feedback.event.is_set()
+
+ros.terminate()
+print("roslibpy: ok")
