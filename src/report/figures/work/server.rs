@@ -161,7 +161,7 @@ fn web(counts: &Counts) -> Vec<Cell> {
         let (size, symbols) = (counts.get(size), counts.get(symbols));
         size.zip(symbols)
             .map_or_else(unmeasured, |(size, symbols)| {
-                Cell::new(format!("{} bytes", number(*size))).detail(format!(
+                Cell::new(format!("{:.2} MB", size / 1e6)).detail(format!(
                     "{} symbols of HTTP and WebSocket",
                     number(*symbols)
                 ))
