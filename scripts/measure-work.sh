@@ -69,7 +69,7 @@ serve() { # name, frames to send first, subscribers, their topic
     local name=$1 first=$2 clients=$3 topic=${4:-/joint_states} counts="$scratch/counts" client pids=()
     valgrind --tool=callgrind --callgrind-out-file="$counts" "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
     server=$!
-    for _ in $(seq 100); do grep -q listening "$scratch/address" && break || sleep 0.1; done
+    for _ in $(seq 600); do grep -q listening "$scratch/address" && break || sleep 0.1; done
     local port
     port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$scratch/address")
     exec 3<>"/dev/tcp/127.0.0.1/$port"
@@ -100,7 +100,7 @@ if command -v callgrind_control >/dev/null; then
 ' 0
     serve server-1-subscriber "" 1
     serve server-11-subscribers "" 11
-    if grep -q '"/arm_sim/error_estimate"' "$root/src/protocol/catalog.rs"; then
+    if grep -rqF '"/arm_sim/error_estimate"' "$root/src/protocol"; then
         serve server-error-estimate "" 1 /arm_sim/error_estimate
     fi
 fi
@@ -109,7 +109,7 @@ fi
 wakes() { # name, frames to send first
     "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
     server=$!
-    for _ in $(seq 100); do grep -q listening "$scratch/address" && break || sleep 0.1; done
+    for _ in $(seq 600); do grep -q listening "$scratch/address" && break || sleep 0.1; done
     local port before after
     port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$scratch/address")
     exec 3<>"/dev/tcp/127.0.0.1/$port"
