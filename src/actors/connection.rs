@@ -1,6 +1,6 @@
 //! One client: bytes in, ops to the registry; messages and answers back, through a bounded outbox.
 //!
-//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
+//! A reception judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
 //! reading task hands one op at a time to the registry and waits until it has taken effect; the actor moves what it is
 //! sent into the outbox; the writing task drains the outbox. A client that reads slowly fills its own outbox and nothing else.
 //!
@@ -10,7 +10,7 @@
 
 pub mod gate;
 mod reader;
-mod session;
+mod reception;
 mod transport;
 #[cfg(feature = "web")]
 mod web;
@@ -31,7 +31,7 @@ use tokio::sync::Notify;
 use tokio::time::Instant;
 
 use self::gate::Gate;
-use self::session::Session;
+use self::reception::Reception;
 use super::ConnectionId;
 use super::gauges::Gauges;
 use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Request, Throttle};
@@ -295,7 +295,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         let Some(stream) = self.stream.take() else {
             return;
         };
-        let session = Session {
+        let reception = Reception {
             shared: Rc::clone(&self.shared),
             registry: self.registry.clone(),
             finish: ctx.address().recipient(),
@@ -304,7 +304,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         };
         let address = ctx.address();
         actix_rt::spawn(async move {
-            session.run(stream, admitted).await;
+            reception.run(stream, admitted).await;
             address.do_send(Ended);
         });
     }

@@ -27,7 +27,7 @@ use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
 use super::Shared;
 use super::gate::HEAD_TIME;
-use super::session::Session;
+use super::reception::Reception;
 use super::transport::{Inbound, Outbound, read_some};
 use crate::actors::ConnectionId;
 use crate::actors::registry::Request;
@@ -46,7 +46,7 @@ const FRAGMENT: usize = 64 * 1024;
 /// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
 const READ_BUFFER: usize = 8 * 1024;
 
-impl Session {
+impl Reception {
     /// Serves a client that has begun an HTTP request with `first`.
     pub(super) async fn serve_web<S>(self, mut stream: S, id: ConnectionId, first: BytesMut)
     where

@@ -25,7 +25,7 @@ use crate::protocol::messages::{self, Level};
 use crate::protocol::token::Token;
 
 /// What one connection's tasks need to know of the rest.
-pub(super) struct Session {
+pub(super) struct Reception {
     pub(super) shared: Rc<Shared>,
     pub(super) registry: Addr<Registry>,
     pub(super) finish: Recipient<Finish>,
@@ -48,7 +48,7 @@ enum Greeting {
     Finished,
 }
 
-impl Session {
+impl Reception {
     /// Serves a client that the registry has taken, or tells it why not; returns when nothing can be sent any more.
     pub(super) async fn run<S>(self, mut stream: S, admitted: Result<ConnectionId, Refused>)
     where
