@@ -37,6 +37,7 @@
 //! sees a node's answers and messages in the order in which the node produced them.
 
 pub mod arm_sim;
+pub mod awake;
 pub mod connection;
 pub mod follower;
 pub mod gauges;

@@ -29,6 +29,7 @@ pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::limit::LimitWatch;
 pub use self::limit::{ArmSettings, Consult, ControlLoop, HeldLimit, Present};
 use self::telemetry::Telemetry;
+use super::awake::stay_awake;
 use super::gauges::Gauges;
 use super::node::{Interest, ServiceCall, TopicMessage};
 use super::registry::{Nodes, Publish, Respond};
@@ -161,6 +162,7 @@ impl<const N: usize> Handler<ServiceCall> for ArmSim<N> {
     fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
         self.advance_to_now(ctx);
         self.serve(call, ctx);
+        stay_awake();
     }
 }
 

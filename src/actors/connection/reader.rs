@@ -15,6 +15,7 @@ use super::gate::{HEAD_TIME, MAX_LOCKED};
 use super::transport::{CHUNK, Inbound};
 use super::{ANSWERS_OWED, Finish, Shared};
 use crate::actors::ConnectionId;
+use crate::actors::awake::stay_awake;
 use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
 use crate::protocol::fragments::Fragments;
@@ -272,6 +273,7 @@ impl Reader {
         if let Ok(handled) = self.registry.send(request).await
             && let Some(effect) = handled.0
         {
+            stay_awake();
             // The sender is dropped, never used: its end is the news.
             let _ = effect.await;
         }
