@@ -9,7 +9,7 @@
 //! bits as one made at once.
 
 use super::expression::{Expression, Stack};
-use super::integrator::{Method, increment};
+use super::integrator::{Method, increment, two_sum};
 
 /// Most steps of one computation. A million samples are some 60 MB of JSON, about as much as a client can want at once.
 pub const MAX_STEPS: u64 = 1_000_000;
@@ -236,10 +236,7 @@ impl CompensatedSum {
     }
 
     fn add(&mut self, term: f64) {
-        let term = term + self.lost;
-        let sum = self.value + term;
-        let added = sum - self.value;
-        let lost = (self.value - (sum - added)) + (term - added);
+        let (sum, lost) = two_sum(self.value, term + self.lost);
         self.value = sum;
         // Where a sum overflows, what it lost is NaN; an infinite sum must stay one, as in ordinary arithmetic.
         self.lost = if lost.is_finite() { lost } else { 0.0 };
