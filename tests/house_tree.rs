@@ -131,7 +131,7 @@ fn no_file_names_a_folder_of_a_build_machine() {
             continue;
         };
         for home in &homes {
-            // A longer path that goes through such a name, as in `/a/work/b`, begins elsewhere.
+            // A longer path that goes through such a name, as in `/a/home/b`, begins elsewhere.
             let named = text.match_indices(home.as_str()).any(|(at, _)| {
                 !text[..at]
                     .ends_with(|before: char| before.is_alphanumeric() || "._-}~*".contains(before))
