@@ -94,9 +94,14 @@ async fn accept(
     gauges: Arc<Gauges>,
     gate: Arc<Gate>,
 ) {
+    // Told once, not twenty times a second.
+    let mut failing = false;
     loop {
         match socket.accept().await {
             Ok((stream, peer)) => {
+                if std::mem::take(&mut failing) {
+                    tracing::info!("clients are accepted again");
+                }
                 // Small frames must not wait for one another's acknowledgements.
                 if let Err(error) = stream.set_nodelay(true) {
                     tracing::debug!(%peer, %error, "TCP_NODELAY refused");
@@ -107,7 +112,9 @@ async fn accept(
                 Connection::start_behind(Arc::clone(&gate), local, stream, registry, gauges);
             }
             Err(error) => {
-                tracing::warn!(%error, "cannot accept a client; trying again");
+                if !std::mem::replace(&mut failing, true) {
+                    tracing::warn!(%error, "cannot accept a client; trying again and again");
+                }
                 actix_rt::time::sleep(BACKOFF).await;
             }
         }

@@ -39,6 +39,7 @@
 pub mod arm_sim;
 pub mod awake;
 pub mod connection;
+pub mod files;
 pub mod follower;
 pub mod gauges;
 pub mod ik;

@@ -18,6 +18,7 @@ use tokio::time::{Instant, sleep};
 
 use super::arm_sim::{ArmSim, Consult, joint_names};
 use super::connection::gate::Gate;
+use super::files;
 use super::gauges::Gauges;
 use super::ik::Ik;
 use super::ik_action::{GoalTracker, IkAction};
@@ -79,7 +80,9 @@ async fn serve(options: &Options) -> Result<(), RunError> {
         .unwrap_or(options.bind);
 
     let gauges = Arc::new(Gauges::default());
-    let registry = Registry::new(Arc::clone(&gauges)).start();
+    let registry = Registry::new(Arc::clone(&gauges))
+        .serving_at_most(files::make_room())
+        .start();
     let workers = WorkerPool::start(WorkerPool::default_threads())?;
     // The arm has no sockets: without them its thread sleeps on a lock instead of a poll, and wakes sooner.
     let arm_thread =

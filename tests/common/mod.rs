@@ -46,7 +46,19 @@ impl Runtime {
 
     /// The same at another address.
     pub fn with_bind(bind: &str, arguments: &[&str]) -> Self {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_pendularm"));
+        let program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
+        Self::spawn(program, bind, arguments)
+    }
+
+    /// The same, started by a shell that has done `prelude` before: sets limits, say.
+    pub fn under(prelude: &str) -> Self {
+        let mut shell = Command::new("sh");
+        let script = format!("{prelude} && exec \"$0\" \"$@\"");
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
+        Self::spawn(shell, "127.0.0.1:0", &[])
+    }
+
+    fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
         for variable in [
             "ARM_SIM_LINKS",
             "ARM_SIM_BIND",

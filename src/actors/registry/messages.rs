@@ -10,7 +10,7 @@ use bytes::Bytes;
 use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
-use super::{MAX_CONNECTIONS, Nodes};
+use super::Nodes;
 use crate::actors::ConnectionId;
 use crate::actors::connection::{Answer, Configure, Deliver, Finish};
 use crate::protocol::catalog::{Service, Topic};
@@ -48,9 +48,9 @@ pub struct Outlets {
 /// Why a client was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
-    /// The limit is reached.
-    #[error("too many connections: this runtime serves {MAX_CONNECTIONS} clients at once")]
-    Full,
+    /// The limit is reached, which this is.
+    #[error("too many connections: this runtime serves {0} clients at once")]
+    Full(usize),
     /// The runtime is ending.
     #[error("shutting down")]
     Closed,

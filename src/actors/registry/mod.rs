@@ -41,9 +41,8 @@ use crate::protocol::messages::{self as frames, Level};
 use crate::protocol::names;
 use crate::protocol::op::Verbosity;
 
-/// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer than the 1,024 open files
-/// that a process usually may have: a client too many is told so, where without a file to accept it with it would hang.
-pub const MAX_CONNECTIONS: usize = 960;
+/// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer where fewer files may be open.
+pub const MAX_CONNECTIONS: usize = 1024;
 /// Subscriptions (topic and id) of one connection.
 pub const MAX_SUBSCRIPTIONS: usize = 1024;
 /// Topics that one connection advertises.
@@ -71,6 +70,8 @@ pub struct Registry {
     /// What clients use and provide, for those who ask what there is.
     tally: Tally,
     gauges: Arc<Gauges>,
+    /// Clients at once.
+    max_connections: usize,
     connections_made: u64,
     /// Why no call is taken any more, once the runtime is ending.
     closed: Option<&'static str>,
@@ -117,8 +118,18 @@ impl Registry {
             fragmented: Cell::new(0),
             tally: Tally::default(),
             gauges,
+            max_connections: MAX_CONNECTIONS,
             connections_made: 0,
             closed: None,
+        }
+    }
+
+    /// The same for at most so many clients at once.
+    #[must_use]
+    pub fn serving_at_most(self, max_connections: usize) -> Self {
+        Self {
+            max_connections,
+            ..self
         }
     }
 }
@@ -146,8 +157,8 @@ impl Handler<Connect> for Registry {
         if self.closed.is_some() {
             return Err(Refused::Closed);
         }
-        if self.clients.len() >= MAX_CONNECTIONS {
-            return Err(Refused::Full);
+        if self.clients.len() >= self.max_connections {
+            return Err(Refused::Full(self.max_connections));
         }
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
