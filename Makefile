@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-browser test-clients lint doc report bench bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-browser test-clients lint audit doc report bench bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -36,6 +36,10 @@ lint: ## Check formatting and lints; any warning fails
 	$(CARGO) fmt --check
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
+
+audit: ## Check the dependencies: licences, duplicates, sources, advisories where there is a copy of the database
+	@echo "make audit: cargo-deny against deny.toml"
+	@bash scripts/audit.sh
 
 # What is public must not link to what is not; then private items too, for whoever reads the source.
 doc: ## Build the documentation; any warning fails

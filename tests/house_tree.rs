@@ -121,6 +121,25 @@ fn math_protocol_and_study_know_only_what_they_may() {
     }
 }
 
+/// Who may write `unsafe`: nobody; where a tool can't do without, the package denies it, and its source says where and why.
+#[test]
+fn every_package_forbids_unsafe_code() {
+    let all = files(root());
+    let manifests = all.iter().filter(|path| path.ends_with("Cargo.toml"));
+    let mut seen = 0;
+    for path in manifests {
+        let text = fs::read_to_string(path).unwrap();
+        let lints = text.split("[lints.rust]\n").nth(1).unwrap_or_default();
+        let lints = lints.split("\n[").next().unwrap();
+        let ours = path.parent() == Some(root());
+        let forbids = lints.contains("unsafe_code = \"forbid\"");
+        let denies = lints.contains("unsafe_code = \"deny\"");
+        assert!(forbids || (denies && !ours), "{}", path.display());
+        seen += 1;
+    }
+    assert!(seen >= 2, "{seen} packages");
+}
+
 /// A path of the machine that something was written on means nothing to anybody else.
 #[test]
 fn no_file_names_a_folder_of_a_build_machine() {
