@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** nothing here is rejected.
 
-use crate::{T, assert_values, parse, value};
+use super::{T, assert_values, parse, value};
 
 #[test]
 fn the_specifications_examples_are_valid() {

@@ -4,7 +4,7 @@
 
 use pendularm::math::expression::{Expression, ExpressionError};
 
-use crate::{assert_rejections, rejection};
+use super::{assert_rejections, rejection};
 
 #[test]
 fn an_empty_function_is_rejected() {

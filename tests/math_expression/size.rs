@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a test's thread has a stack of 2 MiB, so that anything that recursed on these would abort the run.
 
-use crate::{parse, rejection, value};
+use super::{parse, rejection, value};
 
 const MEGABYTE: usize = 1_000_000;
 

@@ -6,7 +6,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
 use serde_json::Value;
 
-use crate::{last, run};
+use super::{last, run};
 
 fn oracle() -> Value {
     serde_json::from_str(include_str!("../data/integrators.json")).unwrap()

@@ -5,7 +5,7 @@
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::{MAX_STEPS, MAX_WORK, Particle, ParticleError, evaluations};
 
-use crate::expression;
+use super::expression;
 
 /// The first of `Particle::new`'s complaints.
 fn refusal(text: &str, start: (f64, f64), dt: f64, steps: u64, method: Method) -> ParticleError {

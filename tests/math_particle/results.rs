@@ -5,7 +5,7 @@
 use pendularm::math::integrator::{Method, increment};
 use pendularm::math::particle::{Particle, evaluations};
 
-use crate::{expression, run};
+use super::{expression, run};
 
 fn bits(samples: &[f64]) -> Vec<u64> {
     samples.iter().map(|sample| sample.to_bits()).collect()
