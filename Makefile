@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-browser test-clients lint audit doc report bench bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-browser test-clients lint audit doc report mutants bench bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -51,6 +51,10 @@ report: build ## Measure error against run time and stability, and write report/
 	@echo "make report: report/index.html"
 	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
+
+mutants: ## Change src/math and src/protocol bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs"
+	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"
+	@bash scripts/mutants.sh $(ARGS)
 
 bench: ## Measure our own speed and size; KEEP=1 keeps the figures in benches/results/
 	@echo "make bench: some minutes; the fewer other programs run, the better"

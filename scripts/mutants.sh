@@ -14,7 +14,9 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 bar=90
 cpu_seconds=${MUTANTS_CPU_SECONDS:-15} # of one run of a layer's tests; they need about 4. A mutant that loops is caught so, however busy the machine is
-base=${MUTANTS_DIR:-${CARGO_TARGET_DIR:-$root/target}/mutants}
+base=${MUTANTS_DIR:-$root/target/mutants}
+# Each layer builds in its own folder.
+unset CARGO_TARGET_DIR RUSTFLAGS
 
 fail() { echo "mutants: $*" >&2; exit 1; }
 
@@ -119,7 +121,7 @@ for layer in "${layers[@]}"; do
     outcomes "$layer" "$folder" | awk -F '\t' '$1 ~ /caught|timeout|unviable/ { print $2 }' >"$folder/mutants.out/previously_caught.txt"
     # Its status says that something was missed; the score is ours to judge, below. What can't be judged is a layer whose own tests fail.
     status=0
-    (cd "$folder" && PROPTEST_CASES=64 RUST_TEST_THREADS=1 cargo mutants --in-place --iterate --timeout 300 --colors never "$@" -- --lib) || status=$?
+    (cd "$folder" && PROPTEST_CASES=64 RUST_TEST_THREADS=1 cargo mutants --in-place --iterate --timeout 300 --cargo-arg=--lib --colors never "$@") || status=$?
     case $status in 0 | 2 | 3) ;; *) fail "$layer: cargo mutants ended with status $status" ;; esac
     keep_outcomes "$folder"
     outcomes "$layer" "$folder" >"$folder/outcomes.tsv"

@@ -12,7 +12,7 @@
 
 use std::collections::HashSet;
 
-use pendularm::protocol::catalog::{Direction, Field, Node, Service, Topic};
+use pendularm::protocol::catalog::{Direction, Field, Node, Service, Topic, types};
 
 fn names(fields: &[Field]) -> Vec<&'static str> {
     fields.iter().map(|field| field.name).collect()
@@ -294,6 +294,24 @@ fn a_field_is_listed_once_and_numbers_have_a_unit() {
         {
             assert!(!field.unit.is_empty(), "{field:?}");
         }
+    }
+}
+
+/// Messages are encoded by walking through their types: that has to come to an end.
+#[test]
+fn no_type_has_itself_inside() {
+    fn walk(one: types::Type, above: &mut Vec<&'static str>) {
+        assert!(!above.contains(&one.name), "{above:?}: {}", one.name);
+        above.push(one.name);
+        for field in one.fields {
+            if let Some(inside) = types::find(field.element().0) {
+                walk(inside, above);
+            }
+        }
+        above.pop();
+    }
+    for one in types::all() {
+        walk(one, &mut Vec::new());
     }
 }
 

@@ -337,6 +337,17 @@ fn a_positional_array_is_read_in_documented_order() {
 }
 
 #[test]
+fn a_positional_array_may_have_as_many_entries_as_the_service_has_fields() {
+    let read = reading(Service::Disturb, "[[1,2],0.5]", |fields| {
+        (
+            fields.numbers("effort", 2, Bound::Finite),
+            fields.number("duration", Bound::Positive),
+        )
+    });
+    assert_eq!(read, ((Some(vec![1.0, 2.0]), Some(0.5)), String::new()));
+}
+
+#[test]
 fn a_positional_array_with_too_many_entries_is_rejected_naming_args() {
     let args = args("[1,2,3]");
     let rejection = Fields::read(&args, Service::SetIntegrator).unwrap_err();

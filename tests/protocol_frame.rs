@@ -263,6 +263,34 @@ fn an_idle_reader_gives_back_the_memory_of_a_long_frame() {
     reader.push(text.as_bytes());
     assert_eq!(reader.by_ref().count(), 1);
     assert!(reader.buffered() < 64 * 1024);
+    // Room for usual frames stays, so that they are read without allocating.
+    assert!(reader.buffered() >= 16 * 1024);
+}
+
+#[test]
+fn what_is_buffered_is_what_has_come_of_an_unfinished_frame() {
+    let mut reader = FrameReader::new();
+    let half = format!("{{\"a\":\"{}", "x".repeat(100_000));
+    reader.push(half.as_bytes());
+    assert_eq!(reader.next(), None);
+    assert!(reader.buffered() >= half.len());
+}
+
+/// The reader never is at the end of a frame when it is at the end of what was pushed.
+#[test]
+fn frames_that_are_done_with_are_not_kept_though_one_is_always_unfinished() {
+    let mut reader = FrameReader::new();
+    let text = format!("{{\"a\":\"{}\"}}\n", "x".repeat(10_000));
+    let (front, back) = text.split_at(10);
+    reader.push(front.as_bytes());
+    for _ in 0..100 {
+        assert_eq!(reader.next(), None);
+        reader.push(back.as_bytes());
+        reader.push(front.as_bytes());
+        assert!(reader.next().is_some_and(|found| found.is_ok()));
+        // Twice what is unfinished and was last pushed, and what a growing buffer has in reserve.
+        assert!(reader.buffered() < 8 * text.len());
+    }
 }
 
 #[test]

@@ -10,14 +10,14 @@ use serde_json::{Map, Value};
 use super::catalog::types::{self, Count, Type};
 use super::cdr;
 
-/// Major types of CBOR (RFC 8949), in place.
-const UNSIGNED: u8 = 0 << 5;
-const NEGATIVE: u8 = 1 << 5;
-const BYTES: u8 = 2 << 5;
-const TEXT: u8 = 3 << 5;
-const ARRAY: u8 = 4 << 5;
-const MAP: u8 = 5 << 5;
-const TAG: u8 = 6 << 5;
+/// Major types of CBOR (RFC 8949), in place: the upper three bits.
+const UNSIGNED: u8 = 0x00;
+const NEGATIVE: u8 = 0x20;
+const BYTES: u8 = 0x40;
+const TEXT: u8 = 0x60;
+const ARRAY: u8 = 0x80;
+const MAP: u8 = 0xa0;
+const TAG: u8 = 0xc0;
 const FALSE: u8 = 0xf4;
 const TRUE: u8 = 0xf5;
 const NULL: u8 = 0xf6;
@@ -89,18 +89,18 @@ fn head(topic: &str) -> Vec<u8> {
 )]
 fn length(out: &mut Vec<u8>, major: u8, number: u64) {
     match number {
-        0..=23 => out.push(major | number as u8),
-        24..=0xff => out.extend_from_slice(&[major | 24, number as u8]),
+        0..=23 => out.push(major + number as u8),
+        24..=0xff => out.extend_from_slice(&[major + 24, number as u8]),
         0x100..=0xffff => {
-            out.push(major | 25);
+            out.push(major + 25);
             out.extend_from_slice(&(number as u16).to_be_bytes());
         }
         0x1_0000..=0xffff_ffff => {
-            out.push(major | 26);
+            out.push(major + 26);
             out.extend_from_slice(&(number as u32).to_be_bytes());
         }
         _ => {
-            out.push(major | 27);
+            out.push(major + 27);
             out.extend_from_slice(&number.to_be_bytes());
         }
     }

@@ -10,8 +10,6 @@ use super::catalog::types::{self, Count, Type};
 
 /// Little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
-/// Deepest nesting of types: those we know have five levels.
-const MAX_DEPTH: usize = 16;
 
 /// The bytes of a message of that type.
 #[must_use]
@@ -19,7 +17,7 @@ pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
     let mut writer = Writer {
         bytes: HEADER.to_vec(),
     };
-    writer.message(one, msg, 0);
+    writer.message(one, msg);
     writer.bytes
 }
 
@@ -28,16 +26,16 @@ struct Writer {
 }
 
 impl Writer {
-    fn message(&mut self, one: Type, msg: &Value, depth: usize) {
+    fn message(&mut self, one: Type, msg: &Value) {
         for field in one.fields {
             let value = msg.get(field.name).unwrap_or(&Value::Null);
             match field.element() {
-                (kind, Count::One) => self.single(kind, value, depth),
+                (kind, Count::One) => self.single(kind, value),
                 (kind, Count::Any) => {
                     let entries = value.as_array().map(Vec::as_slice).unwrap_or_default();
                     self.count(entries.len());
                     for entry in entries {
-                        self.single(kind, entry, depth);
+                        self.single(kind, entry);
                     }
                 }
             }
@@ -48,7 +46,7 @@ impl Writer {
         clippy::cast_possible_truncation,
         reason = "a float32 is as exact as it can be"
     )]
-    fn single(&mut self, kind: &str, value: &Value, depth: usize) {
+    fn single(&mut self, kind: &str, value: &Value) {
         let unsigned = || value.as_u64().unwrap_or_default();
         let signed = || value.as_i64().unwrap_or_default();
         let float = || match value {
@@ -74,8 +72,9 @@ impl Writer {
             "float64" => self.aligned(float().to_le_bytes()),
             "string" => self.string(value.as_str().unwrap_or_default()),
             other => match types::find(other) {
-                Some(one) if depth < MAX_DEPTH => self.message(one, value, depth + 1),
-                _ => debug_assert!(false, "{other} is not a type that this writes"),
+                // No type has itself inside, so this comes to an end.
+                Some(one) => self.message(one, value),
+                None => debug_assert!(false, "{other} is not a type that this writes"),
             },
         }
     }

@@ -153,12 +153,14 @@ impl Fragments {
     }
 
     fn forget_old(&mut self, now: Instant) {
-        let before = self.messages.len();
-        self.messages
-            .retain(|_, one| now.saturating_duration_since(one.began) <= MAX_AGE);
-        if self.messages.len() < before {
-            self.bytes = self.messages.values().map(Unfinished::bytes).sum();
-        }
+        let bytes = &mut self.bytes;
+        self.messages.retain(|_, one| {
+            let kept = now.saturating_duration_since(one.began) <= MAX_AGE;
+            if !kept {
+                *bytes -= one.bytes();
+            }
+            kept
+        });
     }
 }
 
@@ -285,6 +287,35 @@ mod tests {
         let later = now + MAX_AGE + Duration::from_secs(1);
         assert_eq!(fragments.take(piece("more", 0, 2, "x"), later), Ok(None));
         assert_eq!(fragments.messages.len(), 1, "old ones are forgotten");
+    }
+
+    #[test]
+    fn the_bounds_themselves_are_within_bounds() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!(
+            fragments.take(piece("a", 0, MAX_PIECES, "x"), now),
+            Ok(None)
+        );
+        let half = "x".repeat(MAX_FRAME / 2);
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
+        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
+        assert_eq!(whole.map(|text| text.len()), Some(MAX_FRAME));
+    }
+
+    #[test]
+    fn what_is_forgotten_makes_room() {
+        let now = Instant::now();
+        let much = "x".repeat(MAX_FRAME / 2 + 1);
+        let mut fragments = Fragments::default();
+        fragments.take(piece("old", 0, 2, &much), now).unwrap();
+        let at_last = now + MAX_AGE;
+        let more = fragments.take(piece("new", 0, 2, &much), at_last);
+        assert_eq!(more, Err(FragmentError::TooLong));
+        let later = at_last + Duration::from_nanos(1);
+        assert_eq!(fragments.take(piece("new", 0, 2, &much), later), Ok(None));
+        assert_eq!(fragments.bytes, much.len());
     }
 
     /// Characters of one to four bytes, cut at every size: together again they are what they were.

@@ -52,7 +52,7 @@ impl fmt::Display for Expression {
                     if op == Op::Negate {
                         pieces.push(Piece::Operand {
                             root: operand,
-                            level: Level::Negation,
+                            level: Level::Operand,
                         });
                     } else {
                         f.write_str("(")?;
@@ -107,7 +107,7 @@ fn operand_levels(op: Op) -> (Level, Level) {
     match op.level() {
         Level::Sum => (Level::Sum, Level::Product),
         Level::Product => (Level::Product, Level::Power),
-        _ => (Level::Negation, Level::Power),
+        _ => (Level::Operand, Level::Power),
     }
 }
 

@@ -87,8 +87,7 @@ impl Op {
             Self::Add | Self::Subtract => Level::Sum,
             Self::Multiply | Self::Divide => Level::Product,
             Self::Power => Level::Power,
-            Self::Negate => Level::Negation,
-            _ => Level::Atom,
+            _ => Level::Operand,
         }
     }
 }
@@ -99,8 +98,8 @@ enum Level {
     Sum,
     Product,
     Power,
-    Negation,
-    Atom,
+    /// A negation, and whatever stands for itself: no operation asks for anything tighter.
+    Operand,
 }
 
 /// An expression in `t`. A value that exists is well-formed.
