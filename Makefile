@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-browser test-clients lint audit doc report mutants bench bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-browser test-clients lint audit doc report mutants bench bench-load bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -59,6 +59,10 @@ mutants: ## Change src/math and src/protocol bit by bit and count what the tests
 bench: ## Measure our own speed and size; KEEP=1 keeps the figures in benches/results/
 	@echo "make bench: some minutes; the fewer other programs run, the better"
 	@KEEP="$(KEEP)" bash benches/run.sh
+
+bench-load: ## Measure many clients' messages beside redis and mosquitto; ARGS=--quick for a look, KEEP=1 as above
+	@echo "make bench-load: some minutes; installs redis-server and mosquitto from Debian as root if they are missing"
+	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/load/run.sh
 
 bench-peers: ## Measure beside Pinocchio and MuJoCo, installed from PyPI into benches/peers/.venv; KEEP=1 as above
 	@echo "make bench-peers: downloads about 100 MB once, compiles, then some minutes"

@@ -1,0 +1,98 @@
+#!/usr/bin/env bash
+# `make bench-load`: messages between many clients, through pendularm, redis (pub/sub) and mosquitto, the same in one run.
+#
+# All three run on free ports of loopback; each is stopped by its process id. redis-server and mosquitto come from Debian's packages: as root they
+# are installed if missing. Takes some minutes. ARGS=--quick plays each scene for a moment and judges nothing; KEEP=1 keeps the figures in
+# benches/results/<date>-<processor>/load/.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/../.." && pwd)
+source "$root/benches/common.sh"
+
+# Three servers with 1,000 clients each, and both ends of a connection are ours.
+needed_files=4096
+[ "$(ulimit -n)" -ge $needed_files ] || ulimit -n $needed_files || fail "$needed_files open files are needed: raise ulimit -n"
+
+install_peers() {
+    local missing=()
+    PATH=$PATH:/usr/sbin
+    command -v redis-server >/dev/null || missing+=(redis-server)
+    command -v mosquitto >/dev/null || missing+=(mosquitto)
+    [ ${#missing[@]} -gt 0 ] || return 0
+    { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; } || fail "missing: ${missing[*]}; install Debian's packages of that name"
+    say "installing ${missing[*]}"
+    # Programs to be started here, no services.
+    { apt-get update --quiet=2 && DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 apt-get install --quiet=2 --yes --no-install-recommends "${missing[@]}"; } \
+        >"$scratch/apt.log" 2>&1 || { cat "$scratch/apt.log" >&2; fail "apt-get could not install ${missing[*]}"; }
+}
+
+scratch=$(mktemp -d)
+pids=()
+cleanup() {
+    local pid
+    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
+    wait
+    rm -rf "$scratch"
+}
+trap cleanup EXIT
+
+install_peers
+say "building (release)"
+[ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
+(cd "$benches" && cargo build --release --locked --quiet --bin load)
+program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
+
+# Waits until something listens on port $1; $2 is who it should be.
+await() {
+    local tries
+    for tries in $(seq 100); do
+        ! (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null || return 0
+        sleep 0.1
+    done
+    cat "$scratch/$2.log" >&2
+    fail "$2 does not listen"
+}
+
+{ read -r redis_port; read -r mosquitto_port; } < <("$built/load" ports 2)
+
+# Whatever would drop a message or write one to a disk is off.
+redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \
+    --client-output-buffer-limit "pubsub 0 0 0" >"$scratch/redis.log" 2>&1 &
+redis=$!
+pids+=("$redis")
+cat >"$scratch/mosquitto.conf" <<CONF
+listener $mosquitto_port 127.0.0.1
+allow_anonymous true
+set_tcp_nodelay true
+max_connections -1
+max_queued_messages 0
+max_queued_bytes 0
+persistence false
+sys_interval 0
+log_type error
+CONF
+chmod 755 "$scratch" # as root it becomes the user of that name, who has to read this
+mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
+mosquitto=$!
+pids+=("$mosquitto")
+"$program" --bind 127.0.0.1:0 --log warn >"$scratch/listening" 2>"$scratch/pendularm.log" &
+pendularm=$!
+pids+=("$pendularm")
+for _ in $(seq 100); do
+    [ ! -s "$scratch/listening" ] || break
+    sleep 0.1
+done
+address=$(sed 's/^listening on //' "$scratch/listening")
+[ -n "$address" ] || { cat "$scratch/pendularm.log" >&2; fail "pendularm does not listen"; }
+await "$redis_port" redis
+await "$mosquitto_port" mosquitto
+
+folder=$(results_folder)/load
+mkdir -p "$folder"
+{
+    environment "make bench-load"
+    echo "peers:     $(redis-server --version | sed 's/ sha=.*//'); $(mosquitto -h | sed -n 1p)"
+} | tee "$folder/environment.txt"
+# shellcheck disable=SC2086 # arguments, several
+"$built/load" "pendularm=$address=$pendularm" "redis=127.0.0.1:$redis_port=$redis" \
+    "mosquitto=127.0.0.1:$mosquitto_port=$mosquitto" ${ARGS:-} | tee "$folder/summary.txt"
+[ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/load"

@@ -1,0 +1,376 @@
+//! The clients of one server: publishers and subscribers behind one `epoll`, on one thread, the same for every server.
+//!
+//! **Invariant:** every subscriber gets every message of its topic once and in order, or the run fails.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use mio::net::TcpStream;
+use mio::{Events, Interest, Poll, Token};
+
+use crate::message::{Template, now, stamp};
+use crate::process;
+use crate::wire::{Event, Protocol};
+
+/// How long a server may take for what is asked of it before the run fails.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Before it is measured, a scene runs for so long.
+const WARM_UP: Duration = Duration::from_millis(500);
+/// Messages that a flooding publisher hands over in one write.
+const BURST: u64 = 16;
+/// Messages of a flooding publisher that its slowest subscriber may not have yet: few enough that no server has a reason to drop any.
+const WINDOW: u64 = 256;
+
+/// Who publishes, and how fast.
+#[derive(Clone, Copy, PartialEq)]
+pub enum Pace {
+    /// So many times a second.
+    Rate(f64),
+    /// As fast as the slowest subscriber takes them.
+    Flood,
+    /// Nobody here: the arm does, its own topic.
+    Arm,
+}
+
+/// Topics, each with one publisher and so many subscribers.
+#[derive(Clone, Copy)]
+pub struct Scene {
+    pub name: &'static str,
+    pub topics: usize,
+    pub subscribers: usize,
+    pub pace: Pace,
+}
+
+/// What a scene came to.
+pub struct Outcome {
+    pub seconds: f64,
+    pub deliveries: u64,
+    /// Processor time of the server while it was measured \[ns\].
+    pub processor: u64,
+    /// From a message's making to its reading, each \[ns\]; none where the arm publishes.
+    pub latencies: Vec<u32>,
+    /// Resident memory of the server at the end \[MB\].
+    pub resident: f64,
+}
+
+/// One connection.
+struct Link {
+    stream: TcpStream,
+    /// The topic that it publishes or subscribes to.
+    topic: usize,
+    /// The beginning of an event whose end has not come.
+    unread: Vec<u8>,
+    /// What the socket has not taken yet.
+    unsent: Vec<u8>,
+    ready: bool,
+    received: u64,
+    /// Stamps of what the arm has published.
+    stamps: Vec<u64>,
+}
+
+/// All connections of a scene: subscribers first, then publishers.
+pub struct Fleet {
+    protocol: Protocol,
+    scene: Scene,
+    names: Vec<String>,
+    poll: Poll,
+    events: Events,
+    links: Vec<Link>,
+    subscribers: usize,
+    /// Messages sent, by topic.
+    sent: Vec<u64>,
+    /// Messages received in all.
+    deliveries: u64,
+    latencies: Vec<u32>,
+    measuring: bool,
+    template: Template,
+    chunk: Vec<u8>,
+}
+
+impl Fleet {
+    /// Connects and subscribes everybody; returns when every subscription holds.
+    pub fn open(protocol: Protocol, address: SocketAddr, scene: Scene) -> Self {
+        let names = (0..scene.topics)
+            .map(|topic| match scene.pace {
+                Pace::Arm => "/joint_states".to_owned(),
+                _ => format!("/load/topic{topic}"),
+            })
+            .collect();
+        let publishers = if scene.pace == Pace::Arm { 0 } else { scene.topics };
+        let subscribers = scene.topics * scene.subscribers;
+        let mut fleet = Self {
+            protocol,
+            scene,
+            names,
+            poll: Poll::new().expect("epoll"),
+            events: Events::with_capacity(1024),
+            links: Vec::new(),
+            subscribers,
+            sent: vec![0; scene.topics],
+            deliveries: 0,
+            latencies: Vec::new(),
+            measuring: false,
+            template: Template::new(),
+            chunk: vec![0; 256 * 1024],
+        };
+        for number in 0..subscribers + publishers {
+            fleet.connect(address, number);
+        }
+        if protocol.greets_back() {
+            fleet.await_ready(0..subscribers + publishers);
+        }
+        for number in 0..subscribers {
+            let topic = fleet.links[number].topic;
+            protocol.subscribe(&fleet.names[topic], &mut fleet.links[number].unsent);
+            fleet.links[number].flush();
+        }
+        fleet.await_ready(0..subscribers);
+        for number in subscribers..subscribers + publishers {
+            let topic = fleet.links[number].topic;
+            protocol.advertise(&fleet.names[topic], &mut fleet.links[number].unsent);
+            fleet.links[number].flush();
+        }
+        fleet
+    }
+
+    fn connect(&mut self, address: SocketAddr, number: usize) {
+        let stream = std::net::TcpStream::connect(address).expect("the server accepts");
+        stream.set_nodelay(true).expect("nodelay");
+        stream.set_nonblocking(true).expect("non-blocking");
+        let mut stream = TcpStream::from_std(stream);
+        let interest = Interest::READABLE | Interest::WRITABLE;
+        self.poll.registry().register(&mut stream, Token(number), interest).expect("epoll");
+        let topic = if number < self.subscribers {
+            number / self.scene.subscribers
+        } else {
+            number - self.subscribers
+        };
+        let mut link = Link {
+            stream,
+            topic,
+            unread: Vec::new(),
+            unsent: Vec::new(),
+            ready: false,
+            received: 0,
+            stamps: Vec::new(),
+        };
+        self.protocol.greet(number, &mut link.unsent);
+        link.flush();
+        self.links.push(link);
+    }
+
+    /// Waits until each of these has been told that it is ready, and forgets it.
+    fn await_ready(&mut self, links: std::ops::Range<usize>) {
+        let deadline = Instant::now() + PATIENCE;
+        while self.links[links.clone()].iter().any(|link| !link.ready) {
+            assert!(Instant::now() < deadline, "{:?} leaves a client waiting", self.protocol);
+            self.turn(Duration::from_millis(10));
+        }
+        for link in &mut self.links[links] {
+            link.ready = false;
+        }
+    }
+
+    /// Runs the scene for `seconds` after a warm-up, then waits for all that is on its way.
+    pub fn run(mut self, pid: u32, seconds: f64) -> Outcome {
+        let began = Instant::now();
+        let (mut measured_from, mut processor, mut before) = (None, 0, 0);
+        let mut next = began;
+        let (wall, deliveries, used) = loop {
+            let now = Instant::now();
+            match measured_from {
+                None if now >= began + WARM_UP => {
+                    (measured_from, before) = (Some(now), self.deliveries);
+                    processor = process::processor(pid);
+                    self.measuring = true;
+                }
+                Some(from) if now >= from + Duration::from_secs_f64(seconds) => {
+                    let used = process::processor(pid) - processor;
+                    break (now - from, self.deliveries - before, used);
+                }
+                _ => {}
+            }
+            let wait = self.publish(now, &mut next);
+            self.turn(wait);
+        };
+        self.measuring = false;
+        self.drain();
+        Outcome {
+            seconds: wall.as_secs_f64(),
+            deliveries,
+            processor: used,
+            latencies: std::mem::take(&mut self.latencies),
+            resident: process::resident(pid),
+        }
+    }
+
+    /// Sends what is due; gives the time until more may be.
+    fn publish(&mut self, now: Instant, next: &mut Instant) -> Duration {
+        match self.scene.pace {
+            Pace::Arm => Duration::from_millis(20),
+            Pace::Flood => {
+                for topic in 0..self.scene.topics {
+                    self.flood(topic);
+                }
+                Duration::from_millis(20)
+            }
+            Pace::Rate(rate) => {
+                if now >= *next {
+                    let period = Duration::from_secs_f64(1.0 / rate);
+                    // A tick that was missed is skipped.
+                    *next = (*next + period).max(now);
+                    for topic in 0..self.scene.topics {
+                        self.send(topic, 1);
+                    }
+                }
+                next.saturating_duration_since(Instant::now())
+            }
+        }
+    }
+
+    /// Sends bursts as long as every subscriber of the topic keeps up.
+    fn flood(&mut self, topic: usize) {
+        let group = topic * self.scene.subscribers..(topic + 1) * self.scene.subscribers;
+        let slowest = self.links[group].iter().map(|link| link.received).min().unwrap_or(0);
+        while self.sent[topic] + BURST <= slowest + WINDOW {
+            self.send(topic, BURST);
+        }
+    }
+
+    fn send(&mut self, topic: usize, count: u64) {
+        let link = &mut self.links[self.subscribers + topic];
+        for _ in 0..count {
+            let payload = self.template.write(self.sent[topic]);
+            self.protocol.publish(&self.names[topic], payload, &mut link.unsent);
+            self.sent[topic] += 1;
+        }
+        link.flush();
+    }
+
+    /// Waits until every subscriber has all that was sent to it, and checks that it is so.
+    fn drain(&mut self) {
+        let deadline = Instant::now() + PATIENCE;
+        if self.scene.pace == Pace::Arm {
+            // A subscriber may be a message ahead of another: all have to reach the newest of now.
+            let newest = self.links.iter().filter_map(|link| link.stamps.last()).max().copied();
+            let newest = newest.expect("the arm publishes");
+            while self.links.iter().any(|link| link.stamps.last() < Some(&newest)) {
+                assert!(Instant::now() < deadline, "a subscriber never got the arm's message of {newest} ns");
+                self.turn(Duration::from_millis(10));
+            }
+            let oldest = self.links.iter().filter_map(|link| link.stamps.first()).max().copied();
+            let common = oldest.expect("the arm publishes")..=newest;
+            let mut all =
+                self.links.iter().map(|link| link.stamps.iter().filter(|&stamp| common.contains(stamp)));
+            let first: Vec<_> = all.next().expect("a subscriber").collect();
+            assert!(
+                all.all(|stamps| stamps.eq(first.iter().copied())),
+                "subscribers got different messages of the arm"
+            );
+            return;
+        }
+        for link in 0..self.subscribers {
+            let sent = self.sent[self.links[link].topic];
+            while self.links[link].received < sent {
+                let received = self.links[link].received;
+                assert!(
+                    Instant::now() < deadline,
+                    "{:?} lost messages: {received} of {sent} came to subscriber {link}",
+                    self.protocol
+                );
+                self.turn(Duration::from_millis(10));
+            }
+        }
+    }
+
+    /// Waits for events, but no longer than `wait`, and takes all that there is to read.
+    fn turn(&mut self, wait: Duration) {
+        let mut events = std::mem::replace(&mut self.events, Events::with_capacity(0));
+        match self.poll.poll(&mut events, Some(wait)) {
+            Err(error) if error.kind() != ErrorKind::Interrupted => panic!("epoll: {error}"),
+            _ => {}
+        }
+        for event in &events {
+            let Token(number) = event.token();
+            if event.is_writable() {
+                self.links[number].flush();
+            }
+            if event.is_readable() {
+                self.read(number);
+            }
+        }
+        self.events = events;
+    }
+
+    fn read(&mut self, number: usize) {
+        loop {
+            let read = match self.links[number].stream.read(&mut self.chunk) {
+                Ok(0) => panic!("{:?} has closed a connection", self.protocol),
+                Ok(read) => read,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                Err(error) => panic!("{:?}: {error}", self.protocol),
+            };
+            let mut unread = std::mem::take(&mut self.links[number].unread);
+            if unread.is_empty() {
+                let chunk = std::mem::take(&mut self.chunk);
+                let taken = self.take(number, &chunk[..read]);
+                unread.extend_from_slice(&chunk[taken..read]);
+                self.chunk = chunk;
+            } else {
+                unread.extend_from_slice(&self.chunk[..read]);
+                let taken = self.take(number, &unread);
+                unread.drain(..taken);
+            }
+            self.links[number].unread = unread;
+            // Less than asked for: there was no more.
+            if read < self.chunk.len() {
+                return;
+            }
+        }
+    }
+
+    /// Takes whole events off the front of `bytes`; gives how many bytes they had.
+    fn take(&mut self, number: usize, bytes: &[u8]) -> usize {
+        let mut taken = 0;
+        while let Some((event, length)) =
+            (taken < bytes.len()).then(|| self.protocol.next(&bytes[taken..])).flatten()
+        {
+            taken += length;
+            let link = &mut self.links[number];
+            match event {
+                Event::Message(payload) if self.scene.pace == Pace::Arm => {
+                    let stamp = stamp(payload);
+                    assert!(link.stamps.last() < Some(&stamp), "the arm's messages came out of order");
+                    link.stamps.push(stamp);
+                    self.deliveries += 1;
+                }
+                Event::Message(payload) => {
+                    let (sequence, sent) = self.template.read(payload).expect("a whole message");
+                    assert_eq!(sequence, link.received, "{:?}: the next message", self.protocol);
+                    link.received += 1;
+                    self.deliveries += 1;
+                    if self.measuring {
+                        self.latencies.push(u32::try_from(now() - sent).unwrap_or(u32::MAX));
+                    }
+                }
+                Event::Ready => link.ready = true,
+                Event::Answer | Event::Other => {}
+            }
+        }
+        taken
+    }
+}
+
+impl Link {
+    /// Writes as much as the socket takes; `epoll` tells when it takes more.
+    fn flush(&mut self) {
+        while !self.unsent.is_empty() {
+            match self.stream.write(&self.unsent) {
+                Ok(written) => drop(self.unsent.drain(..written)),
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return,
+                Err(error) => panic!("a write fails: {error}"),
+            }
+        }
+    }
+}

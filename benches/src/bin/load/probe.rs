@@ -1,0 +1,130 @@
+//! What somebody else sees of a server under load: the time of a light request, and whether the arm keeps its time.
+//!
+//! **Invariant:** each probe has a connection and a thread of its own, and asks little.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use crate::message::{now, stamp};
+use crate::wire::{Event, Protocol};
+
+/// Between two requests.
+const PERIOD: Duration = Duration::from_millis(20);
+/// A request that takes longer fails the run.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// A thread that probes until it is told to stop.
+pub struct Probe<T> {
+    stop: Arc<AtomicBool>,
+    thread: JoinHandle<T>,
+}
+
+impl<T: Send + 'static> Probe<T> {
+    fn start(work: impl FnOnce(&AtomicBool) -> T + Send + 'static) -> Self {
+        let stop = Arc::new(AtomicBool::new(false));
+        let flag = Arc::clone(&stop);
+        Self { stop, thread: std::thread::spawn(move || work(&flag)) }
+    }
+
+    pub fn stop(self) -> T {
+        self.stop.store(true, Ordering::Relaxed);
+        self.thread.join().expect("the probe ends well")
+    }
+}
+
+/// How long each request took, from its sending to its answer \[ns\].
+pub fn caller(protocol: Protocol, address: SocketAddr) -> Probe<Vec<u32>> {
+    Probe::start(move |stop| {
+        let mut client = Client::connect(protocol, address);
+        let mut request = Vec::new();
+        protocol.ask(&mut request);
+        let mut times = Vec::new();
+        while !stop.load(Ordering::Relaxed) {
+            std::thread::sleep(PERIOD);
+            let sent = Instant::now();
+            client.stream.write_all(&request).expect("sent");
+            let answered = client.listen(PATIENCE, |event| matches!(event, Event::Answer).then_some(()));
+            assert!(answered.is_some(), "{protocol:?} does not answer");
+            times.push(u32::try_from(sent.elapsed().as_nanos()).unwrap_or(u32::MAX));
+        }
+        times
+    })
+}
+
+/// Simulation time by wall time. The arm's `/clock` is heard late now and then, never early: so the earliest of the first second and
+/// of the last are compared.
+pub fn clock(address: SocketAddr) -> Probe<f64> {
+    Probe::start(move |stop| {
+        let mut client = Client::connect(Protocol::Pendularm, address);
+        let mut subscription = Vec::new();
+        Protocol::Pendularm.subscribe("/clock", &mut subscription);
+        client.stream.write_all(&subscription).expect("sent");
+        let mut heard = Vec::new();
+        while !stop.load(Ordering::Relaxed) {
+            let message = client.listen(Duration::from_secs(1), |event| match event {
+                Event::Message(payload) => Some((stamp(payload) as f64, now() as f64)),
+                _ => None,
+            });
+            heard.push(message.expect("the arm publishes its time"));
+        }
+        let second = heard.len().min(60);
+        let earliest = |part: &[(f64, f64)]| {
+            let by_delay = |a: &&(f64, f64), b: &&(f64, f64)| (a.1 - a.0).total_cmp(&(b.1 - b.0));
+            *part.iter().min_by(by_delay).expect("heard")
+        };
+        let (first, last) = (earliest(&heard[..second]), earliest(&heard[heard.len() - second..]));
+        (last.0 - first.0) / (last.1 - first.1)
+    })
+}
+
+/// A plain connection.
+struct Client {
+    protocol: Protocol,
+    stream: TcpStream,
+    unread: Vec<u8>,
+}
+
+impl Client {
+    fn connect(protocol: Protocol, address: SocketAddr) -> Self {
+        let stream = TcpStream::connect(address).expect("the server accepts");
+        stream.set_nodelay(true).expect("nodelay");
+        let mut client = Self { protocol, stream, unread: Vec::new() };
+        let mut greeting = Vec::new();
+        protocol.greet(99_999, &mut greeting);
+        client.stream.write_all(&greeting).expect("sent");
+        if protocol.greets_back() {
+            let greeted = client.listen(PATIENCE, |event| matches!(event, Event::Ready).then_some(()));
+            assert!(greeted.is_some(), "{protocol:?} does not greet");
+        }
+        client
+    }
+
+    /// Reads until something comes that `wanted` takes; `None` if it does not come in time.
+    fn listen<T>(&mut self, patience: Duration, wanted: impl Fn(Event) -> Option<T>) -> Option<T> {
+        self.stream.set_read_timeout(Some(patience)).expect("a timeout");
+        loop {
+            while let Some((event, length)) =
+                (!self.unread.is_empty()).then(|| self.protocol.next(&self.unread)).flatten()
+            {
+                let found = wanted(event);
+                self.unread.drain(..length);
+                if found.is_some() {
+                    return found;
+                }
+            }
+            let mut chunk = [0; 4096];
+            match self.stream.read(&mut chunk) {
+                Ok(0) => panic!("{:?} has closed a probe's connection", self.protocol),
+                Ok(read) => self.unread.extend_from_slice(&chunk[..read]),
+                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                    return None;
+                }
+                Err(error) => panic!("{:?}: {error}", self.protocol),
+            }
+        }
+    }
+}
