@@ -266,9 +266,14 @@ fn changing_gains_or_setpoint_keeps_the_integral() {
         kd: [1.0; 2],
     });
     assert_eq!(pid.integral(), &[3.0, -4.0]);
-    pid.set_setpoint(Setpoint::default());
+    let setpoint = Setpoint {
+        position: [0.5, 1.0],
+        velocity: [-1.0, 2.0],
+    };
+    pid.set_setpoint(setpoint);
     assert_eq!(pid.integral(), &[3.0, -4.0]);
     assert_eq!(pid.gains().kp, [1.0; 2]);
+    assert_eq!(pid.setpoint(), &setpoint);
 }
 
 #[test]

@@ -293,6 +293,25 @@ fn frames_that_are_done_with_are_not_kept_though_one_is_always_unfinished() {
     }
 }
 
+/// 32 bytes are enough to recognise a line by; a sender that never ends it hears of it then.
+#[test]
+fn the_beginning_of_a_line_that_is_no_object_is_told_as_soon_as_32_bytes_are_there() {
+    let mut reader = FrameReader::new();
+    reader.push(&[b'x'; 31]);
+    assert_eq!(reader.next(), None);
+    reader.push(b"y");
+    let told = reader.next().expect("an error").unwrap_err();
+    assert!(
+        told.to_string()
+            .ends_with("got \"xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxy…\""),
+        "{told}"
+    );
+    reader.push(b"the rest of it\nshort\n");
+    let told = reader.next().expect("an error").unwrap_err();
+    assert!(told.to_string().ends_with("got \"short\""), "{told}");
+    assert_eq!(reader.next(), None);
+}
+
 #[test]
 fn nesting_up_to_the_limit_is_taken_and_one_deeper_is_malformed() {
     let (deepest, deeper) = (nested(MAX_NESTING), nested(MAX_NESTING + 1));

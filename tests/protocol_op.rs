@@ -161,7 +161,9 @@ fn an_id_is_known_though_the_operation_is_in_error() {
 #[test]
 fn what_is_no_operation_is_named() {
     assert!(status("{\"a\":}").starts_with("malformed frame: "));
-    assert!(status("[]").starts_with("malformed frame: "));
+    let no_object = status("[]");
+    assert!(no_object.starts_with("malformed frame: "));
+    assert!(no_object.contains("expected a JSON object"), "{no_object}");
     assert!(status("{} {}").starts_with("malformed frame: "));
     assert!(status("{\"a\":01}").starts_with("malformed frame: "));
     assert_eq!(status("{}"), "malformed frame: op is required");

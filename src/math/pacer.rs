@@ -85,12 +85,6 @@ impl Pacer {
         self.taken = self.taken.saturating_add(steps);
     }
 
-    /// Length of a step \[s\].
-    #[must_use]
-    pub fn timestep(&self) -> f64 {
-        self.timestep
-    }
-
     fn owed(&self, now: Duration) -> u64 {
         self.whole_steps(now.saturating_sub(self.anchor))
             .saturating_sub(self.taken)

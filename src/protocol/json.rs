@@ -290,3 +290,18 @@ fn overflows(token: &str) -> bool {
         token.len() > SAFE_DIGITS || token.bytes().any(|byte| matches!(byte, b'e' | b'E'));
     suspect && token.parse::<f64>().is_ok_and(f64::is_infinite)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A client may send a million entries where two belong.
+    #[test]
+    fn no_more_entries_are_kept_than_were_asked_for_but_all_are_counted() {
+        let raw = RawValue::from_string("[1,2,3,4]".to_owned()).unwrap();
+        let entries = entries(&raw, 2).unwrap();
+        let first: Vec<&str> = entries.first.iter().map(|entry| entry.get()).collect();
+        assert_eq!((first, entries.count), (vec!["1", "2"], 4));
+        assert_eq!(entries.last.map(RawValue::get), Some("4"));
+    }
+}
