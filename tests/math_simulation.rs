@@ -423,6 +423,22 @@ fn an_arm_whose_disturbance_is_over_steps_as_one_that_never_had_any() {
 
 /// A torque of 1 N m for 1 s at the base of the stretched, weightless arm at rest (both links 1 m, 1 kg, rods): work in is kinetic energy gained, so
 /// turning faster by the same push either way round is symmetric.
+/// What predicts a step has to know the effort that it will be taken with.
+#[test]
+fn the_effort_of_the_next_step_is_what_that_step_is_then_taken_with() {
+    for on in [false, true] {
+        let mut simulation = moving(Method::Rk4);
+        simulation.enable(on);
+        simulation.disturb([3.0, -5.0], 0.01);
+        for step in 0..20 {
+            let told = simulation.effort_of_next_step();
+            simulation.step();
+            assert_eq!(simulation.effort(), &told, "step {step}");
+            assert_eq!(told == [0.0; 2], !on && step >= 10, "step {step}");
+        }
+    }
+}
+
 #[test]
 fn opposite_disturbances_move_the_weightless_arm_in_mirrored_ways() {
     let run = |sign: f64| {

@@ -13,8 +13,8 @@
 use bytes::Bytes;
 use pendularm::protocol::messages::{
     Clock, DiagnosticArray, DiagnosticStatus, Empty, Header, JointState, JointTrajectory,
-    JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, publish, publish_raw, response,
-    response_raw, status,
+    JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, publish, publish_raw, respelled,
+    response, response_raw, status,
 };
 use proptest::prelude::*;
 use serde::Serialize;
@@ -144,6 +144,29 @@ fn what_passes_through_is_untouched_but_for_numbers_that_overflow() {
     );
 }
 
+/// How much memory a frame holds on to.
+fn memory(frame: Bytes) -> usize {
+    frame.try_into_mut().expect("nobody else has it").capacity()
+}
+
+/// What waits for slow clients is counted by its length: it may not take more than that.
+#[test]
+fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_their_text() {
+    for length in [2, 40, 1000, 100_000] {
+        let msg = raw(&format!("{{\"a\":\"{}\"}}", "x".repeat(length)));
+        let frame = publish_raw("/chat", &msg);
+        let text = frame.len();
+        assert_eq!(memory(frame), text);
+    }
+    let large = "x".repeat(100_000);
+    let frame = publish("/large", &large);
+    let text = frame.len();
+    assert_eq!(memory(frame), text);
+    // Of another spelling: exact too.
+    let frame = respelled("/x", "x", &publish("/x", &[1, 2, 3]));
+    assert!(memory(frame) <= publish("/x", &[1, 2, 3]).len());
+}
+
 #[test]
 fn a_response_carries_the_callers_id_exactly() {
     for id in [
@@ -209,6 +232,11 @@ fn a_stamp_splits_seconds_and_carries_when_it_rounds_up() {
 
 #[test]
 fn a_stamp_saturates_and_is_never_negative() {
+    let last = Stamp {
+        sec: i32::MAX,
+        nanosec: 999_999_999,
+    };
+    assert_eq!(Stamp::MAX, last);
     for seconds in [2_147_483_648.0, 1e300, f64::INFINITY] {
         assert_eq!(Stamp::from_seconds(seconds), Stamp::MAX, "{seconds}");
     }
