@@ -421,8 +421,6 @@ fn an_arm_whose_disturbance_is_over_steps_as_one_that_never_had_any() {
     assert_eq!(pushed, fresh);
 }
 
-/// A torque of 1 N m for 1 s at the base of the stretched, weightless arm at rest (both links 1 m, 1 kg, rods): work in is kinetic energy gained, so
-/// turning faster by the same push either way round is symmetric.
 /// What predicts a step has to know the effort that it will be taken with.
 #[test]
 fn the_effort_of_the_next_step_is_what_that_step_is_then_taken_with() {
@@ -439,6 +437,24 @@ fn the_effort_of_the_next_step_is_what_that_step_is_then_taken_with() {
     }
 }
 
+/// The arm has stood still for 2^30 s; numbers there are 2^-22 s apart, which is a step, and the push is shorter.
+#[test]
+fn a_disturbance_shorter_than_the_clock_can_tell_is_in_one_step() {
+    let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
+    let mut simulation = Simulation::<2>::new(arm, Gains::default());
+    simulation.set_timestep(2.0_f64.powi(30));
+    simulation.advance(1);
+    simulation.set_timestep(2.0_f64.powi(-22));
+    simulation.disturb([1.0, 0.0], 1e-9);
+    for effort in [[1.0, 0.0], [0.0, 0.0]] {
+        assert_eq!(simulation.effort_of_next_step(), effort);
+        simulation.advance(1);
+        assert_eq!(simulation.effort(), &effort);
+    }
+}
+
+/// A torque of 1 N m for 1 s at the base of the stretched, weightless arm at rest (both links 1 m, 1 kg, rods): work in is kinetic energy gained, so
+/// turning faster by the same push either way round is symmetric.
 #[test]
 fn opposite_disturbances_move_the_weightless_arm_in_mirrored_ways() {
     let run = |sign: f64| {

@@ -162,6 +162,13 @@ fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_t
     let frame = publish("/large", &large);
     let text = frame.len();
     assert_eq!(memory(frame), text);
+    // Calls and answers that only pass through: their text and the room for a usual frame.
+    for passed in [raw("{}"), raw(&format!("[\"{}\"]", "x".repeat(10_000)))] {
+        let most = passed.get().len() + 512;
+        assert_eq!(memory(call("/x", "1", &passed)), most);
+        let answer = response_raw("/x", None, &passed, true, "");
+        assert_eq!(memory(answer), most);
+    }
     // Of another spelling: exact too.
     let frame = respelled("/x", "x", &publish("/x", &[1, 2, 3]));
     assert!(memory(frame) <= publish("/x", &[1, 2, 3]).len());

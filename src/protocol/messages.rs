@@ -267,7 +267,7 @@ pub fn response_raw(
     result: bool,
     status: &str,
 ) -> Bytes {
-    Line::op("service_response")
+    Line::with_room("service_response", values.get().len() + USUAL_FRAME)
         .text("service", service)
         .optional_raw("id", id)
         .raw("values", values)
@@ -323,7 +323,7 @@ pub fn status(level: Level, msg: &str, id: Option<&RawValue>) -> Bytes {
 /// A call that goes on to an external provider under an id of the runtime's own; `args` only pass through.
 #[must_use]
 pub fn call(service: &str, id: &str, args: &RawValue) -> Bytes {
-    Line::op("call_service")
+    Line::with_room("call_service", args.get().len() + USUAL_FRAME)
         .text("service", service)
         .text("id", id)
         .raw("args", args)
@@ -375,13 +375,9 @@ impl Line {
     }
 
     fn raw(mut self, key: &str, raw: &RawValue) -> Self {
-        let strict = json::strict(raw.get());
         self.key(key);
-        // Where the room for it was not asked for at the start, there is to be some for what follows too.
-        if self.text.capacity() - self.text.len() < strict.len() + "}\n".len() {
-            self.text.reserve(strict.len() + USUAL_FRAME / 2);
-        }
-        self.text.extend_from_slice(strict.as_bytes());
+        self.text
+            .extend_from_slice(json::strict(raw.get()).as_bytes());
         self
     }
 
