@@ -12,6 +12,7 @@ pub mod gate;
 mod reader;
 mod reception;
 mod transport;
+pub mod unfinished;
 #[cfg(feature = "web")]
 mod web;
 mod writer;
@@ -28,16 +29,18 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::Notify;
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 
 use self::gate::Gate;
 use self::reception::Reception;
 use super::ConnectionId;
+use super::budget::{Claim, Share};
 use super::gauges::Gauges;
+use super::node::SMALL_ANSWER;
 use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Request, Throttle};
 use crate::options::DEFAULT_BIND;
 use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::outbox::Outbox;
+use crate::protocol::outbox::{MAX_TOPIC_BYTES, Outbox};
 
 /// While more bytes of responses than this wait, the client is not read and none of its computations starts.
 pub const MAX_RESPONSES_WAITING: usize = 32 * 1024 * 1024;
@@ -51,6 +54,13 @@ pub const LINGER: Duration = Duration::from_secs(5);
 /// How long a client that has stopped sending is owed the answers that are not ready yet: longer than other clients
 /// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
 pub const ANSWERS_OWED: Duration = Duration::from_secs(15);
+
+/// A frame of no more bytes from a client that has no responses waiting is served whatever waits for the others.
+pub const SMALL_FRAME: usize = 64 * 1024;
+/// Bytes of topic messages that may wait for one client while all clients together have nearly all that there is for them.
+pub const MAX_TOPIC_BYTES_SCARCE: usize = 64 * 1024;
+/// How often a client that finds no room in a total looks again.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
 /// What a response of the arm makes old: after the response to a pause, none of these from before it may follow.
 const ARM_STATE: [&str; 8] = [
@@ -105,8 +115,9 @@ struct Shared {
 /// The heavy calls of one connection: one runs, some wait.
 #[derive(Default)]
 struct Computations {
-    waiting: VecDeque<Request>,
-    running: bool,
+    waiting: VecDeque<(Request, Share)>,
+    /// Room for a small answer or a failure, and for the request itself, while one runs.
+    running: Option<Share>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
@@ -230,6 +241,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connectio
     fn handle(&mut self, message: Deliver, _: &mut Context<Self>) {
         let mut outbox = self.shared.outbox.borrow_mut();
         let before = outbox.dropped();
+        outbox.limit_topics(self.shared.topic_room(message.frame.len()));
         outbox.push(&message.topic, message.frame, Instant::now().into_std());
         self.shared.gauges.add_dropped(outbox.dropped() - before);
         self.shared.outgoing.notify_one();
@@ -246,7 +258,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Answer> for Connection
         self.shared
             .send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] });
         if answer.service.is_some_and(Service::is_computation) {
-            self.shared.computations.borrow_mut().running = false;
+            self.shared.computations.borrow_mut().running = None;
             self.shared.start_computation(&self.registry);
             self.shared.room.notify_one();
         }
@@ -352,20 +364,57 @@ impl Shared {
         self.start_computation(registry);
     }
 
+    /// Bytes of topic messages that may wait for this client, now that one of `length` bytes comes. Where all clients together have
+    /// much waiting, this one may keep the newest message; where they have nearly all, only a little.
+    fn topic_room(&self, length: usize) -> usize {
+        let messages = &self.gauges.totals().messages;
+        if messages.has_room(Claim::Heavy) {
+            MAX_TOPIC_BYTES
+        } else if messages.has_room(Claim::Last) {
+            length.max(MAX_TOPIC_BYTES_SCARCE)
+        } else {
+            MAX_TOPIC_BYTES_SCARCE
+        }
+    }
+
+    /// Waits for room for the answer to a frame of so many bytes, and for what is kept of the frame until then. A small frame of a
+    /// client without backlog finds some as long as every client keeps to that.
+    async fn room_for(&self, length: usize) -> Share {
+        let responses = &self.gauges.totals().responses;
+        let bytes = SMALL_ANSWER + length + length / 2;
+        loop {
+            let is_modest = length <= SMALL_FRAME && self.outbox.borrow().response_bytes() == 0;
+            let claim = if is_modest {
+                Claim::Last
+            } else {
+                Claim::Ordinary
+            };
+            if let Some(share) = responses.take(bytes, claim) {
+                return share;
+            }
+            if self.finishing.get() {
+                return responses.note(0);
+            }
+            let _ = timeout(LOOK_AGAIN, self.room.notified()).await;
+        }
+    }
+
     /// Queues a heavy call behind the connection's others.
-    fn enqueue_computation(&self, request: Request, registry: &Addr<Registry>) {
-        self.computations.borrow_mut().waiting.push_back(request);
+    fn enqueue_computation(&self, request: Request, room: Share, registry: &Addr<Registry>) {
+        let mut computations = self.computations.borrow_mut();
+        computations.waiting.push_back((request, room));
+        drop(computations);
         self.start_computation(registry);
     }
 
     /// Starts the next computation if none runs and its answer would find room.
     fn start_computation(&self, registry: &Addr<Registry>) {
         let mut computations = self.computations.borrow_mut();
-        if computations.running || !self.may_compute() {
+        if computations.running.is_some() || !self.may_compute() {
             return;
         }
-        if let Some(request) = computations.waiting.pop_front() {
-            computations.running = true;
+        if let Some((request, room)) = computations.waiting.pop_front() {
+            computations.running = Some(room);
             registry.do_send(request);
         }
     }
@@ -373,7 +422,7 @@ impl Shared {
     /// True while a computation runs or waits.
     fn is_computing(&self) -> bool {
         let computations = self.computations.borrow();
-        computations.running || !computations.waiting.is_empty()
+        computations.running.is_some() || !computations.waiting.is_empty()
     }
 
     /// Nobody waits for the computations any more.

@@ -1,12 +1,14 @@
 //! Counters that one node writes and another reports: what `/diagnostics` says about the gateway, and work whose absence is to
-//! be shown.
+//! be shown. The totals of what clients hold are kept beside them.
 //!
 //! The arm publishes `/diagnostics` from its own thread; asking the registry once a second would make the gateway part
 //! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
 //!
-//! **Invariant:** statistics only; nothing is decided by them.
+//! **Invariant:** the counters are statistics: only by the totals anything is decided.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::budget::Totals;
 
 /// Numbers about the runtime, shared by reference.
 #[derive(Debug, Default)]
@@ -14,9 +16,25 @@ pub struct Gauges {
     connections: AtomicU64,
     messages_dropped: AtomicU64,
     error_estimates: AtomicU64,
+    totals: Totals,
 }
 
 impl Gauges {
+    /// Counters at zero, beside totals of one's own.
+    #[must_use]
+    pub fn with(totals: Totals) -> Self {
+        Self {
+            totals,
+            ..Self::default()
+        }
+    }
+
+    /// What all clients together may hold.
+    #[must_use]
+    pub fn totals(&self) -> &Totals {
+        &self.totals
+    }
+
     /// Clients connected now.
     #[must_use]
     pub fn connections(&self) -> u64 {

@@ -9,6 +9,7 @@ use std::time::Instant;
 use actix::prelude::*;
 use bytes::Bytes;
 
+use super::budget::NoRoom;
 use super::node::{Reply, ServiceCall};
 use super::registry::Nodes;
 use super::workers::{Computation, Progress, WorkerPool};
@@ -22,6 +23,10 @@ use crate::protocol::streamed::StreamedResponse;
 
 /// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
+/// The longest number and the comma behind it, and the number itself while the answer is computed.
+pub(super) const NUMBER_BYTES: usize = 25 + 8;
+/// What a byte of an expression may cost once it has been read.
+const EXPRESSION_BYTES: usize = 32;
 /// Numbers encoded between two looks at the clock: some tens of microseconds.
 const NUMBERS_PER_LOOK: usize = 1024;
 
@@ -93,9 +98,13 @@ impl Computation for IntegrationStep {
                 self.refuse("the caller is gone");
             }
             self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
-                Stage::Unread(arguments) => match read(&arguments) {
+                Stage::Unread(arguments) => match self.begin(&arguments) {
                     Ok(particle) => Stage::Stepping(Box::new(particle)),
-                    Err(why) => {
+                    Err(None) => {
+                        self.stage = Stage::Unread(arguments);
+                        return Progress::Waiting;
+                    }
+                    Err(Some(why)) => {
                         self.reply.refuse(&why);
                         Stage::Done
                     }
@@ -130,6 +139,30 @@ impl Computation for IntegrationStep {
         self.reply.refuse(why);
         self.stage = Stage::Done;
     }
+}
+
+impl IntegrationStep {
+    /// Takes room for the answer, then reads the request; refused for the reason given, or without one put off.
+    fn begin(&mut self, arguments: &Arguments) -> Result<Particle, Option<String>> {
+        match self.reply.reserve(most_bytes(arguments)) {
+            Ok(()) => read(arguments).map_err(Some),
+            Err(NoRoom::Yet) => Err(None),
+            Err(NoRoom::Now) => Err(Some(NoRoom::Now.to_string())),
+        }
+    }
+}
+
+/// The most bytes that the answer can have, and its computation beside it. Whatever is wrong with the request is found when it is read.
+fn most_bytes(arguments: &Arguments) -> usize {
+    let steps = Fields::read(arguments, Service::IntegrationStep)
+        .ok()
+        .and_then(|mut fields| fields.count("steps", MAX_STEPS))
+        .unwrap_or_default();
+    let samples = usize::try_from(steps)
+        .unwrap_or(usize::MAX)
+        .saturating_add(1);
+    let values = samples.saturating_mul(3 * NUMBER_BYTES);
+    values.saturating_add(EXPRESSION_BYTES * arguments.raw().get().len())
 }
 
 /// Reads the request; all or nothing, and every field that is wrong is named.

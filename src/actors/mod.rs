@@ -38,6 +38,7 @@
 
 pub mod arm_sim;
 pub mod awake;
+pub mod budget;
 pub mod connection;
 pub mod files;
 pub mod follower;

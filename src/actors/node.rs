@@ -5,6 +5,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -13,10 +14,20 @@ use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
+use super::budget::{Budget, Claim, NoRoom, Promise};
 use super::registry::Respond;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages;
 use crate::protocol::op::Arguments;
+
+/// Bytes of an answer for which there is always room, beside twice the caller's `id`: more than any answer has but those that list or
+/// compute something.
+pub const SMALL_ANSWER: usize = 16 * 1024;
+/// How long a computation waits for room that is taken by answers which wait for their clients, before it is refused.
+pub const ROOM_TIME: Duration = Duration::from_secs(2);
+/// What a caller is told whose answer found no room.
+const NO_ROOM: &str =
+    "too many bytes of answers wait for clients that do not read; try again later";
 
 /// A call of one of the runtime's own services. From the registry; answered through `reply`.
 #[derive(Message)]
@@ -73,6 +84,12 @@ pub struct Reply {
     gone: Arc<AtomicBool>,
     answered: bool,
     done: Option<oneshot::Sender<()>>,
+    /// The total that answers count in.
+    budget: Option<Budget>,
+    /// What was taken for an answer of megabytes.
+    promise: Option<Promise>,
+    /// Since when answers that wait have left no room for that.
+    asked_for_room: Option<Instant>,
 }
 
 impl Reply {
@@ -97,9 +114,43 @@ impl Reply {
                 gone,
                 answered: false,
                 done: Some(done),
+                budget: None,
+                promise: None,
+                asked_for_room: None,
             },
             ended,
         )
+    }
+
+    /// The answer counts in this total until it has been written.
+    #[must_use]
+    pub fn within(mut self, budget: Budget) -> Self {
+        self.budget = Some(budget);
+        self
+    }
+
+    /// Takes room for an answer of at most so many bytes, beside the echo of the caller's `id`, before it is computed. Small ones need
+    /// none to be taken.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+        let Some(budget) = self.budget.as_ref().filter(|_| bytes > SMALL_ANSWER) else {
+            return Ok(());
+        };
+        match budget.promise(bytes.saturating_add(self.small_answer())) {
+            Ok(promise) => {
+                self.promise = Some(promise);
+                Ok(())
+            }
+            Err(NoRoom::Now) => {
+                // Answers are on their way to clients that read them: those make room in a moment.
+                let since = self.asked_for_room.get_or_insert_with(Instant::now);
+                let is_patient = since.elapsed() < ROOM_TIME;
+                Err(if is_patient { NoRoom::Yet } else { NoRoom::Now })
+            }
+            Err(yet) => Err(yet),
+        }
     }
 
     /// The connection that called.
@@ -166,6 +217,7 @@ impl Reply {
             return;
         }
         self.answered = true;
+        let frame = self.counted(frame);
         self.registry.do_send(Respond {
             connection: self.connection,
             frame,
@@ -173,6 +225,27 @@ impl Reply {
             status: None,
             done,
         });
+    }
+
+    /// The answer, counted in the total; a failure instead where a long one finds no room.
+    fn counted(&mut self, frame: Bytes) -> Bytes {
+        if let Some(promise) = self.promise.take() {
+            return promise.cover(frame);
+        }
+        let Some(budget) = &self.budget else {
+            return frame;
+        };
+        if frame.len() <= self.small_answer() {
+            return budget.count(frame);
+        }
+        match budget.take(frame.len(), Claim::Ordinary) {
+            Some(share) => share.cover(frame),
+            None => budget.count(messages::failure(&self.name, self.id.as_deref(), NO_ROOM)),
+        }
+    }
+
+    fn small_answer(&self) -> usize {
+        SMALL_ANSWER + 2 * self.id.as_deref().map_or(0, |id| id.get().len())
     }
 }
 

@@ -16,6 +16,7 @@ use tokio::sync::oneshot;
 use self::rollout::RolloutWork;
 use self::stability::StabilityWork;
 use super::arm_sim::{ArmSettings, ControlLoop, HeldLimit};
+use super::budget::NoRoom;
 use super::node::{Reply, ServiceCall};
 use super::registry::Nodes;
 use super::workers::{Computation, Progress, WorkerPool};
@@ -79,6 +80,7 @@ impl<const N: usize> Handler<ServiceCall> for Study<N> {
             };
             study.workers.submit(Box::new(Answering {
                 reply,
+                has_room: false,
                 work: Some(work),
             }));
         }));
@@ -100,6 +102,11 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
 
 /// What a call asks for, done piece by piece.
 trait Work: Send {
+    /// The most bytes that the answer can have, and its computation beside it; asked before it begins.
+    fn most_bytes(&self) -> usize {
+        0
+    }
+
     /// Does a piece, a fraction of a slice; true once it has answered.
     fn advance(&mut self, reply: &mut Reply) -> bool;
 }
@@ -107,6 +114,8 @@ trait Work: Send {
 /// A call on its way through the workers.
 struct Answering {
     reply: Reply,
+    /// Room for the answer has been taken.
+    has_room: bool,
     /// None once it is answered.
     work: Option<Box<dyn Work>>,
 }
@@ -116,6 +125,12 @@ impl Computation for Answering {
         while let Some(work) = &mut self.work {
             if self.reply.caller_is_gone() {
                 self.refuse("the caller is gone");
+            } else if !self.has_room {
+                match self.reply.reserve(work.most_bytes()) {
+                    Ok(()) => self.has_room = true,
+                    Err(NoRoom::Yet) => return Progress::Waiting,
+                    Err(NoRoom::Now) => self.refuse(&NoRoom::Now.to_string()),
+                }
             } else if work.advance(&mut self.reply) {
                 self.work = None;
             } else if Instant::now() >= deadline {

@@ -6,6 +6,8 @@
 //! A long computation comes to hold a hundred megabytes of results. So one that has had [`SHORT_SLICES`] turns is long,
 //! and only [`MAX_LONG`] long ones take turns; the others wait, and still hold little. Short ones never wait for long ones.
 //!
+//! At most [`MAX_ADMITTED`] are here at once, all clients' together: one more is refused, so that a pool that is stuck holds up nobody for ever.
+//!
 //! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
 
 use std::collections::VecDeque;
@@ -23,11 +25,22 @@ pub const SHORT_SLICES: u32 = 16;
 /// Long computations that take turns with one another: what they hold together stays below half a gigabyte.
 pub const MAX_LONG: usize = 4;
 
+/// Computations that may be here at once, waiting or running: four clients in ten may have one each. The rest is refused.
+pub const MAX_ADMITTED: usize = 256;
+/// What the caller of one too many is told.
+pub const BUSY: &str =
+    "busy: as many computations of all clients wait as may wait; try again later";
+
+/// How often those that can't begin try again while nothing else is computed.
+const TRY_AGAIN: Duration = Duration::from_millis(10);
+
 /// Whether a computation wants another turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// It goes to the back of the queue.
     Unfinished,
+    /// It can't begin yet: it tries again when another has ended, or after a moment.
+    Waiting,
     /// It has answered and can be dropped.
     Finished,
 }
@@ -58,6 +71,8 @@ struct Queue {
     turns: VecDeque<Job>,
     /// Long computations for which there is no place among the turns yet.
     parked: VecDeque<Job>,
+    /// Those that can't begin yet.
+    waiting: VecDeque<Job>,
     /// Long computations among the turns, those that run included.
     long: usize,
     running: usize,
@@ -90,18 +105,19 @@ impl Queue {
         self.turns.push_back(job);
     }
 
-    /// A computation has ended: if it was a long one, the next has its place. True if there is one.
-    fn end(&mut self, was_long: bool) -> bool {
-        if !was_long {
-            return false;
+    /// A computation has ended: those that waited for that try again, and if it was a long one, the next has its place.
+    fn end(&mut self, was_long: bool) {
+        self.turns.append(&mut self.waiting);
+        if was_long {
+            match self.parked.pop_front() {
+                Some(next) => self.turns.push_back(next),
+                None => self.long -= 1,
+            }
         }
-        let next = self.parked.pop_front();
-        let found = next.is_some();
-        match next {
-            Some(next) => self.turns.push_back(next),
-            None => self.long -= 1,
-        }
-        found
+    }
+
+    fn admitted(&self) -> usize {
+        self.running + self.turns.len() + self.parked.len() + self.waiting.len()
     }
 }
 
@@ -130,11 +146,11 @@ impl WorkerPool {
         thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).clamp(1, 4))
     }
 
-    /// Puts a computation at the back of the queue; refuses it if the pool is closed.
+    /// Puts a computation at the back of the queue; refuses it if the pool is closed, or has as many as it may have.
     pub fn submit(&self, mut computation: Box<dyn Computation>) {
-        let closed = {
+        let why = {
             let mut queue = self.shared.lock();
-            if queue.closed.is_none() {
+            if queue.closed.is_none() && queue.admitted() < MAX_ADMITTED {
                 let slices = 0;
                 queue.turns.push_back(Job {
                     computation,
@@ -143,9 +159,9 @@ impl WorkerPool {
                 self.shared.changed.notify_one();
                 return;
             }
-            queue.closed
+            queue.closed.unwrap_or(BUSY)
         };
-        computation.refuse(closed.unwrap_or_default());
+        computation.refuse(why);
     }
 
     /// Refuses what waits and what runs (at the end of its slice) for the reason `why`, then ends the workers.
@@ -155,6 +171,7 @@ impl WorkerPool {
             queue.closed = Some(why);
             let mut waiting = std::mem::take(&mut queue.turns);
             waiting.append(&mut queue.parked);
+            waiting.append(&mut queue.waiting);
             waiting
         };
         self.shared.changed.notify_all();
@@ -167,7 +184,7 @@ impl WorkerPool {
     #[must_use]
     pub fn is_idle(&self) -> bool {
         let queue = self.shared.lock();
-        queue.running == 0 && queue.turns.is_empty() && queue.parked.is_empty()
+        queue.admitted() == 0
     }
 }
 
@@ -198,10 +215,18 @@ impl Shared {
             if queue.closed.is_some() {
                 return None;
             }
-            queue = self
-                .changed
-                .wait(queue)
-                .unwrap_or_else(PoisonError::into_inner);
+            if queue.waiting.is_empty() {
+                let waited = self.changed.wait(queue);
+                queue = waited.unwrap_or_else(PoisonError::into_inner);
+                continue;
+            }
+            let waited = self.changed.wait_timeout(queue, TRY_AGAIN);
+            let end;
+            (queue, end) = waited.unwrap_or_else(PoisonError::into_inner);
+            if end.timed_out() {
+                let queue = &mut *queue;
+                queue.turns.append(&mut queue.waiting);
+            }
         }
     }
 
@@ -209,23 +234,28 @@ impl Shared {
         let was_long = job.is_long();
         let closed = {
             let mut queue = self.lock();
-            if progress == Progress::Unfinished && queue.closed.is_none() {
+            if progress != Progress::Finished && queue.closed.is_none() {
                 queue.running -= 1;
-                job.slices = job.slices.saturating_add(1);
-                queue.put_back(job);
+                if progress == Progress::Waiting {
+                    queue.waiting.push_back(job);
+                } else {
+                    job.slices = job.slices.saturating_add(1);
+                    queue.put_back(job);
+                }
                 return;
             }
             queue.closed
         };
         // Dropped outside the lock: the end of a computation may free many megabytes.
-        if progress == Progress::Unfinished {
+        if progress != Progress::Finished {
             job.computation.refuse(closed.unwrap_or_default());
         }
         drop(job);
         let mut queue = self.lock();
         queue.running -= 1;
-        if queue.end(was_long) {
-            self.changed.notify_one();
+        queue.end(was_long);
+        if !queue.turns.is_empty() {
+            self.changed.notify_all();
         }
     }
 }

@@ -124,6 +124,18 @@ impl Fragments {
             .map(|whole| whole.pieces.into_values().collect()))
     }
 
+    /// Bytes of what is kept.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// When the oldest unfinished message began.
+    #[must_use]
+    pub fn oldest(&self) -> Option<Instant> {
+        self.messages.values().map(|one| one.began).min()
+    }
+
     fn check(&self, id: &str, bytes: usize, num: usize, total: usize) -> Result<(), FragmentError> {
         if num >= total {
             return Err(FragmentError::NoSuchPiece { num, total });
@@ -152,7 +164,8 @@ impl Fragments {
         Some(gone)
     }
 
-    fn forget_old(&mut self, now: Instant) {
+    /// Forgets what has taken longer than [`MAX_AGE`].
+    pub fn forget_old(&mut self, now: Instant) {
         let bytes = &mut self.bytes;
         self.messages.retain(|_, one| {
             let kept = now.saturating_duration_since(one.began) <= MAX_AGE;

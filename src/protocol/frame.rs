@@ -126,6 +126,32 @@ impl FrameReader {
         self.buffer.capacity()
     }
 
+    /// How many bytes are kept, in all.
+    #[must_use]
+    pub const fn kept(&self) -> usize {
+        self.buffer.len()
+    }
+
+    /// Whether a frame has begun and not ended, one that is being skipped included.
+    #[must_use]
+    pub fn is_unfinished(&self) -> bool {
+        self.state != State::Between
+    }
+
+    /// Gives up the frame that has begun, once `next` gives none: the rest of it is skipped, as of one that is too long. False if
+    /// there is none of which anything is kept.
+    pub fn give_up(&mut self) -> bool {
+        let skipped = match self.state {
+            State::Object => State::SkippedObject,
+            State::Line => State::SkippedLine,
+            State::Between | State::SkippedObject | State::SkippedLine => return false,
+        };
+        self.state = skipped;
+        self.start = self.at;
+        self.give_back();
+        true
+    }
+
     /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {

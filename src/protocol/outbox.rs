@@ -38,6 +38,8 @@ pub struct Outbox {
     /// What is being written: bytes left of each frame, and whether it is a response.
     in_flight: VecDeque<(usize, bool)>,
     dropped: u64,
+    /// Fewer bytes of topic messages than usual may wait.
+    scarce: Option<usize>,
 }
 
 impl Outbox {
@@ -47,10 +49,19 @@ impl Outbox {
         Self::default()
     }
 
+    /// From the next message on at most so many bytes of topic messages wait, and never more than [`MAX_TOPIC_BYTES`].
+    pub fn limit_topics(&mut self, bytes: usize) {
+        self.scarce = Some(bytes).filter(|bytes| *bytes < MAX_TOPIC_BYTES);
+    }
+
+    fn most_topic_bytes(&self) -> usize {
+        self.scarce.unwrap_or(MAX_TOPIC_BYTES)
+    }
+
     /// Adds a message on a topic: queued, or held back if the topic is throttled. If it does not fit, the oldest go.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         self.release(now);
-        if frame.len() > MAX_TOPIC_BYTES {
+        if frame.len() > self.most_topic_bytes() {
             self.dropped += 1;
             return;
         }
@@ -190,7 +201,7 @@ impl Outbox {
 
     /// Drops the oldest topic messages until what is left fits: of the queue's first and the longest held back, the older.
     fn make_room(&mut self) {
-        while self.topic_bytes() > MAX_TOPIC_BYTES {
+        while self.topic_bytes() > self.most_topic_bytes() {
             let queued = self.topics.front().map(|(number, _)| *number);
             let held = self.throttles.oldest();
             if held.is_some_and(|held| queued.is_none_or(|queued| held < queued)) {

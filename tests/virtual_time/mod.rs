@@ -22,6 +22,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
+use pendularm::actors::budget::Totals;
 use pendularm::actors::connection::Connection;
 use pendularm::actors::gauges::Gauges;
 use pendularm::actors::node::{Interest, Reply, ServiceCall, TopicMessage};
@@ -65,7 +66,12 @@ impl Gateway {
     }
 
     pub async fn with(nodes: Nodes) -> Self {
-        let gauges = Arc::new(Gauges::default());
+        Self::within(Totals::default(), nodes).await
+    }
+
+    /// A gateway whose clients together may hold so much.
+    pub async fn within(totals: Totals, nodes: Nodes) -> Self {
+        let gauges = Arc::new(Gauges::with(totals));
         let registry = Registry::new(Arc::clone(&gauges)).start();
         registry.send(Attach(nodes)).await.expect("a registry");
         Self { registry, gauges }

@@ -13,12 +13,14 @@ use tokio::time::{Instant, timeout, timeout_at};
 
 use super::gate::{HEAD_TIME, MAX_LOCKED};
 use super::transport::{CHUNK, Inbound};
-use super::{ANSWERS_OWED, Finish, Shared};
+use super::unfinished::Unfinished;
+use super::{ANSWERS_OWED, Finish, LOOK_AGAIN, Shared};
 use crate::actors::ConnectionId;
 use crate::actors::awake::stay_awake;
+use crate::actors::budget::{Claim, Share};
 use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
-use crate::protocol::fragments::Fragments;
+use crate::protocol::fragments::{Fragments, MAX_AGE};
 use crate::protocol::frame::{Frame, FrameError, FrameReader};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
@@ -31,6 +33,11 @@ const DISCARD_BYTES: usize = 16 * 1024 * 1024;
 
 /// What a client hears that asks for binary frames over raw TCP.
 const NO_BINARY: &str = "subscribe: compression cbor and cbor-raw need WebSocket; over raw TCP every frame is a line of JSON";
+/// What a client hears whose frame takes longer than [`FRAME_TIME`](super::unfinished::FRAME_TIME).
+const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
+const NO_ROOM_FOR_FRAME: &str =
+    "frame skipped: too many bytes of unfinished frames of all clients are kept; try again later";
+const NO_ROOM_FOR_FRAGMENTS: &str = "fragment: too many bytes of unfinished frames of all clients are kept; this connection's pieces are forgotten, try again later";
 const NESTED_FRAGMENT: &str = "fragment: the pieces make a fragment again";
 
 /// The reading half of a connection.
@@ -42,6 +49,8 @@ pub(super) struct Reader {
     frames: FrameReader,
     /// Frames that come in pieces.
     fragments: Fragments,
+    /// What is kept of frames and messages that are not complete yet.
+    unfinished: Unfinished,
     /// What the client has yet to show before anything is done for it.
     locked: Option<Token>,
 }
@@ -67,6 +76,7 @@ impl Reader {
         finish: Recipient<Finish>,
         locked: Option<Token>,
     ) -> Self {
+        let unfinished = Unfinished::new(&shared.gauges.totals().input);
         Self {
             id,
             shared,
@@ -74,6 +84,7 @@ impl Reader {
             finish,
             frames: FrameReader::new(),
             fragments: Fragments::default(),
+            unfinished,
             locked,
         }
     }
@@ -106,12 +117,18 @@ impl Reader {
             received += chunk.len();
             self.frames.push(&chunk);
             chunk.clear();
+            if chunk.capacity() > 4 * CHUNK {
+                // A long message is no reason to keep as much for the next.
+                chunk = BytesMut::new();
+            }
             while let Some(frame) = self.next_frame().await {
+                self.unfinished.begin_anew();
                 self.take(frame).await;
                 if self.shared.refusing.get() {
                     return Ok(());
                 }
             }
+            self.keep_unfinished().await;
             if full {
                 // A long frame comes in many chunks, all of them at hand: the other clients have a turn in between.
                 tokio::task::yield_now().await;
@@ -120,24 +137,83 @@ impl Reader {
                 break;
             }
             let read = if self.locked.is_none() {
-                input.read(&mut chunk).await?
+                self.read(input, &mut chunk)
+                    .await?
+                    .ok_or(TOO_SLOW.to_owned())
             } else if received > MAX_LOCKED {
-                self.refuse(LockedOut::TooMuch);
-                return Ok(());
+                Err(LockedOut::TooMuch.to_string())
             } else if let Ok(read) = timeout_at(patience, input.read(&mut chunk)).await {
-                read?
+                Ok(read?)
             } else {
-                self.refuse(LockedOut::TooLate);
-                return Ok(());
+                Err(LockedOut::TooLate.to_string())
             };
-            if read == 0 {
-                break;
+            match read {
+                Ok(0) => break,
+                Ok(_) => {}
+                Err(why) => {
+                    self.refuse(&why);
+                    return Ok(());
+                }
             }
         }
         if let Some(error) = self.frames.finish() {
             self.complain(&error.to_string(), None).await;
         }
         Ok(())
+    }
+
+    /// Reads on; `None` if a frame that has begun takes too long. Meanwhile pieces of messages grow old, and are forgotten.
+    async fn read<I: Inbound>(
+        &mut self,
+        input: &mut I,
+        chunk: &mut BytesMut,
+    ) -> std::io::Result<Option<usize>> {
+        loop {
+            let began = Instant::now();
+            let is_unfinished = self.frames.is_unfinished();
+            let late = is_unfinished.then(|| began + self.unfinished.time_left());
+            let oldest = self.fragments.oldest().map(Instant::from_std);
+            let old = oldest.map(|oldest| oldest + MAX_AGE + LOOK_AGAIN);
+            let read = match late.into_iter().chain(old).min() {
+                None => return input.read(chunk).await.map(Some),
+                Some(due) => timeout_at(due, input.read(chunk)).await,
+            };
+            let received = read.as_ref().map_or(0, |read| *read.as_ref().unwrap_or(&0));
+            if is_unfinished {
+                self.unfinished.wait(began.elapsed(), received);
+            }
+            if let Ok(read) = read {
+                return read.map(Some);
+            }
+            if is_unfinished && self.unfinished.time_left().is_zero() {
+                return Ok(None);
+            }
+            self.fragments.forget_old(Instant::now().into_std());
+            self.keep_unfinished().await;
+        }
+    }
+
+    /// Counts what is kept of what is not complete yet. Where there is no room for it, it is given up and the client is told.
+    async fn keep_unfinished(&mut self) {
+        if !self.frames.is_unfinished() {
+            self.unfinished.begin_anew();
+        }
+        if self.fits() {
+            return;
+        }
+        if self.frames.give_up() {
+            self.complain(NO_ROOM_FOR_FRAME, None).await;
+        }
+        if !self.fits() {
+            self.fragments = Fragments::default();
+            self.complain(NO_ROOM_FOR_FRAGMENTS, None).await;
+        }
+        let _ = self.fits();
+    }
+
+    fn fits(&mut self) -> bool {
+        let kept = self.frames.kept() + self.fragments.bytes();
+        self.unfinished.keep(kept)
     }
 
     /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
@@ -169,16 +245,19 @@ impl Reader {
         if let Some(token) = &self.locked {
             match admit(token, frame.as_ref()) {
                 Ok(()) => self.locked = None,
-                Err(why) => self.refuse(why),
+                Err(why) => self.refuse(&why.to_string()),
             }
             return;
         }
+        let length = frame.as_ref().map_or(0, |frame| frame.text.len());
+        let mut room = self.shared.room_for(length).await;
         let frame = match frame {
             Ok(frame) => frame,
             Err(error) => return self.complain(&error.to_string(), None).await,
         };
         self.shared.unbatched.set(!frame.newline);
-        let Some(Incoming { id, op }) = self.assemble(op::read(&frame.text)).await else {
+        let Some(Incoming { id, op }) = self.assemble(op::read(&frame.text), &mut room).await
+        else {
             return;
         };
         match op {
@@ -188,12 +267,8 @@ impl Reader {
                 self.complain(NO_BINARY, id.as_deref()).await;
             }
             Ok(op) => {
-                self.perform(Request {
-                    from: self.id,
-                    id,
-                    op,
-                })
-                .await;
+                let from = self.id;
+                self.perform(Request { from, id, op }, room).await;
             }
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
@@ -207,7 +282,8 @@ impl Reader {
     }
 
     /// Whatever is no fragment, as it is; of fragments, the frame that they make once all are there.
-    async fn assemble(&mut self, incoming: Incoming) -> Option<Incoming> {
+    /// Then `room` is room for that.
+    async fn assemble(&mut self, incoming: Incoming, room: &mut Share) -> Option<Incoming> {
         let Ok(Op::Fragment(piece)) = incoming.op else {
             return Some(incoming);
         };
@@ -219,6 +295,9 @@ impl Reader {
                 return None;
             }
         };
+        // The little room that there was is not kept while more is waited for.
+        let _ = room.resize(0, Claim::Last);
+        *room = self.shared.room_for(whole.len()).await;
         // A frame like any other: the same bounds hold, and the same leniency.
         let mut frames = FrameReader::new();
         frames.push(whole.as_bytes());
@@ -238,11 +317,10 @@ impl Reader {
         None
     }
 
-    /// The client has not shown what it has to: it is told so, and nothing that it sends is looked at any more.
-    fn refuse(&self, why: LockedOut) {
+    /// The client has not done what it has to: it is told so, and nothing that it sends is looked at any more.
+    fn refuse(&self, why: &str) {
         self.shared.refusing.set(true);
-        let why = why.to_string();
-        self.shared.send(messages::status(Level::Error, &why, None));
+        self.shared.send(messages::status(Level::Error, why, None));
     }
 
     async fn complain(&self, why: &str, id: Option<&RawValue>) {
@@ -263,11 +341,13 @@ impl Reader {
         let _ = self.registry.send(respond).await;
     }
 
-    async fn perform(&self, request: Request) {
+    /// Performs an op; `room` is kept until it has taken effect.
+    async fn perform(&self, request: Request, room: Share) {
         if let Op::CallService(CallService { service, .. }) = &request.op
             && Service::from_name(service).is_some_and(Service::is_computation)
         {
-            self.shared.enqueue_computation(request, &self.registry);
+            let registry = &self.registry;
+            self.shared.enqueue_computation(request, room, registry);
             return;
         }
         if let Ok(handled) = self.registry.send(request).await

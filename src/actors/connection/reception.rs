@@ -15,6 +15,7 @@ use tokio::time::{Instant, sleep_until, timeout};
 use super::gate::{Gate, HEAD_TIME};
 use super::reader::{Reader, discard};
 use super::transport::{CHUNK, Inbound, Outbound, Plain, read_some};
+use super::unfinished::FRAME_TIME;
 use super::{Finish, LINGER, Shared, writer};
 use crate::actors::ConnectionId;
 use crate::actors::registry::{Disconnect, Refused, Registry};
@@ -95,7 +96,7 @@ impl Reception {
                 () = self.shared.finished() => return Greeting::Finished,
                 read = read_some(stream, first) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
-                    return Greeting::Foreign("the request that this connection began with did not go on");
+                    return Greeting::Foreign("what this connection began with did not go on");
                 }
             };
             if read.unwrap_or(0) == 0 {
@@ -104,8 +105,13 @@ impl Reception {
             match opening(first) {
                 Opening::Undecided => {
                     let may_be_foreign = !first.trim_ascii_start().starts_with(b"{");
-                    if may_be_foreign && !first.trim_ascii().is_empty() {
-                        deadline.get_or_insert_with(|| Instant::now() + HEAD_TIME);
+                    let time = if may_be_foreign {
+                        HEAD_TIME
+                    } else {
+                        FRAME_TIME
+                    };
+                    if !first.trim_ascii().is_empty() {
+                        deadline.get_or_insert_with(|| Instant::now() + time);
                     }
                 }
                 Opening::Json => return Greeting::Json,

@@ -29,6 +29,7 @@ use super::Shared;
 use super::gate::HEAD_TIME;
 use super::reception::Reception;
 use super::transport::{Inbound, Outbound, read_some};
+use super::unfinished::{FRAME_TIME, Unfinished};
 use crate::actors::ConnectionId;
 use crate::actors::registry::Request;
 use crate::protocol::frame::MAX_FRAME;
@@ -68,7 +69,8 @@ impl Reception {
         };
         let _ = self.registry.send(quiet).await;
         self.shared.binary.set(true);
-        let link = Link::open(stream, &behind).await;
+        let unfinished = Unfinished::new(&self.shared.gauges.totals().input);
+        let link = Link::open(stream, &behind, unfinished).await;
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,
@@ -94,12 +96,17 @@ struct Link<S> {
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     /// Takes a stream on which the handshake has been made; `behind` came after it.
-    async fn open(stream: S, behind: &[u8]) -> Rc<Self> {
+    async fn open(stream: S, behind: &[u8], unfinished: Unfinished) -> Rc<Self> {
         let life = Rc::new(Cell::new(Instant::now()));
         let watched = Watched {
             stream,
             life: Rc::clone(&life),
             is_blocked: false,
+            unfinished,
+            pending: 0,
+            began: None,
+            is_complete: false,
+            no_room: false,
         };
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
@@ -162,7 +169,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
     async fn next(&mut self) -> io::Result<Option<Result<Message, Error>>> {
         loop {
             let pong_due = self.asked.map(|asked| asked + PONG_TIME);
-            let wake = pong_due.map_or(self.next_ping, |due| due.min(self.next_ping));
+            let late = self.link.socket.borrow().get_ref().late();
+            let due = pong_due.into_iter().chain(late).min();
+            let wake = due.map_or(self.next_ping, |due| due.min(self.next_ping));
             tokio::select! {
                 biased;
                 message = self.link.next() => return Ok(message),
@@ -171,8 +180,20 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
         }
     }
 
+    /// A message is complete.
+    fn take(&self, message: &[u8], chunk: &mut BytesMut) {
+        message::append_line(message, chunk);
+        self.link.socket.borrow_mut().get_mut().is_complete = true;
+    }
+
     fn look_for_life(&mut self) -> io::Result<()> {
         let now = Instant::now();
+        let late = self.link.socket.borrow().get_ref().late();
+        if late.is_some_and(|late| late <= now) {
+            self.link.farewell.set((CloseCode::Policy, TOO_SLOW));
+            self.shared.refusing.set(true);
+            return Err(io::ErrorKind::TimedOut.into());
+        }
         if let Some(asked) = self.asked {
             if self.link.life.get() > asked {
                 self.asked = None;
@@ -196,17 +217,23 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
         // While nothing was read, no sign of life could be seen.
         let unread = self.read_until.elapsed();
         self.asked = self.asked.map(|asked| asked + unread);
+        self.link.socket.borrow_mut().get_mut().read_on(unread);
         let before = chunk.len();
         while chunk.len() == before {
             match self.next().await? {
-                Some(Ok(Message::Text(text))) => message::append_line(text.as_bytes(), chunk),
-                Some(Ok(Message::Binary(bytes))) => message::append_line(&bytes, chunk),
+                Some(Ok(Message::Text(text))) => self.take(text.as_bytes(), chunk),
+                Some(Ok(Message::Binary(bytes))) => self.take(&bytes, chunk),
                 // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of it.
-                Some(Ok(_)) => {}
+                Some(Ok(control)) => {
+                    let mut socket = self.link.socket.borrow_mut();
+                    socket.get_mut().control(control.len());
+                }
                 // The peer has closed, and takes no answers any more.
                 None => return Err(io::ErrorKind::ConnectionAborted.into()),
                 Some(Err(error)) => {
-                    self.link.farewell.set(farewell(&error));
+                    let no_room = self.link.socket.borrow().get_ref().no_room;
+                    let why = if no_room { NO_ROOM } else { farewell(&error) };
+                    self.link.farewell.set(why);
                     self.shared.refusing.set(true);
                     return Err(io::ErrorKind::InvalidData.into());
                 }
@@ -226,6 +253,14 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
         .await
     }
 }
+
+/// What a peer is told whose message takes longer than [`FRAME_TIME`](super::unfinished::FRAME_TIME).
+const TOO_SLOW: &str = "a message that has begun must be complete within a minute";
+/// What a peer is told for whose message there is no room.
+const NO_ROOM: (CloseCode, &str) = (
+    CloseCode::Again,
+    "too many unfinished messages of all clients; try again later",
+);
 
 /// What a peer is told that broke a rule.
 fn farewell(error: &Error) -> (CloseCode, &'static str) {
@@ -325,12 +360,54 @@ fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
     }
 }
 
-/// A stream that notes when its other side last gave a sign of life: sent a byte, or took one after having taken none.
+/// A stream that notes when its other side last gave a sign of life: sent a byte, or took one after having taken none. And what it
+/// has sent of a message that is not complete yet.
 struct Watched<S> {
     stream: S,
     life: Rc<Cell<Instant>>,
     /// The last write found no room: the next that does shows that there is somebody.
     is_blocked: bool,
+    unfinished: Unfinished,
+    /// Bytes that belong to no complete message yet.
+    pending: usize,
+    /// When the first of them came, later by the time that nothing was read.
+    began: Option<Instant>,
+    /// They do now.
+    is_complete: bool,
+    /// There was no room for them.
+    no_room: bool,
+}
+
+/// Bytes of a control frame beside its payload: two, and the mask's four.
+const CONTROL_HEAD: usize = 6;
+
+impl<S> Watched<S> {
+    /// Reading goes on after so long a time: what was complete has been dealt with.
+    fn read_on(&mut self, unread: Duration) {
+        if std::mem::take(&mut self.is_complete) {
+            self.settle(0);
+        }
+        self.began = self.began.map(|began| began + unread);
+    }
+
+    /// A control frame with so much payload has come: it may stand between the parts of a message.
+    fn control(&mut self, payload: usize) {
+        self.settle(self.pending.saturating_sub(CONTROL_HEAD + payload));
+    }
+
+    fn settle(&mut self, pending: usize) {
+        self.pending = pending;
+        if pending == 0 {
+            self.began = None;
+        }
+        // Less always fits.
+        let _ = self.unfinished.keep(pending);
+    }
+
+    /// When the message that has begun is late.
+    fn late(&self) -> Option<Instant> {
+        self.began.map(|began| began + FRAME_TIME)
+    }
 }
 
 impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
@@ -341,8 +418,17 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
     ) -> Poll<io::Result<()>> {
         let before = buffer.filled().len();
         let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
-        if buffer.filled().len() > before {
-            self.life.set(Instant::now());
+        let received = buffer.filled().len() - before;
+        if received > 0 {
+            let now = Instant::now();
+            self.life.set(now);
+            self.began.get_or_insert(now);
+            self.pending += received;
+            let pending = self.pending;
+            if !self.unfinished.keep(pending) {
+                self.no_room = true;
+                return Poll::Ready(Err(io::ErrorKind::QuotaExceeded.into()));
+            }
         }
         polled
     }

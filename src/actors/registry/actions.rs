@@ -99,7 +99,7 @@ impl Handler<Progress> for Registry {
         if let Some(client) = self.clients.get(&progress.connection) {
             client.outlets.deliver.do_send(Deliver {
                 topic: progress.action,
-                frame: progress.frame,
+                frame: self.count(progress.frame),
             });
         }
     }

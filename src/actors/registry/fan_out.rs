@@ -23,7 +23,7 @@ impl Registry {
             let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
                 continue;
             };
-            let plain = encode(spelling);
+            let plain = self.count(encode(spelling));
             let mut made: Vec<(Encoding, Option<Bytes>)> = Vec::new();
             for subscriber in subscribers {
                 let encoding = subscriber.encoding;
@@ -71,7 +71,7 @@ impl Registry {
     fn encoded(&self, spelling: &str, plain: &Bytes, encoding: Encoding) -> Option<Bytes> {
         if encoding.compression == Compression::None {
             return Some(match encoding.fragment_size {
-                Some(size) if plain.len() > size => self.in_fragments(plain, size),
+                Some(size) if plain.len() > size => self.count(self.in_fragments(plain, size)),
                 _ => plain.clone(),
             });
         }
@@ -82,7 +82,12 @@ impl Registry {
             Compression::CborRaw => cbor::publish_raw(spelling, type_name?, &msg)?,
             _ => cbor::publish(spelling, type_name, &msg),
         };
-        Some(Bytes::from(bytes))
+        Some(self.count(Bytes::from(bytes)))
+    }
+
+    /// A message to be delivered counts in the total of messages until the last copy is gone.
+    pub(super) fn count(&self, frame: Bytes) -> Bytes {
+        self.gauges.totals().messages.count(frame)
     }
 
     fn in_fragments(&self, plain: &Bytes, size: usize) -> Bytes {

@@ -32,6 +32,7 @@ use self::services::{Forwarded, Services};
 pub use self::topics::Throttle;
 use self::topics::{Subscription, Topics};
 use super::ConnectionId;
+use super::budget::{Budget, Claim, Share};
 use super::connection::{Answer, Finish, MAX_RESPONSES_WAITING};
 use super::follower::ActionRequest;
 use super::gauges::Gauges;
@@ -51,6 +52,8 @@ pub const MAX_ADVERTISED: usize = 1024;
 pub const MAX_PROVIDED: usize = 256;
 /// Calls of one connection that wait for clients to answer.
 pub const MAX_WAITING_CALLS: usize = 256;
+/// What a registration takes of the total of names, beside three times its name: its places in the tables.
+pub const REGISTRATION_BYTES: usize = 1024;
 /// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
 /// answers to its own calls) is refused: it has not been read for long then, but others would go on.
 pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
@@ -80,12 +83,15 @@ pub struct Registry {
 /// What the registry knows of one client.
 struct Client {
     outlets: Outlets,
-    advertised: HashSet<Box<str>>,
+    /// The total that what it is sent counts in.
+    responses: Budget,
+    /// Topics, each with its share of the total of names.
+    advertised: HashMap<Box<str>, Share>,
     /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
     /// dropped until it advertises again.
     withdrawn: HashSet<Topic>,
     subscriptions: HashMap<Arc<str>, Vec<Subscription>>,
-    provided: HashSet<Box<str>>,
+    provided: HashMap<Box<str>, Share>,
     /// Which statuses it wants.
     verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
@@ -162,7 +168,8 @@ impl Handler<Connect> for Registry {
         }
         self.connections_made += 1;
         let id = ConnectionId(self.connections_made);
-        self.clients.insert(id, Client::new(outlets));
+        let responses = self.gauges.totals().responses.clone();
+        self.clients.insert(id, Client::new(outlets, responses));
         self.gauges.set_connections(self.clients.len() as u64);
         Ok(id)
     }
@@ -236,7 +243,12 @@ impl Handler<Respond> for Registry {
                 .status
                 .is_none_or(|level| client.verbosity.wants(level))
         {
-            client.send(respond.frame, respond.service);
+            if respond.service.is_some() {
+                // A `Reply` has counted it.
+                client.pass(respond.frame, respond.service);
+            } else {
+                client.send(respond.frame, None);
+            }
         }
     }
 }
@@ -284,19 +296,26 @@ impl Handler<TimedOut> for Registry {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl Client {
-    fn new(outlets: Outlets) -> Self {
+    fn new(outlets: Outlets, responses: Budget) -> Self {
         Self {
             outlets,
-            advertised: HashSet::new(),
+            responses,
+            advertised: HashMap::new(),
             withdrawn: HashSet::new(),
             subscriptions: HashMap::new(),
-            provided: HashSet::new(),
+            provided: HashMap::new(),
             verbosity: Verbosity::ALL,
             answered: None,
         }
     }
 
+    /// Sends a response or a status.
     fn send(&self, frame: Bytes, service: Option<Service>) {
+        self.pass(self.responses.count(frame), service);
+    }
+
+    /// The same with one that has been counted already.
+    fn pass(&self, frame: Bytes, service: Option<Service>) {
         self.outlets.answer.do_send(Answer { frame, service });
     }
 
@@ -315,14 +334,14 @@ impl Registry {
         let advertised = std::mem::take(&mut client.advertised);
         let subscriptions = std::mem::take(&mut client.subscriptions);
         let provided = std::mem::take(&mut client.provided);
-        for topic in advertised {
-            self.tally.remove(&topic, Use::Advertised);
+        for topic in advertised.keys() {
+            self.tally.remove(topic, Use::Advertised);
         }
         for topic in subscriptions.keys() {
             self.drop_subscriber(topic, id);
         }
-        for service in provided {
-            self.withdraw_service(&service, id);
+        for service in provided.keys() {
+            self.withdraw_service(service, id);
         }
         for call in self.services.take_provided_by(id) {
             let why = Refusal::ProviderGone(call.service.to_string());
@@ -350,6 +369,13 @@ impl Registry {
             self.tally.withdraw(service);
         }
         provided
+    }
+
+    /// A registration's share of the total of names.
+    fn name_share(&self, bytes: usize) -> Result<Share, Refusal> {
+        let bytes = REGISTRATION_BYTES + 3 * bytes;
+        let share = self.gauges.totals().names.take(bytes, Claim::Last);
+        share.ok_or(Refusal::TooManyNames)
     }
 
     fn tell_owner(&self, topic: &str, wanted: bool) {

@@ -19,8 +19,9 @@ use super::{
     Registry, Request, TimedOut,
 };
 use crate::actors::ConnectionId;
+use crate::actors::budget::Claim;
 use crate::actors::connection::Configure;
-use crate::actors::node::{Reply, Sender, ServiceCall, TopicMessage};
+use crate::actors::node::{Reply, SMALL_ANSWER, Sender, ServiceCall, TopicMessage};
 use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
@@ -107,13 +108,20 @@ impl Registry {
     ) -> Result<(), Refusal> {
         refuse_runtime_topic(topic)?;
         let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        let new = !client.advertised.contains_key(topic);
+        if new && client.advertised.len() >= MAX_ADVERTISED {
+            return Err(Refusal::TooManyAdvertised);
+        }
+        let bytes = topic.len() + type_name.map_or(0, str::len);
+        let share = new.then(|| self.name_share(bytes)).transpose()?;
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        if client.advertised.len() >= MAX_ADVERTISED && !client.advertised.contains(topic) {
-            return Err(Refusal::TooManyAdvertised);
-        }
-        if client.advertised.insert(topic.into()) {
+        if let Some(share) = share {
+            client.advertised.insert(topic.into(), share);
             self.tally.add(topic, Use::Advertised, type_name);
         }
         if let Some(topic) = Topic::from_name(topic) {
@@ -127,7 +135,7 @@ impl Registry {
             return;
         };
         let topic = &*names::absolute(topic);
-        if client.advertised.remove(topic) {
+        if client.advertised.remove(topic).is_some() {
             self.tally.remove(topic, Use::Advertised);
         }
         if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
@@ -153,7 +161,7 @@ impl Registry {
         let listener = Topic::from_name(topic)
             .filter(|topic| is_listened_to(*topic) && !client.withdrawn.contains(topic))
             .and_then(|topic| self.nodes.listeners.get(&topic));
-        if listener.is_none() && !client.advertised.contains(topic) {
+        if listener.is_none() && !client.advertised.contains_key(topic) {
             return Handled(None);
         }
         self.fan_out(topic, |spelling| messages::publish_raw(spelling, &msg));
@@ -194,6 +202,9 @@ impl Registry {
                 return Err(Refusal::UnknownType);
             }
         }
+        let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
+        let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
+        let share = self.name_share(topic.len() + bytes)?;
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
@@ -212,6 +223,7 @@ impl Registry {
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
             encoding: subscribe.encoding,
+            _share: share,
         });
         let throttle = Throttle::of(subscriptions);
         let encoding = encoding_of(subscriptions);
@@ -269,13 +281,17 @@ impl Registry {
             return Err(Refusal::RuntimeService(spelling.to_owned()));
         }
         let service = &*names::absolute(spelling);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains_key(service) {
+            return Err(Refusal::TooManyProvided);
+        }
+        let share = self.name_share(service.len() + type_name.map_or(0, str::len))?;
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains(service) {
-            return Err(Refusal::TooManyProvided);
-        }
-        client.provided.insert(service.into());
+        client.provided.insert(service.into(), share);
         if let Some(before) = self
             .services
             .provider(service)
@@ -325,6 +341,7 @@ impl Registry {
                         origin.id,
                         self.gone(origin.from),
                     );
+                    let reply = reply.within(self.gauges.totals().responses.clone());
                     node.do_send(ServiceCall {
                         service,
                         arguments: call.args,
@@ -374,7 +391,13 @@ impl Registry {
             &Services::call_id(number),
             call.args.raw(),
         );
-        client.send(frame, None);
+        let id_bytes = origin.id.as_ref().map_or(0, |id| id.get().len());
+        let take = |bytes| {
+            let share = client.responses.take(bytes, Claim::Ordinary);
+            share.ok_or(Refusal::NoRoom)
+        };
+        let share = take(SMALL_ANSWER + 2 * id_bytes)?;
+        client.pass(take(frame.len())?.cover(frame), None);
         let registry = ctx.address();
         let patience = call.timeout.unwrap_or(DEFAULT_TIMEOUT);
         let timer = actix_rt::spawn(async move {
@@ -389,6 +412,7 @@ impl Registry {
                 provider: provider.connection,
                 service: service.into(),
                 timer: timer.abort_handle(),
+                share,
             },
         );
         Ok(())
@@ -401,7 +425,7 @@ impl Registry {
         service: &str,
         encode: impl FnOnce(&str, Option<&RawValue>) -> Bytes,
     ) -> Result<(), Refusal> {
-        let call = self
+        let mut call = self
             .services
             .complete(origin.id.as_deref(), service, origin.from)
             .ok_or_else(|| Refusal::StaleCall(service.to_owned()))?;
@@ -411,9 +435,14 @@ impl Registry {
         if caller.backlog() > MAX_BACKLOG {
             let why = Refusal::CallerBusy(call.service.to_string());
             self.answer_forwarded(&call, &why);
-        } else {
-            caller.send(encode(&call.service, call.id.as_deref()), None);
+            return Ok(());
+        }
+        let frame = encode(&call.service, call.id.as_deref());
+        if call.share.resize(frame.len(), Claim::Ordinary) {
+            caller.pass(call.share.cover(frame), None);
             self.note_answered(call.caller);
+        } else {
+            self.answer_forwarded(&call, &Refusal::NoRoom);
         }
         Ok(())
     }

@@ -41,6 +41,10 @@ pub(super) enum Refusal {
         "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
     )]
     CallerBusy(String),
+    #[error("too many bytes of answers wait for clients that do not read; try again later")]
+    NoRoom,
+    #[error("too many topics and services are registered by all clients together; try again later")]
+    TooManyNames,
     #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
     TooManyWaiting,
     #[error("action: no action is called {0}")]

@@ -9,6 +9,7 @@ use serde_json::value::RawValue;
 use tokio::task::AbortHandle;
 
 use crate::actors::ConnectionId;
+use crate::actors::budget::Share;
 use crate::protocol::names;
 
 /// What the runtime's own ids for forwarded calls begin with, so that a provider's log shows where they come from.
@@ -22,6 +23,8 @@ pub(super) struct Forwarded {
     /// The service's name as the caller spells it.
     pub(super) service: Box<str>,
     pub(super) timer: AbortHandle,
+    /// Room for a small answer, or a failure.
+    pub(super) share: Share,
 }
 
 /// Who provides a service.

@@ -10,17 +10,20 @@ use std::time::Duration;
 use actix::prelude::*;
 
 use crate::actors::ConnectionId;
+use crate::actors::budget::Share;
 use crate::actors::connection::Deliver;
 use crate::protocol::names;
 use crate::protocol::op::Encoding;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug)]
 pub(super) struct Subscription {
     pub(super) id: Option<Box<str>>,
     pub(super) throttle: Duration,
     pub(super) queue_length: usize,
     pub(super) encoding: Encoding,
+    /// What it takes of the total of names.
+    pub(super) _share: Share,
 }
 
 /// What a connection's subscriptions to one topic come to: the smallest of each value.

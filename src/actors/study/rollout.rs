@@ -11,6 +11,7 @@ use bytes::Bytes;
 
 use super::{Work, read_arm, read_gains, read_joints};
 use crate::actors::arm_sim::Present;
+use crate::actors::integration::NUMBER_BYTES;
 use crate::actors::node::Reply;
 use crate::math::arm::State;
 use crate::math::integrator::Method;
@@ -95,6 +96,21 @@ impl<const N: usize> RolloutWork<N> {
 
 /// None once it is answered.
 impl<const N: usize> Work for Option<RolloutWork<N>> {
+    fn most_bytes(&self) -> usize {
+        let Some(RolloutWork::Unread(arguments, _)) = self else {
+            return 0;
+        };
+        // Whatever is wrong with the request is found when it is read.
+        let samples = Fields::read(arguments, Service::Rollout)
+            .ok()
+            .and_then(|mut fields| fields.count("samples", MAX_SAMPLES))
+            .unwrap_or(DEFAULT_SAMPLES);
+        let numbers = 3 * N + COLUMNS.len();
+        usize::try_from(samples)
+            .unwrap_or(usize::MAX)
+            .saturating_mul(numbers * NUMBER_BYTES)
+    }
+
     fn advance(&mut self, reply: &mut Reply) -> bool {
         *self = self.take().and_then(|work| work.next(reply));
         self.is_none()
