@@ -71,6 +71,6 @@ fi
 for package in . benches fuzz; do
     [ -e "$package/Cargo.lock" ] || continue
     say "$package/Cargo.lock: ${checks[*]} (cargo-deny $version)"
-    "${deny[@]}" --manifest-path "$package/Cargo.toml" --all-features --log-level error \
+    "${deny[@]}" --manifest-path "$package/Cargo.toml" --all-features --locked --log-level error \
         check --hide-inclusion-graph --config "$config" "${options[@]}" "${checks[@]}"
 done

@@ -3,7 +3,7 @@
 //! A parent that never reads the pipe it gave us must not stop the arm once that pipe is full. So a thread of its own
 //! writes the lines, a bounded queue feeds it, and what does not fit is dropped and counted.
 //!
-//! **Invariant:** logging never blocks, and a broken standard error never fails anything.
+//! **Invariant:** logging never blocks, a broken standard error never fails anything, and an event is one line, whatever its text.
 
 use std::fmt::{self, Write as _};
 use std::io::{self, Write};
@@ -19,6 +19,8 @@ use tracing::level_filters::LevelFilter;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::Layer;
 use tracing_subscriber::layer::{Context, SubscriberExt};
+
+use crate::protocol::text::push_plain;
 
 /// Lines that may wait for the writer: more than any burst of connections logs at the default level.
 const QUEUE_LINES: usize = 1024;
@@ -160,11 +162,7 @@ impl Log {
 /// Takes one line at a time: `tracing-subscriber` formats an event first, then writes it whole.
 impl Write for Log {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        let kept = match line.get(..LINE_BYTES) {
-            Some(start) => [start, b"...\n"].concat(),
-            None => line.to_vec(),
-        };
-        if self.entries.try_send(Entry::Line(kept)).is_err() {
+        if self.entries.try_send(Entry::Line(plain(line))).is_err() {
             self.dropped.fetch_add(1, Ordering::Relaxed);
         }
         Ok(line.len())
@@ -173,6 +171,23 @@ impl Write for Log {
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
+}
+
+/// What is kept of an event's text: one line, of bounded length, on which nothing acts on a terminal. It may repeat what a
+/// client has sent, and a client must not be able to write lines of its own.
+fn plain(line: &[u8]) -> Vec<u8> {
+    let text = String::from_utf8_lossy(line);
+    let text = text.strip_suffix('\n').unwrap_or(&text);
+    let mut kept = String::with_capacity(text.len().min(LINE_BYTES) + 1);
+    for character in text.chars() {
+        if kept.len() >= LINE_BYTES {
+            kept.push_str("...");
+            break;
+        }
+        push_plain(&mut kept, character);
+    }
+    kept.push('\n');
+    kept.into_bytes()
 }
 
 /// Writes line after line until the last [`Log`] is gone. An error of the sink has nowhere to be told.
@@ -277,6 +292,32 @@ mod tests {
             text.lines().filter(|line| *line == "line").count(),
             QUEUE_LINES + 10 - lost
         );
+    }
+
+    /// A client's text may be in an event: neither a line of its own nor a sequence that a terminal obeys comes of it.
+    #[test]
+    fn an_event_is_one_line_and_nothing_on_it_acts() {
+        let hostile =
+            "a\r\nERROR forged\u{1b}[2J\u{7}\0\u{202e}\u{2028}\u{9b}31m\u{feff} %s{} \u{e9}";
+        let (gate, seen) = Gate::new(true);
+        let mut log = Log::to(gate).unwrap();
+        log.write_all(format!("{hostile}\n").as_bytes()).unwrap();
+        log.write_all(b"not UTF-8: \xff\xfe\n").unwrap();
+        log.finish();
+        let written: String = seen.try_iter().collect();
+        assert_eq!(
+            written,
+            "a\\r\\nERROR forged\\u{1b}[2J\\u{7}\\u{0}\\u{202e}\\u{2028}\\u{9b}31m\\u{feff} %s{} \u{e9}\n\
+             not UTF-8: \u{fffd}\u{fffd}\n"
+        );
+    }
+
+    /// Six bytes for one, all of them: what is kept is bounded, not what is read.
+    #[test]
+    fn escapes_count_towards_the_limit() {
+        let line = plain(&vec![0x1b; 3 * LINE_BYTES]);
+        assert!(line.len() < LINE_BYTES + 16, "{}", line.len());
+        assert!(line.ends_with(b"...\n"));
     }
 
     #[test]

@@ -7,7 +7,7 @@
 
 use super::json;
 use super::nesting::{Event, Nesting};
-pub use super::opening::{Foreign, Opening, opening};
+pub use super::opening::{Foreign, Opening, is_host_line, opening};
 use super::text;
 
 /// Longest frame, in bytes without the newline: a 3-link trajectory has under 1 KiB, an expression of 1 MB has to pass.

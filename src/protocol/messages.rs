@@ -376,8 +376,18 @@ impl Line {
 
     fn raw(mut self, key: &str, raw: &RawValue) -> Self {
         self.key(key);
-        self.text
-            .extend_from_slice(json::strict(raw.get()).as_bytes());
+        let strict = json::strict(raw.get());
+        let start = self.text.len();
+        self.text.extend_from_slice(strict.as_bytes());
+        // Valid JSON has a carriage return between tokens only. Some readers take one for the end of a line: then what
+        // another client has put between two of them would be a frame to them.
+        if strict.as_bytes().contains(&b'\r') {
+            for byte in self.text.iter_mut().skip(start) {
+                if *byte == b'\r' {
+                    *byte = b' ';
+                }
+            }
+        }
         self
     }
 

@@ -20,7 +20,7 @@ pub mod parameters;
 pub mod rosapi;
 pub mod scene_messages;
 pub mod streamed;
-mod text;
+pub(crate) mod text;
 mod throttle;
 pub mod token;
 pub mod trajectory;

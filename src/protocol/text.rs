@@ -1,4 +1,4 @@
-//! Client text in our own messages: shortened, and with control characters escaped.
+//! Client text in our own messages and in the log: shortened, and with control characters escaped.
 //!
 //! **Invariant:** nothing that a client sent is echoed in a message of ours at a length of its own choosing.
 
@@ -24,14 +24,24 @@ pub(super) fn shortened(text: &str, limit: usize) -> String {
             short.push('…');
             break;
         }
-        if character.is_control() {
-            // A `String` takes whatever is written to it.
-            let _ = write!(short, "{}", character.escape_default());
-        } else {
-            short.push(character);
-        }
+        push_plain(&mut short, character);
     }
     short
+}
+
+/// Appends a character, escaped where it does something on a terminal other than to show itself: control characters, and
+/// those that end a line or turn the direction of writing.
+pub(crate) fn push_plain(text: &mut String, character: char) {
+    let acts = matches!(
+        character,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}'
+    );
+    if acts || character.is_control() {
+        // A `String` takes whatever is written to it.
+        let _ = write!(text, "{}", character.escape_default());
+    } else {
+        text.push(character);
+    }
 }
 
 /// What a JSON value is, in words a sentence can end with: the value itself if it is short, else its kind.

@@ -10,6 +10,7 @@ use std::net::SocketAddr;
 
 use super::authority::{Authority, Host};
 use super::head::Request;
+use crate::protocol::text::push_plain;
 use crate::protocol::token::Token;
 
 /// Characters of a header that a refusal repeats.
@@ -162,6 +163,9 @@ fn encode(text: &str) -> String {
 
 /// What of a header is repeated to its sender.
 fn shown(text: &str) -> String {
-    let plain = text.chars().filter(|one| !one.is_control());
-    plain.take(MAX_SHOWN).collect()
+    let mut shown = String::new();
+    for character in text.chars().take(MAX_SHOWN) {
+        push_plain(&mut shown, character);
+    }
+    shown
 }

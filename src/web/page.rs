@@ -81,12 +81,13 @@ pub fn find(path: &str) -> Option<&'static Asset> {
 }
 
 /// What the page may do: run its own scripts and styles, draw, and speak to `own`, where it came from. `'self'` covers the
-/// WebSocket in newer browsers only, so that is spelled out.
+/// WebSocket in newer browsers only, so that is spelled out. No text can become markup or a script: of trusted types there are none.
 #[must_use]
 pub fn policy(own: &super::authority::Authority) -> String {
     format!(
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self' ws://{own}; \
-         base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+         base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'; \
+         trusted-types 'none'"
     )
 }
 

@@ -116,6 +116,7 @@ fn malformed(error: &HeadError) -> Response {
 /// What a request may have, and what it gets.
 fn judge(request: &Request, door: &Door, local: SocketAddr) -> Outcome {
     let refused = |why: &Refusal| {
+        tracing::debug!(%why, "request refused");
         let status = match why {
             Refusal::NoHost => Status::BadRequest,
             _ => Status::Forbidden,

@@ -21,7 +21,7 @@ use crate::actors::budget::{Claim, Share};
 use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
 use crate::protocol::fragments::{Fragments, MAX_AGE};
-use crate::protocol::frame::{Frame, FrameError, FrameReader};
+use crate::protocol::frame::{Foreign, Frame, FrameError, FrameReader, is_host_line};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
 use crate::protocol::token::Token;
@@ -53,6 +53,8 @@ pub(super) struct Reader {
     unfinished: Unfinished,
     /// What the client has yet to show before anything is done for it.
     locked: Option<Token>,
+    /// An object has come: this is no HTTP request, whose body could be one, but not its head.
+    speaks_json: bool,
 }
 
 /// Why a client that has to show a token is not let in.
@@ -86,6 +88,7 @@ impl Reader {
             fragments: Fragments::default(),
             unfinished,
             locked,
+            speaks_json: false,
         }
     }
 
@@ -253,8 +256,12 @@ impl Reader {
         let mut room = self.shared.room_for(length).await;
         let frame = match frame {
             Ok(frame) => frame,
+            Err(FrameError::NotAnObject(start)) if !self.speaks_json && is_host_line(&start) => {
+                return self.refuse(Foreign::Http.explanation());
+            }
             Err(error) => return self.complain(&error.to_string(), None).await,
         };
+        self.speaks_json = true;
         self.shared.unbatched.set(!frame.newline);
         let Some(Incoming { id, op }) = self.assemble(op::read(&frame.text), &mut room).await
         else {
@@ -317,13 +324,15 @@ impl Reader {
         None
     }
 
-    /// The client has not done what it has to: it is told so, and nothing that it sends is looked at any more.
+    /// The client has not done what it has to, or speaks something else: it is told so, and nothing that it sends is looked at
+    /// any more.
     fn refuse(&self, why: &str) {
         self.shared.refusing.set(true);
         self.shared.send(messages::status(Level::Error, why, None));
     }
 
     async fn complain(&self, why: &str, id: Option<&RawValue>) {
+        tracing::debug!(connection = self.id.0, why, "refused");
         self.say(messages::status(Level::Error, why, id), Some(Level::Error))
             .await;
     }

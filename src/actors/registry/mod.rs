@@ -394,6 +394,9 @@ impl Registry {
     }
 
     fn send_status(&self, to: ConnectionId, level: Level, msg: &str, id: Option<&RawValue>) {
+        if level == Level::Error {
+            tracing::debug!(connection = to.0, why = msg, "refused");
+        }
         if let Some(client) = self.clients.get(&to)
             && client.verbosity.wants(level)
         {

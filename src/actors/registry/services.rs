@@ -98,6 +98,10 @@ impl Services {
         let id: String = serde_json::from_str(id?.get()).ok()?;
         let number: u64 = id.strip_prefix(CALL_ID_PREFIX)?.parse().ok()?;
         let call = self.outstanding.get(&number)?;
+        // One id a call: `+1` and `01` are numbers too.
+        if id != Self::call_id(number) {
+            return None;
+        }
         if call.provider != provider || names::absolute(&call.service) != names::absolute(service) {
             return None;
         }

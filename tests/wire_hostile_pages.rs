@@ -1,0 +1,493 @@
+//! Pages that mean harm, and what else may speak HTTP or WebSocket at the port: requests as a browser can be made to send
+//! them, and bytes that no browser sends.
+//!
+//! What a page tries in a real browser is in `tests/browser/test_hostile.py`; who may ask, and well-formed refusals, are
+//! in `wire_http.rs`, `wire_websocket.rs` and `wire_token.rs`.
+//!
+//! **Invariant:** whatever a page has its visitor's browser send, the arm's parameters stay as they were.
+
+#![allow(
+    clippy::expect_used,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "a helper of a test fails by panicking, as a test does"
+)]
+
+mod common;
+#[cfg(feature = "web")]
+mod web_client;
+
+use common::{Client, Runtime};
+use serde_json::json;
+
+const SET_GRAVITY: &str =
+    "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
+
+fn assert_nothing_was_executed(runtime: &Runtime) {
+    let parameters = runtime.connect().ask("/arm_sim/set_params", json!({}));
+    assert_eq!(parameters["gravity"], 9.81);
+}
+
+/// All lines up to the end of the stream, which must come; each is an error status.
+fn complaints(client: &mut Client) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut rest = String::new();
+    std::io::Read::read_to_string(&mut client.stream(), &mut rest).expect("the stream ends");
+    for line in rest.lines() {
+        let status: serde_json::Value = serde_json::from_str(line).expect("a line of JSON");
+        assert_eq!(
+            (&status["op"], &status["level"]),
+            (&json!("status"), &json!("error"))
+        );
+        lines.push(status["msg"].as_str().unwrap().to_owned());
+    }
+    lines
+}
+
+/// A hostile name server can make a browser believe that this port is the page's own server. To that, a page may send a
+/// request of any method without asking first, and no list of methods has them all.
+#[test]
+fn a_request_of_whatever_method_is_told_so_and_closed_before_its_body() {
+    let runtime = Runtime::start();
+    for method in [
+        "PROPFIND",
+        "patch",
+        "X",
+        "LINK",
+        "M-SEARCH",
+        "!#$%&'*+-.^_`|~",
+    ] {
+        for head in [
+            "Host: evil.example:9095\r\nContent-Length: 100\r\n",
+            "Accept: */*\r\nContent-Type: text/plain\r\nHOST: evil.example\r\nConnection: keep-alive\r\n",
+            "host:evil.example\n",
+            "Host:\r\n",
+        ] {
+            let mut client = runtime.connect();
+            let request = format!("{method} / HTTP/1.1\r\n{head}\r\n{SET_GRAVITY}{SET_GRAVITY}");
+            client.send_bytes(request.as_bytes());
+            let told = complaints(&mut client);
+            let last = told.last().expect("a reason");
+            assert!(last.contains("HTTP request"), "{method}, {head}: {told:?}");
+        }
+    }
+    assert_nothing_was_executed(&runtime);
+}
+
+/// The same where the request line is longer than a frame may be, so that nothing of it is kept, and byte by byte.
+#[test]
+fn a_request_is_known_by_its_head_however_long_its_first_line_and_however_it_is_cut() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let line = format!("LINK /{} HTTP/1.1\r\n", "a".repeat(4 * 1024 * 1024));
+    client.send_bytes(line.as_bytes());
+    client.send_bytes(format!("Host: evil.example\r\n\r\n{SET_GRAVITY}").as_bytes());
+    assert!(
+        complaints(&mut client)
+            .last()
+            .unwrap()
+            .contains("HTTP request")
+    );
+
+    let mut client = runtime.connect();
+    for byte in b"LINK / HTTP/1.1\r\nHost: evil.example\r\n" {
+        client.send_bytes(&[*byte]);
+    }
+    assert!(
+        complaints(&mut client)
+            .last()
+            .unwrap()
+            .contains("HTTP request")
+    );
+    assert_nothing_was_executed(&runtime);
+}
+
+/// The rule is about how a connection opens: later, and where it only resembles that, a line is malformed and no more.
+#[test]
+fn a_line_like_one_of_a_head_is_an_ordinary_malformed_frame_elsewhere() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for line in [
+        "hostile: x\n",
+        "Hos\n",
+        "host\n",
+        " host x: y\n",
+        "get / HTTP/1.1\n",
+    ] {
+        client.send_bytes(line.as_bytes());
+        assert_eq!(client.receive()["level"], "error");
+    }
+    client.settle();
+    client.send_bytes(b"Host: localhost\n");
+    assert_eq!(client.receive()["level"], "error");
+    client.settle();
+}
+
+/// Whoever must show a token has to show it first, whatever it looks like.
+#[test]
+fn a_request_of_whatever_method_is_locked_out_by_the_token_too() {
+    let runtime = Runtime::with(&["--token", "open-sesame"]);
+    let mut client = runtime.connect();
+    let auth = "{\"op\":\"auth\",\"token\":\"open-sesame\"}\n";
+    let request = format!("LINK / HTTP/1.1\r\nHost: x\r\n\r\n{auth}{SET_GRAVITY}");
+    client.send_bytes(request.as_bytes());
+    assert!(complaints(&mut client)[0].contains("token"));
+    let mut client = runtime.connect();
+    client.send_bytes(auth.as_bytes());
+    assert_eq!(
+        client.ask("/arm_sim/set_params", json!({}))["gravity"],
+        9.81
+    );
+}
+
+#[cfg(feature = "web")]
+mod web {
+    use std::fs;
+    use std::io::Write;
+    use std::path::{Path, PathBuf};
+
+    use serde_json::json;
+    use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
+
+    use super::{Runtime, assert_nothing_was_executed};
+    use crate::web_client::{Answer, Socket, exchange, get, handshake, request, try_handshake};
+
+    /// What every answer says to a browser, whatever it is about.
+    const STRICT: [(&str, &str); 7] = [
+        ("x-content-type-options", "nosniff"),
+        ("x-frame-options", "DENY"),
+        ("cross-origin-resource-policy", "same-origin"),
+        ("cross-origin-opener-policy", "same-origin"),
+        ("referrer-policy", "no-referrer"),
+        ("cache-control", "no-store"),
+        ("connection", "close"),
+    ];
+
+    fn assert_strict(answer: &Answer, what: &str) {
+        for (name, value) in STRICT {
+            assert_eq!(answer.header(name), Some(value), "{name} of {what}");
+        }
+        let policy = answer.header("content-security-policy").expect(what);
+        for rule in ["default-src 'none'", "frame-ancestors 'none'"] {
+            assert!(
+                policy.split("; ").any(|one| one == rule),
+                "{policy} of {what}"
+            );
+        }
+        for name in [
+            "access-control-allow-origin",
+            "access-control-allow-methods",
+            "access-control-allow-headers",
+            "access-control-allow-credentials",
+            "access-control-allow-private-network",
+            "server",
+        ] {
+            assert_eq!(answer.header(name), None, "{name} of {what}");
+        }
+    }
+
+    /// A folder of this test's own, below the build's.
+    fn folder(name: &str) -> PathBuf {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        folder
+    }
+
+    #[test]
+    fn every_answer_keeps_the_browser_strict_and_allows_no_other_site_anything() {
+        let report = folder("strict_report");
+        fs::write(report.join("index.html"), "x").unwrap();
+        let runtime = Runtime::with(&["--report", report.to_str().unwrap()]);
+        let address = runtime.address;
+        let origin = format!("Host: {address}\r\nOrigin: http://evil.example\r\n");
+        for (path, status) in [
+            ("/", 200),
+            ("/main.js", 200),
+            ("/report/", 200),
+            ("/report", 301),
+            ("/nothing", 404),
+            ("/report/nothing.txt", 404),
+        ] {
+            let answer = request(address, path, &origin);
+            assert_eq!(answer.status, status, "{path}");
+            assert_strict(&answer, path);
+        }
+        assert_strict(&request(address, "/", "Host: evil.example\r\n"), "403");
+        assert_strict(&request(address, "/", ""), "400");
+        let refused = [
+            (handshake(address) + "Origin: http://evil.example\r\n", 403),
+            (handshake(address).replace("Version: 13", "Version: 8"), 426),
+            (handshake(address).replace("Key: dGhl", "Key: !"), 400),
+        ];
+        for (headers, status) in refused {
+            let answer = request(address, "/", &headers);
+            assert_eq!(answer.status, status);
+            assert_strict(&answer, &headers);
+        }
+        let long = format!("GET /{} HTTP/1.1\r\n\r\n", "a".repeat(20_000));
+        let answer = Answer::parse(&exchange(address, long.as_bytes()));
+        assert_eq!(answer.status, 431);
+        assert_strict(&answer, "431");
+    }
+
+    #[test]
+    fn the_page_can_make_no_markup_of_a_text() {
+        let runtime = Runtime::start();
+        let page = get(runtime.address, "/");
+        let policy = page.header("content-security-policy").unwrap();
+        for rule in ["require-trusted-types-for 'script'", "trusted-types 'none'"] {
+            assert!(policy.split("; ").any(|one| one == rule), "{policy}");
+        }
+    }
+
+    /// To the browser, such a page is of the same origin: `Origin` and `Host` agree, and only the name gives it away.
+    #[test]
+    fn a_websocket_of_a_page_whose_name_was_pointed_here_is_refused() {
+        let runtime = Runtime::start();
+        let (address, port) = (runtime.address, runtime.address.port());
+        for name in [
+            "evil.example",
+            "localhost.evil.example",
+            "xn--lcalhost-54a",
+            "127.0.0.1.nip.example",
+        ] {
+            let headers = handshake(address)
+                .replace(&format!("Host: {address}"), &format!("Host: {name}:{port}"));
+            let headers = format!("{headers}Origin: http://{name}:{port}\r\n");
+            let (status, body) = try_handshake(address, "/", &headers);
+            assert_eq!(status, 403, "{name}");
+            assert!(body.contains("--allow-host"), "{body}");
+        }
+    }
+
+    /// Other ways to write this machine's address: a browser never sends them as they stand, so they are nobody's.
+    #[test]
+    fn a_host_or_an_origin_that_only_resembles_ours_is_refused() {
+        let runtime = Runtime::start();
+        let (address, port) = (runtime.address, runtime.address.port());
+        for name in [
+            "localhost.",
+            "127.1",
+            "127.0.1",
+            "2130706433",
+            "0x7f000001",
+            "0177.0.0.1",
+            "[::ffff:127.0.0.1]",
+            "[::]",
+            "[::1%25lo]",
+            "l\u{43e}calhost",
+            "localhost\u{200b}",
+            "%6cocalhost",
+            "localhost/",
+            "localhost#",
+            "localhost,evil.example",
+            "evil.example@localhost",
+        ] {
+            let host = format!("Host: {name}:{port}\r\n");
+            assert_eq!(request(address, "/", &host).status, 403, "{name}");
+            let headers = format!("{}Origin: http://{name}:{port}\r\n", handshake(address));
+            assert_eq!(try_handshake(address, "/", &headers).0, 403, "{name}");
+        }
+        for origin in [
+            "http://localhost/",
+            "http://localhost:3000/..",
+            "http://localhost http://evil.example",
+            "http:localhost",
+            "ws://localhost",
+            "http://localhost?x",
+            "http://",
+            "undefined",
+        ] {
+            let headers = format!("{}Origin: {origin}\r\n", handshake(address));
+            assert_eq!(try_handshake(address, "/", &headers).0, 403, "{origin}");
+        }
+    }
+
+    #[test]
+    fn no_spelling_of_a_path_leads_out_of_the_reports_folder() {
+        let outside = folder("hostile_outside");
+        let inside = outside.join("inside");
+        fs::create_dir(&inside).unwrap();
+        fs::write(outside.join("secret.txt"), "secret").unwrap();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::symlink;
+            symlink("loop.txt", inside.join("loop.txt")).unwrap();
+            symlink("../inside/../secret.txt", inside.join("relative.txt")).unwrap();
+            symlink("/etc/passwd", inside.join("passwd.txt")).unwrap();
+        }
+        let runtime = Runtime::with(&["--report", inside.to_str().unwrap()]);
+        let absolute = outside.join("secret.txt");
+        let long = format!("{}.txt", "a".repeat(5000));
+        for rest in [
+            "%252e%252e/secret.txt",
+            "%c0%ae%c0%ae/secret.txt",
+            "%2e%2e%2fsecret.txt",
+            "%2e%2e%5csecret.txt",
+            "..;/secret.txt",
+            "...//secret.txt",
+            "..%00/secret.txt",
+            "secret.txt%00.svg",
+            "%e2%80%a5/secret.txt",
+            "%uff0e%uff0e/secret.txt",
+            "~/secret.txt",
+            "$HOME/secret.txt",
+            "file:///etc/passwd",
+            "con.txt:stream.txt",
+            "loop.txt",
+            "relative.txt",
+            "passwd.txt",
+            absolute.to_str().unwrap(),
+            &absolute.to_str().unwrap().replace('/', "%2f"),
+            &"../".repeat(9),
+            &"a/".repeat(2000),
+            &long,
+        ] {
+            let answer = get(runtime.address, &format!("/report/{rest}"));
+            assert_eq!(answer.status, 404, "{rest}");
+            assert!(!answer.text().contains("secret\n"), "{rest}");
+        }
+        for path in [
+            "/../secret.txt",
+            "/report/../../secret.txt",
+            "/report%2f..%2fsecret.txt",
+            "//etc/passwd",
+        ] {
+            assert_eq!(get(runtime.address, path).status, 404, "{path}");
+        }
+    }
+
+    /// What a client closes with is as little to be trusted as what it sends before. Payloads of a close frame, each against a
+    /// rule of RFC 6455, section 5.5.1 or 7.4.
+    #[test]
+    fn a_close_frame_against_the_protocol_is_answered_as_such_and_costs_nobody_else() {
+        let runtime = Runtime::start();
+        for payload in [
+            &b"\x03"[..],                 // half a code
+            &b"\x00\x00"[..],             // 0
+            &b"\x03\xe7"[..],             // 999
+            &b"\x03\xec"[..],             // 1004
+            &b"\x03\xed"[..],             // 1005: never sent
+            &b"\x03\xee"[..],             // 1006: never sent
+            &b"\xff\xff"[..],             // 65535
+            &b"\x03\xe8\xff\xfe"[..],     // a reason that is no text
+            &b"\x03\xe8\xed\xa0\x80"[..], // half a surrogate pair
+        ] {
+            let mut socket = Socket::open(runtime.address);
+            let mut frame = vec![
+                0x88,
+                0x80 | u8::try_from(payload.len()).unwrap(),
+                0,
+                0,
+                0,
+                0,
+            ];
+            frame.extend_from_slice(payload);
+            socket.socket.get_mut().write_all(&frame).unwrap();
+            let code = socket.close_code();
+            let expected = [Some(CloseCode::Protocol), Some(CloseCode::Invalid)];
+            assert!(expected.contains(&code), "{code:?} for {payload:x?}");
+            assert!(socket.is_closed());
+        }
+        Socket::open(runtime.address).settle();
+    }
+
+    /// A frame's head alone, as no client of the protocol sends it; of the lengths, nothing may be set aside for them.
+    #[test]
+    fn a_frame_whose_head_is_against_the_protocol_is_refused_by_that_alone() {
+        let runtime = Runtime::start();
+        for (head, expected) in [
+            (&b"\xa1\x82\0\0\0\0{}"[..], CloseCode::Protocol), // the second reserved bit
+            (&b"\x91\x82\0\0\0\0{}"[..], CloseCode::Protocol), // the third
+            (&b"\x8b\x80\0\0\0\0"[..], CloseCode::Protocol),   // a reserved control frame
+            (&b"\x08\x80\0\0\0\0"[..], CloseCode::Protocol),   // a close in fragments
+            (&b"\x88\xfe\x00\x7e\0\0\0\0"[..], CloseCode::Protocol), // a close of 126 bytes
+            (
+                &b"\x81\xff\x3f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0"[..],
+                CloseCode::Size,
+            ),
+            (
+                &b"\x82\xff\0\0\0\0\x00\x40\x00\x01\0\0\0\0"[..],
+                CloseCode::Size,
+            ), // 4 MiB and a byte
+        ] {
+            let mut socket = Socket::open(runtime.address);
+            socket.socket.get_mut().write_all(head).unwrap();
+            if head.starts_with(b"\x88\xfe") {
+                socket.socket.get_mut().write_all(&[0; 126]).unwrap();
+            }
+            assert_eq!(socket.close_code(), Some(expected), "{head:x?}");
+        }
+        Socket::open(runtime.address).settle();
+    }
+
+    /// Compression would let a page learn what else is in the stream, and a small message be a large one.
+    #[test]
+    fn no_extension_and_no_subprotocol_is_agreed_to() {
+        let runtime = Runtime::start();
+        let address = runtime.address;
+        let offers = "Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits\r\n\
+                      Sec-WebSocket-Protocol: rosbridge_v2, json\r\n";
+        let request = format!("GET / HTTP/1.1\r\n{}{offers}\r\n\u{1}", handshake(address));
+        let mut stream = std::net::TcpStream::connect(address).unwrap();
+        stream
+            .set_read_timeout(Some(super::common::PATIENCE))
+            .unwrap();
+        // The byte behind the head begins a frame that is not masked, so that the stream ends.
+        stream.write_all(request.as_bytes()).unwrap();
+        stream.write_all(b"\x02{}").unwrap();
+        let answer = Answer::parse(&crate::web_client::rest(&mut stream));
+        assert_eq!(answer.status, 101);
+        assert_eq!(answer.header("sec-websocket-extensions"), None);
+        assert_eq!(answer.header("sec-websocket-protocol"), None);
+    }
+
+    /// Each ping would be answered, and nobody reads the answers.
+    #[test]
+    fn pings_without_end_are_answered_as_far_as_they_are_read() {
+        let runtime = Runtime::start();
+        let mut socket = Socket::open(runtime.address);
+        let mut ping = vec![0x89, 0x80 | 125, 0, 0, 0, 0];
+        ping.extend_from_slice(&[b'x'; 125]);
+        for _ in 0..100 {
+            socket
+                .socket
+                .get_mut()
+                .write_all(&ping.repeat(100))
+                .unwrap();
+        }
+        let response = socket.call("/arm_sim/set_params", json!({}));
+        assert_eq!(response["result"], true);
+    }
+
+    /// A body behind a handshake is not a way past the check of the origin, nor are two requests in one.
+    #[test]
+    fn a_handshake_hidden_in_a_request_opens_nothing() {
+        let runtime = Runtime::start();
+        let address = runtime.address;
+        let inner = format!("GET / HTTP/1.1\r\n{}\r\n", handshake(address));
+        let frame = super::SET_GRAVITY.trim_end();
+        let mut text = vec![0x81, 0x80 | u8::try_from(frame.len()).unwrap(), 0, 0, 0, 0];
+        text.extend_from_slice(frame.as_bytes());
+        for outer in [
+            format!(
+                "GET / HTTP/1.1\r\nHost: {address}\r\nContent-Length: {}\r\n\r\n",
+                inner.len()
+            ),
+            format!(
+                "GET / HTTP/1.1\r\nHost: {address}\r\nTransfer-Encoding: chunked\r\n\r\n{:x}\r\n",
+                inner.len()
+            ),
+            format!("GET / HTTP/1.1\r\nHost: evil.example\r\nX: \r\n\r\n"),
+            format!("GET /nothing HTTP/1.1\r\nHost: {address}\r\nConnection: keep-alive\r\n\r\n"),
+        ] {
+            let mut bytes = (outer + &inner).into_bytes();
+            bytes.extend_from_slice(&text);
+            let answer = Answer::parse(&exchange(address, &bytes));
+            assert_ne!(answer.status, 101);
+        }
+        assert_nothing_was_executed(&runtime);
+    }
+}
