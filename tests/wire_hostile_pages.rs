@@ -1,5 +1,4 @@
-//! Pages that mean harm, and what else may speak HTTP or WebSocket at the port: requests as a browser can be made to send
-//! them, and bytes that no browser sends.
+//! Pages that mean harm: requests as a browser can be made to send them, and what the answers let it do.
 //!
 //! What a page tries in a real browser is in `tests/browser/test_hostile.py`; who may ask, and well-formed refusals, are
 //! in `wire_http.rs`, `wire_websocket.rs` and `wire_token.rs`.
@@ -144,14 +143,10 @@ fn a_request_of_whatever_method_is_locked_out_by_the_token_too() {
 #[cfg(feature = "web")]
 mod web {
     use std::fs;
-    use std::io::Write;
     use std::path::{Path, PathBuf};
 
-    use serde_json::json;
-    use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
-
-    use super::{Runtime, assert_nothing_was_executed};
-    use crate::web_client::{Answer, Socket, exchange, get, handshake, request, try_handshake};
+    use super::Runtime;
+    use crate::web_client::{Answer, exchange, get, handshake, request, try_handshake};
 
     /// What every answer says to a browser, whatever it is about.
     const STRICT: [(&str, &str); 7] = [
@@ -357,137 +352,5 @@ mod web {
         ] {
             assert_eq!(get(runtime.address, path).status, 404, "{path}");
         }
-    }
-
-    /// What a client closes with is as little to be trusted as what it sends before. Payloads of a close frame, each against a
-    /// rule of RFC 6455, section 5.5.1 or 7.4.
-    #[test]
-    fn a_close_frame_against_the_protocol_is_answered_as_such_and_costs_nobody_else() {
-        let runtime = Runtime::start();
-        for payload in [
-            &b"\x03"[..],                 // half a code
-            &b"\x00\x00"[..],             // 0
-            &b"\x03\xe7"[..],             // 999
-            &b"\x03\xec"[..],             // 1004
-            &b"\x03\xed"[..],             // 1005: never sent
-            &b"\x03\xee"[..],             // 1006: never sent
-            &b"\xff\xff"[..],             // 65535
-            &b"\x03\xe8\xff\xfe"[..],     // a reason that is no text
-            &b"\x03\xe8\xed\xa0\x80"[..], // half a surrogate pair
-        ] {
-            let mut socket = Socket::open(runtime.address);
-            let mut frame = vec![
-                0x88,
-                0x80 | u8::try_from(payload.len()).unwrap(),
-                0,
-                0,
-                0,
-                0,
-            ];
-            frame.extend_from_slice(payload);
-            socket.socket.get_mut().write_all(&frame).unwrap();
-            let code = socket.close_code();
-            let expected = [Some(CloseCode::Protocol), Some(CloseCode::Invalid)];
-            assert!(expected.contains(&code), "{code:?} for {payload:x?}");
-            assert!(socket.is_closed());
-        }
-        Socket::open(runtime.address).settle();
-    }
-
-    /// A frame's head alone, as no client of the protocol sends it; of the lengths, nothing may be set aside for them.
-    #[test]
-    fn a_frame_whose_head_is_against_the_protocol_is_refused_by_that_alone() {
-        let runtime = Runtime::start();
-        for (head, expected) in [
-            (&b"\xa1\x82\0\0\0\0{}"[..], CloseCode::Protocol), // the second reserved bit
-            (&b"\x91\x82\0\0\0\0{}"[..], CloseCode::Protocol), // the third
-            (&b"\x8b\x80\0\0\0\0"[..], CloseCode::Protocol),   // a reserved control frame
-            (&b"\x08\x80\0\0\0\0"[..], CloseCode::Protocol),   // a close in fragments
-            (&b"\x88\xfe\x00\x7e\0\0\0\0"[..], CloseCode::Protocol), // a close of 126 bytes
-            (
-                &b"\x81\xff\x3f\xff\xff\xff\xff\xff\xff\xff\0\0\0\0"[..],
-                CloseCode::Size,
-            ),
-            (
-                &b"\x82\xff\0\0\0\0\x00\x40\x00\x01\0\0\0\0"[..],
-                CloseCode::Size,
-            ), // 4 MiB and a byte
-        ] {
-            let mut socket = Socket::open(runtime.address);
-            socket.socket.get_mut().write_all(head).unwrap();
-            if head.starts_with(b"\x88\xfe") {
-                socket.socket.get_mut().write_all(&[0; 126]).unwrap();
-            }
-            assert_eq!(socket.close_code(), Some(expected), "{head:x?}");
-        }
-        Socket::open(runtime.address).settle();
-    }
-
-    /// Compression would let a page learn what else is in the stream, and a small message be a large one.
-    #[test]
-    fn no_extension_and_no_subprotocol_is_agreed_to() {
-        let runtime = Runtime::start();
-        let address = runtime.address;
-        let offers = "Sec-WebSocket-Extensions: permessage-deflate; client_max_window_bits\r\n\
-                      Sec-WebSocket-Protocol: rosbridge_v2, json\r\n";
-        let request = format!("GET / HTTP/1.1\r\n{}{offers}\r\n\u{1}", handshake(address));
-        let mut stream = std::net::TcpStream::connect(address).unwrap();
-        stream
-            .set_read_timeout(Some(super::common::PATIENCE))
-            .unwrap();
-        // The byte behind the head begins a frame that is not masked, so that the stream ends.
-        stream.write_all(request.as_bytes()).unwrap();
-        stream.write_all(b"\x02{}").unwrap();
-        let answer = Answer::parse(&crate::web_client::rest(&mut stream));
-        assert_eq!(answer.status, 101);
-        assert_eq!(answer.header("sec-websocket-extensions"), None);
-        assert_eq!(answer.header("sec-websocket-protocol"), None);
-    }
-
-    /// Each ping would be answered, and nobody reads the answers.
-    #[test]
-    fn pings_without_end_are_answered_as_far_as_they_are_read() {
-        let runtime = Runtime::start();
-        let mut socket = Socket::open(runtime.address);
-        let mut ping = vec![0x89, 0x80 | 125, 0, 0, 0, 0];
-        ping.extend_from_slice(&[b'x'; 125]);
-        for _ in 0..100 {
-            socket
-                .socket
-                .get_mut()
-                .write_all(&ping.repeat(100))
-                .unwrap();
-        }
-        let response = socket.call("/arm_sim/set_params", json!({}));
-        assert_eq!(response["result"], true);
-    }
-
-    /// A body behind a handshake is not a way past the check of the origin, nor are two requests in one.
-    #[test]
-    fn a_handshake_hidden_in_a_request_opens_nothing() {
-        let runtime = Runtime::start();
-        let address = runtime.address;
-        let inner = format!("GET / HTTP/1.1\r\n{}\r\n", handshake(address));
-        let frame = super::SET_GRAVITY.trim_end();
-        let mut text = vec![0x81, 0x80 | u8::try_from(frame.len()).unwrap(), 0, 0, 0, 0];
-        text.extend_from_slice(frame.as_bytes());
-        for outer in [
-            format!(
-                "GET / HTTP/1.1\r\nHost: {address}\r\nContent-Length: {}\r\n\r\n",
-                inner.len()
-            ),
-            format!(
-                "GET / HTTP/1.1\r\nHost: {address}\r\nTransfer-Encoding: chunked\r\n\r\n{:x}\r\n",
-                inner.len()
-            ),
-            format!("GET / HTTP/1.1\r\nHost: evil.example\r\nX: \r\n\r\n"),
-            format!("GET /nothing HTTP/1.1\r\nHost: {address}\r\nConnection: keep-alive\r\n\r\n"),
-        ] {
-            let mut bytes = (outer + &inner).into_bytes();
-            bytes.extend_from_slice(&text);
-            let answer = Answer::parse(&exchange(address, &bytes));
-            assert_ne!(answer.status, 101);
-        }
-        assert_nothing_was_executed(&runtime);
     }
 }

@@ -6,9 +6,10 @@
 #![allow(
     clippy::expect_used,
     clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
     clippy::panic,
     clippy::unwrap_used,
-    reason = "a helper of a test fails by panicking, as a test does"
+    reason = "a helper of a test fails by panicking, as a test does; it reads best called with a value"
 )]
 
 mod common;
