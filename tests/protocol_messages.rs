@@ -144,6 +144,16 @@ fn what_passes_through_is_untouched_but_for_numbers_that_overflow() {
     );
 }
 
+/// To some readers they end a line. Within a string there can be none but as an escape.
+#[test]
+fn carriage_returns_between_tokens_of_what_passes_through_become_spaces() {
+    let msg = raw("{\r\"a\"\r:\t[\r1e999,\"\\r\"]\r}");
+    assert_eq!(
+        line(&publish_raw("/x", &msg)),
+        "{\"op\":\"publish\",\"topic\":\"/x\",\"msg\":{ \"a\" :\t[ null,\"\\r\"] }}"
+    );
+}
+
 /// How much memory a frame holds on to.
 fn memory(frame: Bytes) -> usize {
     frame.try_into_mut().expect("nobody else has it").capacity()

@@ -99,3 +99,26 @@ pub fn is_host_line(start: &str) -> bool {
 fn holds_a_line(bytes: &[u8]) -> bool {
     bytes.trim_ascii_start().contains(&b'\n')
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_line_is_one_in_any_case_and_with_any_value() {
+        for line in ["Host: a", "host:a", "HOST:", "Host: a:1"] {
+            assert!(is_host_line(line), "{line}");
+        }
+        for line in [
+            "",
+            "Host",
+            "Hosts: a",
+            "X-Host: a",
+            "host a:1",
+            " Host: a",
+            ":host",
+        ] {
+            assert!(!is_host_line(line), "{line}");
+        }
+    }
+}

@@ -56,3 +56,39 @@ pub(super) fn found(raw: &RawValue) -> String {
         _ => excerpt(raw.get()),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_acts_on_a_terminal_is_escaped_and_what_shows_itself_is_not() {
+        for acting in [
+            '\0', '\n', '\r', '\t', '\u{1b}', '\u{7f}', '\u{85}', '\u{9b}', '\u{61c}', '\u{200e}',
+            '\u{200f}', '\u{2028}', '\u{2029}', '\u{202a}', '\u{202e}', '\u{2066}', '\u{2069}',
+            '\u{feff}',
+        ] {
+            let mut text = String::new();
+            push_plain(&mut text, acting);
+            assert_eq!(text, acting.escape_default().to_string());
+            assert!(text.is_ascii() && text.starts_with('\\'), "{text}");
+        }
+        for plain in [
+            ' ',
+            'a',
+            '~',
+            '\\',
+            '"',
+            '\u{e9}',
+            '\u{2027}',
+            '\u{202f}',
+            '\u{2065}',
+            '\u{206a}',
+            '\u{1f9be}',
+        ] {
+            let mut text = String::new();
+            push_plain(&mut text, plain);
+            assert_eq!(text, plain.to_string());
+        }
+    }
+}
