@@ -134,7 +134,11 @@ fn every_package_forbids_unsafe_code() {
         let ours = path.parent() == Some(root());
         let forbids = lints.contains("unsafe_code = \"forbid\"");
         let denies = lints.contains("unsafe_code = \"deny\"");
-        assert!(forbids || (denies && !ours), "{}", path.display());
+        assert!(
+            forbids || (denies && !ours),
+            "{}: its [lints.rust] has no `unsafe_code = \"forbid\"`",
+            path.display()
+        );
         seen += 1;
     }
     assert!(seen >= 2, "{seen} packages");
