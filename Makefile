@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-browser test-clients lint audit doc report mutants bench bench-load bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-browser test-clients fuzz lint audit doc report mutants bench bench-load bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -31,9 +31,14 @@ test-clients: build ## Run clients that nobody here wrote against it: roslibpy, 
 	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
+fuzz: ## Run every fuzz target for TIME=60 seconds; ARGS="frame op" picks some; needs cargo-fuzz
+	@echo "make fuzz: $(or $(TIME),60) s each, after a build of some minutes"
+	@CARGO="$(CARGO)" TIME="$(TIME)" bash scripts/fuzz.sh $(ARGS)
+
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check
+	$(CARGO) fmt --check --manifest-path fuzz/Cargo.toml
 	$(CARGO) clippy --locked --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 

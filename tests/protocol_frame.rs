@@ -222,7 +222,7 @@ fn a_longer_frame_gets_one_error_and_is_skipped_to_where_it_would_have_ended() {
         ),
     ] {
         let stream = text + "{\"b\":2}";
-        let expected = [Err(FrameError::TooLong), frame("{\"b\":2}")];
+        let expected = [Err(FrameError::TooLong(MAX_FRAME)), frame("{\"b\":2}")];
         assert_eq!(read([stream.as_bytes()]), expected);
         for size in [64 * 1024, 999_983] {
             assert_eq!(
@@ -244,7 +244,7 @@ fn a_frame_that_is_too_long_is_reported_before_it_ends_and_is_not_kept() {
         reader.push(&chunk);
         errors += reader
             .by_ref()
-            .filter(|found| *found == Err(FrameError::TooLong))
+            .filter(|found| *found == Err(FrameError::TooLong(MAX_FRAME)))
             .count();
     }
     assert_eq!(errors, 1);
@@ -551,7 +551,7 @@ fn in_terms_of_the_model(outcome: &Outcome) -> Expected {
         Err(FrameError::Mismatch { .. }) => Expected::Mismatch,
         Err(FrameError::TooDeep) => Expected::TooDeep,
         Err(FrameError::NotUtf8 { .. }) => Expected::NotUtf8,
-        Err(FrameError::TooLong) => panic!("nothing here is that long"),
+        Err(FrameError::TooLong(_)) => panic!("nothing here is that long"),
     }
 }
 

@@ -54,9 +54,9 @@ pub enum FrameError {
     /// More than [`MAX_NESTING`] levels.
     #[error("malformed frame: nested deeper than {MAX_NESTING} levels")]
     TooDeep,
-    /// Longer than [`MAX_FRAME`].
-    #[error("frame longer than {MAX_FRAME} bytes, skipped")]
-    TooLong,
+    /// Longer than it may be, which is [`MAX_FRAME`] unless the reader has another limit; holds that.
+    #[error("frame longer than {0} bytes, skipped")]
+    TooLong(usize),
     /// Not UTF-8.
     #[error("malformed frame: byte {at} is not UTF-8")]
     NotUtf8 {
@@ -93,6 +93,8 @@ pub struct FrameReader {
     at: usize,
     state: State,
     nesting: Nesting,
+    /// Longest frame.
+    limit: usize,
 }
 
 impl Default for FrameReader {
@@ -105,12 +107,19 @@ impl FrameReader {
     /// A reader at the beginning of a stream.
     #[must_use]
     pub const fn new() -> Self {
+        Self::with_limit(MAX_FRAME)
+    }
+
+    /// The same for frames of at most `limit` bytes.
+    #[must_use]
+    pub const fn with_limit(limit: usize) -> Self {
         Self {
             buffer: Vec::new(),
             start: 0,
             at: 0,
             state: State::Between,
             nesting: Nesting::new(),
+            limit,
         }
     }
 
@@ -159,7 +168,7 @@ impl FrameReader {
             State::Line => Some(self.not_an_object()),
             State::Between | State::SkippedObject | State::SkippedLine => None,
         };
-        *self = Self::new();
+        *self = Self::with_limit(self.limit);
         error
     }
 
@@ -251,12 +260,13 @@ impl FrameReader {
             self.start = self.at;
         }
         // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
-        let too_long = self.at - self.start > MAX_FRAME;
+        let limit = self.limit;
+        let too_long = self.at - self.start > limit;
         let (state, error) = match event {
             None if !too_long => return None,
-            None => (State::SkippedObject, FrameError::TooLong),
+            None => (State::SkippedObject, FrameError::TooLong(limit)),
             Some(Event::Balanced) if kept && !too_long => return Some(self.take_frame()),
-            Some(Event::Balanced) => (State::Between, FrameError::TooLong),
+            Some(Event::Balanced) => (State::Between, FrameError::TooLong(limit)),
             Some(Event::Newline { in_string: true }) => {
                 (State::Between, FrameError::LineEndedInString)
             }
@@ -268,7 +278,11 @@ impl FrameReader {
         };
         self.state = state;
         self.start = self.at;
-        kept.then_some(Err(if too_long { FrameError::TooLong } else { error }))
+        kept.then_some(Err(if too_long {
+            FrameError::TooLong(limit)
+        } else {
+            error
+        }))
     }
 
     /// The frame that has just balanced.

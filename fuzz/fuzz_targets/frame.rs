@@ -1,0 +1,222 @@
+//! The frame reader against a slow model that has all bytes at once and looks at them one by one.
+//!
+//! What holds: reader and model find the same frames and complain of the same stretches, in the same order, however the
+//! stream is cut; what the reader keeps is bounded; it says that a line ended behind a frame only where one did.
+//!
+//! Input: a byte that chooses the limit, a byte that chooses the cuts, the stream.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use pendularm::protocol::frame::{FrameError, FrameReader, MAX_NESTING};
+
+fuzz_target!(|input: &[u8]| {
+    let &[limit, seed, ref stream @ ..] = input else {
+        return;
+    };
+    let limit = usize::from(limit) * 4;
+    let expected = model(stream, limit);
+    check(&expected, limit, stream, std::iter::once(stream));
+    check(&expected, limit, stream, stream.chunks(1));
+    check(&expected, limit, stream, Cuts { stream, seed });
+});
+
+/// What a stretch of the stream is.
+#[derive(Debug, PartialEq, Eq)]
+enum Outcome {
+    /// The text, and the bytes that follow it start here.
+    Frame(String, usize),
+    NotAnObject,
+    LineEnded,
+    LineEndedInString,
+    StreamEnded,
+    Mismatch,
+    TooDeep,
+    TooLong,
+    NotUtf8,
+}
+
+fn check<'a>(
+    expected: &[Outcome],
+    limit: usize,
+    stream: &[u8],
+    pieces: impl Iterator<Item = &'a [u8]>,
+) {
+    let mut reader = FrameReader::with_limit(limit);
+    let mut found = 0;
+    let mut judge = |outcome: Result<_, FrameError>| {
+        let wanted = expected.get(found).expect("no more than the model finds");
+        compare(outcome, wanted, limit, stream);
+        found += 1;
+    };
+    for piece in pieces {
+        reader.push(piece);
+        // A buffer grows by doubling, and is moved together once half of it is done with.
+        assert!(reader.buffered() <= 4 * (limit + piece.len() + 64) + 16 * 1024);
+        reader.by_ref().for_each(&mut judge);
+    }
+    reader.finish().map(Err).into_iter().for_each(&mut judge);
+    assert_eq!(found, expected.len(), "{expected:?}");
+}
+
+fn compare(
+    outcome: Result<pendularm::protocol::frame::Frame, FrameError>,
+    wanted: &Outcome,
+    limit: usize,
+    stream: &[u8],
+) {
+    let same = match (&outcome, wanted) {
+        (Ok(frame), Outcome::Frame(text, end)) => {
+            let mut behind = stream[*end..].iter();
+            let next = behind.find(|byte| !b" \t\r".contains(byte));
+            assert!(!frame.newline || next == Some(&b'\n'), "no line ended");
+            frame.text == *text
+        }
+        (Err(FrameError::TooLong(told)), Outcome::TooLong) => *told == limit,
+        (Err(FrameError::NotAnObject(_)), Outcome::NotAnObject)
+        | (Err(FrameError::LineEnded), Outcome::LineEnded)
+        | (Err(FrameError::LineEndedInString), Outcome::LineEndedInString)
+        | (Err(FrameError::StreamEnded), Outcome::StreamEnded)
+        | (Err(FrameError::Mismatch { .. }), Outcome::Mismatch)
+        | (Err(FrameError::TooDeep), Outcome::TooDeep)
+        | (Err(FrameError::NotUtf8 { .. }), Outcome::NotUtf8) => true,
+        _ => false,
+    };
+    assert!(same, "{outcome:?} instead of {wanted:?}");
+}
+
+/// Pieces of 0 to some dozen bytes, as the seed has it.
+struct Cuts<'a> {
+    stream: &'a [u8],
+    seed: u8,
+}
+
+impl<'a> Iterator for Cuts<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        if self.stream.is_empty() {
+            return None;
+        }
+        self.seed = self.seed.wrapping_mul(29).wrapping_add(13);
+        let length = usize::from(self.seed >> 2).min(self.stream.len());
+        let (piece, rest) = self.stream.split_at(length);
+        self.stream = rest;
+        Some(piece)
+    }
+}
+
+/// All that a stream holds, by contract section 1.
+fn model(stream: &[u8], limit: usize) -> Vec<Outcome> {
+    let mut outcomes = Vec::new();
+    let mut at = 0;
+    while at < stream.len() {
+        match stream[at] {
+            b' ' | b'\t' | b'\r' | b'\n' => at += 1,
+            b'{' => {
+                let (outcome, end) = object(stream, at, limit);
+                outcomes.push(outcome);
+                at = end;
+            }
+            _ => {
+                outcomes.push(Outcome::NotAnObject);
+                at = line_end(stream, at);
+            }
+        }
+    }
+    outcomes
+}
+
+fn line_end(stream: &[u8], from: usize) -> usize {
+    let newline = stream[from..].iter().position(|byte| *byte == b'\n');
+    newline.map_or(stream.len(), |offset| from + offset)
+}
+
+/// What begins with the brace at `start` is, and where it ends. The first thing that is wrong is what it is; it ends where
+/// it would have ended without that, or with the line where brackets do not match.
+fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
+    let mut open = Vec::new();
+    let mut in_string = false;
+    let mut wrong = None;
+    let mut at = start;
+    while at < stream.len() {
+        let byte = stream[at];
+        // A newline is no part of the frame.
+        if byte != b'\n' && at + 1 - start > limit {
+            wrong.get_or_insert(Outcome::TooLong);
+        }
+        match (in_string, byte) {
+            (false, b'\n') => return (wrong.unwrap_or(Outcome::LineEnded), at),
+            (true, b'\n') => return (wrong.unwrap_or(Outcome::LineEndedInString), at),
+            // What is escaped is looked at by nobody, unless it is a newline.
+            (true, b'\\') if stream.get(at + 1).is_some_and(|next| *next != b'\n') => {
+                at += 1;
+                if at + 1 - start > limit {
+                    wrong.get_or_insert(Outcome::TooLong);
+                }
+            }
+            (_, b'"') => in_string = !in_string,
+            (false, b'{' | b'[') => {
+                open.push(byte);
+                if open.len() > MAX_NESTING {
+                    wrong.get_or_insert(Outcome::TooDeep);
+                }
+            }
+            (false, b'}' | b']') => {
+                // Which brackets were opened beyond that depth is not remembered.
+                let opener = if byte == b'}' { b'{' } else { b'[' };
+                if open.len() <= MAX_NESTING && open.last() != Some(&opener) {
+                    return (wrong.unwrap_or(Outcome::Mismatch), line_end(stream, at + 1));
+                }
+                open.pop();
+                if open.is_empty() {
+                    let outcome = wrong.unwrap_or_else(|| frame(stream, start, at + 1));
+                    return (outcome, at + 1);
+                }
+            }
+            _ => {}
+        }
+        at += 1;
+    }
+    (wrong.unwrap_or(Outcome::StreamEnded), stream.len())
+}
+
+fn frame(stream: &[u8], start: usize, end: usize) -> Outcome {
+    match std::str::from_utf8(&stream[start..end]) {
+        Ok(text) => Outcome::Frame(accept(text), end),
+        Err(_) => Outcome::NotUtf8,
+    }
+}
+
+/// The text with Python's names for numbers that are not finite as literals that overflow.
+fn accept(text: &str) -> String {
+    let mut accepted = String::new();
+    let mut token = String::new();
+    let mut in_string = false;
+    let mut characters = text.chars();
+    while let Some(character) = characters.next() {
+        let is_token = character.is_ascii_alphanumeric() || "_.+-".contains(character);
+        if is_token && !in_string {
+            token.push(character);
+            continue;
+        }
+        accepted.push_str(literal(&token));
+        token.clear();
+        accepted.push(character);
+        match character {
+            '"' => in_string = !in_string,
+            '\\' if in_string => accepted.extend(characters.next()),
+            _ => {}
+        }
+    }
+    accepted + literal(&token)
+}
+
+fn literal(token: &str) -> &str {
+    match token {
+        "NaN" => "9e999",
+        "Infinity" => "1e999",
+        "-Infinity" => "-1e999",
+        other => other,
+    }
+}

@@ -1,0 +1,175 @@
+//! Frames into operations: any text that the frame reader lets through.
+//!
+//! What holds: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object gives an
+//! operation; names are bounded, and so is what a complaint repeats; whatever is passed on or echoed is one line of strict
+//! JSON in which nothing but numbers that overflow has changed.
+//!
+//! Input: the frames.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::frame::FrameReader;
+use pendularm::protocol::messages::{self, Level};
+use pendularm::protocol::op::{
+    self, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
+};
+use pendularm::protocol::trajectory::joint_trajectory;
+use pendularm_fuzz::json::Json;
+use serde_json::value::RawValue;
+
+/// Longest complaint: a sentence of ours and an excerpt of what it is about.
+const LONGEST_COMPLAINT: usize = 512;
+
+fuzz_target!(|input: &[u8]| {
+    let mut frames = FrameReader::new();
+    frames.push(input);
+    for frame in frames.by_ref() {
+        match frame {
+            Ok(frame) => judge(&frame.text),
+            Err(error) => check_complaint(&error.to_string()),
+        }
+    }
+    if let Some(error) = frames.finish() {
+        check_complaint(&error.to_string());
+    }
+});
+
+fn check_complaint(why: &str) {
+    let line = check_line(&messages::status(Level::Error, why, None));
+    assert_eq!(line.get("msg").and_then(Json::text), Some(why));
+}
+
+fn judge(frame: &str) {
+    let json = Json::read(frame);
+    let incoming = op::read(frame);
+    let id = incoming.id.as_deref();
+    let Some(json) = json else {
+        assert!(incoming.op.is_err() && id.is_none(), "{frame:?} is no JSON");
+        return;
+    };
+    // A key that is no text makes a frame that is taken for no JSON.
+    if !matches!(incoming.op, Err(OpError::Status(Problem::NotJson(_)))) {
+        let echoed = id.and_then(|id| Json::read(id.get()));
+        assert_eq!(echoed.as_ref(), json.get("id"), "{frame:?}");
+    }
+    match incoming.op {
+        Ok(op) => {
+            let name = json.get("op").and_then(Json::text);
+            assert!(name.is_some(), "{frame:?}");
+            check(&op, &json, id);
+        }
+        Err(error) => {
+            let why = error.to_string();
+            assert!(
+                why.len() < LONGEST_COMPLAINT && !why.contains(char::is_control),
+                "{why:?}"
+            );
+            let line = match &error {
+                OpError::Status(_) => messages::status(Level::Error, &why, id),
+                OpError::Call { service, .. } => messages::failure(service, id, &why),
+            };
+            let line = check_line(&line);
+            assert_eq!(line.get("id").is_some(), id.is_some(), "{frame:?}");
+        }
+    }
+}
+
+fn check(op: &Op, json: &Json, id: Option<&RawValue>) {
+    match op {
+        Op::Publish { topic, msg } => {
+            check_name(topic);
+            let line = check_line(&messages::publish_raw(topic, msg));
+            check_passed_on(json.get("msg"), line.get("msg"));
+            assert_eq!(line.get("topic").and_then(Json::text), Some(&**topic));
+            // The runtime's own subscribers read it further; whatever it is, they must not fail.
+            if *topic == *Topic::JointTrajectory.name() {
+                check_setpoint(msg);
+            }
+        }
+        Op::CallService(call) => {
+            check_name(&call.service);
+            assert!(call.timeout.is_none_or(|timeout| timeout <= MAX_TIMEOUT));
+            let line = check_line(&messages::call(&call.service, "1", call.args.raw()));
+            let none = matches!(json.get("args"), None | Some(Json::Null));
+            if !none {
+                check_passed_on(json.get("args"), line.get("args"));
+            }
+        }
+        Op::ServiceResponse {
+            service,
+            values,
+            result,
+            status,
+        } => {
+            check_name(service);
+            let status = status.as_deref().unwrap_or_default();
+            let line = check_line(&messages::response_raw(
+                service, id, values, *result, status,
+            ));
+            check_passed_on(json.get("values"), line.get("values"));
+            check_passed_on(json.get("id"), line.get("id"));
+        }
+        Op::Subscribe(one) => {
+            check_name(&one.topic);
+            assert!(one.throttle <= MAX_THROTTLE);
+            assert!((1..=MAX_QUEUE_LENGTH).contains(&one.queue_length));
+            assert_ne!(one.encoding.fragment_size, Some(0));
+        }
+        Op::Advertise { topic, .. } | Op::Unadvertise { topic } | Op::Unsubscribe { topic } => {
+            check_name(topic)
+        }
+        Op::AdvertiseService { service, .. } | Op::UnadvertiseService { service } => {
+            check_name(service)
+        }
+        Op::SendActionGoal(goal) => check_name(&goal.action),
+        Op::CancelActionGoal { action } => check_name(action),
+        Op::Fragment(_) | Op::SetLevel(_) | Op::Auth { .. } => {}
+    }
+}
+
+fn check_setpoint(msg: &RawValue) {
+    match joint_trajectory(msg, &["joint1", "joint2"]) {
+        Ok(setpoint) => {
+            assert_eq!((setpoint.position.len(), setpoint.velocity.len()), (2, 2));
+            let mut numbers = setpoint.position.iter().chain(&setpoint.velocity);
+            assert!(numbers.all(|number| number.is_finite()));
+        }
+        Err(error) => assert!(error.to_string().len() < LONGEST_COMPLAINT),
+    }
+}
+
+fn check_name(name: &str) {
+    assert!((1..=MAX_NAME).contains(&name.len()));
+}
+
+fn check_line(line: &[u8]) -> Json {
+    let text = std::str::from_utf8(line).expect("UTF-8");
+    let text = text.strip_suffix('\n').expect("a newline at its end");
+    assert!(!text.contains('\n'), "{text:?}");
+    let json = Json::read(text).expect("JSON");
+    assert!(!json.overflows(), "{text:?}");
+    json
+}
+
+/// Equal but for numbers that overflow, which are `null` now.
+fn check_passed_on(before: Option<&Json>, after: Option<&Json>) {
+    match (before, after) {
+        (Some(Json::Number(_)), Some(Json::Null)) => assert!(before.is_some_and(Json::overflows)),
+        (Some(Json::Array(before)), Some(Json::Array(after))) => {
+            assert_eq!(before.len(), after.len());
+            for (before, after) in before.iter().zip(after) {
+                check_passed_on(Some(before), Some(after));
+            }
+        }
+        (Some(Json::Object(before)), Some(Json::Object(after))) => {
+            assert_eq!(before.len(), after.len());
+            for ((key, before), (same_key, after)) in before.iter().zip(after) {
+                assert_eq!(key, same_key);
+                check_passed_on(Some(before), Some(after));
+            }
+        }
+        (before, after) => assert_eq!(before, after),
+    }
+}

@@ -1,0 +1,244 @@
+//! A client on an in-memory pipe: plain, or behind a WebSocket. Reading and writing go on by themselves.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, ReadHalf, WriteHalf, split};
+use tokio::sync::Notify;
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::task::JoinHandle;
+
+use crate::websocket::{self, Event, HANDSHAKE, opcode};
+
+/// Which way a client speaks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Door {
+    /// One object per line.
+    Plain,
+    /// One object per message.
+    Socket,
+}
+
+/// What came from the runtime.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Received {
+    /// A frame, without its newline.
+    Json(String),
+    /// A frame in CBOR.
+    Binary(Vec<u8>),
+}
+
+/// The client's end of a connection.
+pub struct Client {
+    door: Door,
+    out: UnboundedSender<Outgoing>,
+    line: Rc<Line>,
+    tasks: [JoinHandle<()>; 2],
+    frames: websocket::Reader,
+    is_greeted: bool,
+}
+
+enum Outgoing {
+    Bytes(Vec<u8>),
+    End,
+}
+
+#[derive(Default)]
+struct Line {
+    bytes: RefCell<Vec<u8>>,
+    ended: Cell<bool>,
+    paused: Cell<bool>,
+    resumed: Notify,
+}
+
+impl Client {
+    /// A client of this end of a pipe; `piece` bytes are written at a time.
+    #[must_use]
+    pub fn new(door: Door, stream: DuplexStream, piece: usize) -> Self {
+        let (input, output) = split(stream);
+        let line = Rc::new(Line::default());
+        let (out, queue) = unbounded_channel();
+        let reading = actix::spawn(read(input, Rc::clone(&line)));
+        let writing = actix::spawn(write(output, queue, piece.max(1)));
+        let client = Self {
+            door,
+            out,
+            line,
+            tasks: [reading, writing],
+            frames: websocket::Reader::default(),
+            is_greeted: door == Door::Plain,
+        };
+        if door == Door::Socket {
+            client.send_bytes(HANDSHAKE.into());
+        }
+        client
+    }
+
+    /// Which way it speaks.
+    #[must_use]
+    pub fn door(&self) -> Door {
+        self.door
+    }
+
+    /// Sends bytes as they are.
+    pub fn send_bytes(&self, bytes: Vec<u8>) {
+        // Its end may be gone already.
+        let _ = self.out.send(Outgoing::Bytes(bytes));
+    }
+
+    /// Sends a frame; `style` says how: with which line end, or in which pieces.
+    pub fn send(&self, frame: &str, style: u8) {
+        let mut bytes = Vec::with_capacity(frame.len() + 16);
+        match self.door {
+            Door::Plain => {
+                bytes.extend_from_slice(frame.as_bytes());
+                let end = ["\n", "\r\n", "", " \n\n\t"][usize::from(style) % 4];
+                bytes.extend_from_slice(end.as_bytes());
+            }
+            Door::Socket => {
+                let kind = if style & 1 == 0 {
+                    opcode::TEXT
+                } else {
+                    opcode::BINARY
+                };
+                let piece = [0, 1, 7, 100][usize::from(style >> 1) % 4];
+                let mask = [style, style.rotate_left(3), 0x5a, 0];
+                websocket::append_message(&mut bytes, kind, mask, piece, frame.as_bytes());
+            }
+        }
+        self.send_bytes(bytes);
+    }
+
+    /// Says that nothing more will come: by the stream's end, or by a close frame.
+    pub fn finish(&self) {
+        if self.door == Door::Socket {
+            let mut bytes = Vec::new();
+            websocket::append(&mut bytes, 0x80 | opcode::CLOSE, [1, 2, 3, 4], &[3, 232]);
+            self.send_bytes(bytes);
+        }
+        let _ = self.out.send(Outgoing::End);
+    }
+
+    /// Stops and goes on reading.
+    pub fn pause(&self, paused: bool) {
+        self.line.paused.set(paused);
+        self.line.resumed.notify_one();
+    }
+
+    /// Whether it reads nothing now.
+    #[must_use]
+    pub fn is_paused(&self) -> bool {
+        self.line.paused.get()
+    }
+
+    /// Whether the runtime has ended the stream.
+    #[must_use]
+    pub fn has_ended(&self) -> bool {
+        self.line.ended.get()
+    }
+
+    /// Whether the runtime has agreed to speak.
+    #[must_use]
+    pub fn is_greeted(&self) -> bool {
+        self.is_greeted
+    }
+
+    /// Whether all that came was whole, for a stream that has ended.
+    #[must_use]
+    pub fn ended_in_order(&self) -> bool {
+        self.line.bytes.borrow().is_empty()
+            && (self.door == Door::Plain || !self.is_greeted || self.frames.is_between_messages())
+    }
+
+    /// What was left over, to be shown.
+    #[must_use]
+    pub fn rest(&self) -> String {
+        let bytes = String::from_utf8_lossy(&self.line.bytes.borrow()).into_owned();
+        format!("{bytes:?}, {:?}", self.frames)
+    }
+
+    /// What has come since.
+    pub fn take(&mut self) -> Vec<Received> {
+        let mut bytes = self.line.bytes.borrow_mut();
+        if !self.is_greeted {
+            let Some(end) = bytes.windows(4).position(|window| window == b"\r\n\r\n") else {
+                return Vec::new();
+            };
+            assert!(
+                bytes.starts_with(b"HTTP/1.1 101 "),
+                "{}",
+                String::from_utf8_lossy(&bytes)
+            );
+            bytes.drain(..end + 4);
+            self.is_greeted = true;
+        }
+        let mut received = Vec::new();
+        if self.door == Door::Plain {
+            let end = bytes
+                .iter()
+                .rposition(|byte| *byte == b'\n')
+                .map_or(0, |at| at + 1);
+            let lines: Vec<u8> = bytes.drain(..end).collect();
+            let text = String::from_utf8(lines).expect("what the runtime sends is UTF-8");
+            received.extend(text.lines().map(|line| Received::Json(line.to_owned())));
+            return received;
+        }
+        self.frames.push(&bytes);
+        bytes.clear();
+        drop(bytes);
+        while let Some(event) = self.frames.event() {
+            match event {
+                Event::Text(text) => received.push(Received::Json(text)),
+                Event::Binary(bytes) => received.push(Received::Binary(bytes)),
+                Event::Ping(payload) => {
+                    let mut pong = Vec::new();
+                    websocket::append(&mut pong, 0x80 | opcode::PONG, [9; 4], &payload);
+                    self.send_bytes(pong);
+                }
+                Event::Pong | Event::Close => {}
+            }
+        }
+        received
+    }
+}
+
+impl Drop for Client {
+    fn drop(&mut self) {
+        for task in &self.tasks {
+            task.abort();
+        }
+    }
+}
+
+async fn read(mut input: ReadHalf<DuplexStream>, line: Rc<Line>) {
+    let mut chunk = vec![0; 4096];
+    loop {
+        while line.paused.get() {
+            line.resumed.notified().await;
+        }
+        match input.read(&mut chunk).await {
+            Ok(0) | Err(_) => break,
+            Ok(read) => line.bytes.borrow_mut().extend_from_slice(&chunk[..read]),
+        }
+    }
+    line.ended.set(true);
+}
+
+async fn write(
+    mut output: WriteHalf<DuplexStream>,
+    mut queue: UnboundedReceiver<Outgoing>,
+    piece: usize,
+) {
+    while let Some(next) = queue.recv().await {
+        let Outgoing::Bytes(bytes) = next else {
+            let _ = output.shutdown().await;
+            return;
+        };
+        for part in bytes.chunks(piece) {
+            if output.write_all(part).await.is_err() {
+                return;
+            }
+            tokio::task::yield_now().await;
+        }
+    }
+}

@@ -1,0 +1,252 @@
+//! A gateway in virtual time: registry, connections on in-memory pipes, and one node that serves everything as it is told to.
+//!
+//! One runtime serves all executions of a thread; each has a registry and connections of its own, which have ended before
+//! the next begins.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::future::Future;
+use std::net::SocketAddr;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use pendularm::actors::arm_sim::{ArmSim, joint_names};
+use pendularm::actors::connection::Connection;
+use pendularm::actors::connection::gate::Gate;
+use pendularm::actors::gauges::Gauges;
+use pendularm::actors::ik::Ik;
+use pendularm::actors::ik_action::{GoalTracker, IkAction};
+use pendularm::actors::ik_trial::{GoalClient, IkTrial};
+use pendularm::actors::node::{Interest, Reply, ServiceCall, TopicMessage};
+use pendularm::actors::registry::{Attach, Nodes, Publish, Registry};
+use pendularm::actors::rosapi::Rosapi;
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+use pendularm::protocol::catalog::{self, Direction, Service, Topic};
+use pendularm::protocol::fields::Fields;
+use pendularm::protocol::messages;
+use serde_json::json;
+use tokio::io::{DuplexStream, duplex};
+
+/// Where clients connect to: what `Host` has to say.
+pub const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
+
+thread_local! {
+    static SYSTEM: SystemRunner = system();
+}
+
+fn system() -> SystemRunner {
+    System::with_tokio_rt(|| {
+        tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .start_paused(true)
+            .build()
+            .expect("a runtime")
+    })
+}
+
+/// Runs one execution to its end.
+pub fn run<T>(execution: impl Future<Output = T>) -> T {
+    SYSTEM.with(|system| system.block_on(execution))
+}
+
+/// The same in a runtime of its own, which ends all that still goes on in it: an arm ticks for ever.
+pub fn run_apart<T>(execution: impl Future<Output = T>) -> T {
+    system().block_on(execution)
+}
+
+/// What the node does with a call.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Manner {
+    /// Answers at once.
+    Prompt,
+    /// Keeps it until told otherwise.
+    Holding,
+    /// Answers a little later.
+    Late,
+    /// Drops it: the reply says so itself.
+    Forgetful,
+}
+
+/// What script and node share.
+#[derive(Default)]
+struct Desk {
+    manner: Cell<Option<Manner>>,
+    held: RefCell<VecDeque<Reply>>,
+}
+
+/// The runtime's side.
+pub struct Stage {
+    pub registry: Addr<Registry>,
+    pub gauges: Arc<Gauges>,
+    gate: Arc<Gate>,
+    desk: Rc<Desk>,
+}
+
+impl Stage {
+    /// A gateway whose one node answers at once.
+    pub async fn new(gate: Gate) -> Self {
+        Self::raised(gate, |_, _, _| {}).await
+    }
+
+    /// A gateway with the runtime's own nodes. Computations, which have threads of their own, are left to the one node.
+    pub async fn with_arm(gate: Gate) -> Self {
+        Self::raised(gate, start_nodes).await
+    }
+
+    async fn raised(
+        gate: Gate,
+        start: impl FnOnce(&Addr<Registry>, &Arc<Gauges>, &mut Nodes),
+    ) -> Self {
+        let gauges = Arc::new(Gauges::default());
+        let registry = Registry::new(Arc::clone(&gauges)).start();
+        let desk = Rc::new(Desk::default());
+        let node = Node(Rc::clone(&desk)).start();
+        let mut nodes = Nodes::default();
+        let rosapi = catalog::Rosapi::ALL.into_iter().map(Service::Rosapi);
+        for service in Service::ALL.into_iter().chain(rosapi) {
+            nodes.services.insert(service, node.clone().recipient());
+        }
+        for topic in Topic::ALL {
+            if topic.direction() == Direction::Subscribed {
+                nodes.listeners.insert(topic, node.clone().recipient());
+            } else {
+                nodes.publishers.insert(topic, node.clone().recipient());
+            }
+        }
+        start(&registry, &gauges, &mut nodes);
+        registry.send(Attach(nodes)).await.expect("a registry");
+        Self {
+            registry,
+            gauges,
+            gate: Arc::new(gate),
+            desk,
+        }
+    }
+
+    /// A connection; gives the client's end, whose pipe holds `room` bytes each way.
+    #[must_use]
+    pub fn connect(&self, room: usize) -> DuplexStream {
+        let (ours, theirs) = duplex(room);
+        let (gate, local) = (Arc::clone(&self.gate), SocketAddr::from(LOCAL));
+        let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
+        Connection::start_behind(gate, local, theirs, registry, gauges);
+        ours
+    }
+
+    /// How the node treats calls from now on.
+    pub fn behave(&self, manner: Manner) {
+        self.desk.manner.set(Some(manner));
+    }
+
+    /// The node answers the call that it has held for longest.
+    pub fn release(&self) {
+        let reply = self.desk.held.borrow_mut().pop_front();
+        if let Some(mut reply) = reply {
+            reply.succeed(&json!({}));
+        }
+    }
+
+    /// From now on every call is answered, and so are all that were held.
+    pub fn release_all(&self) {
+        self.behave(Manner::Prompt);
+        while !self.desk.held.borrow().is_empty() {
+            self.release();
+        }
+    }
+
+    /// The node says something on a topic of the runtime's.
+    pub fn publish(&self, topic: Topic, number: u64) {
+        let msg = json!({"data": number, "header": {"stamp": {"sec": 1, "nanosec": 2}, "frame_id": "world"}});
+        let frame = messages::publish(topic.name(), &msg);
+        self.registry.do_send(Publish {
+            topic,
+            frame,
+            msg: None,
+        });
+    }
+}
+
+/// What `actors/runtime.rs` starts, all of it on one thread.
+fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Nodes) {
+    let arm = ArmSim::<2>::new(
+        Arm::default(),
+        Gains::default(),
+        registry.clone().recipient(),
+        registry.clone().recipient(),
+        Arc::clone(gauges),
+    )
+    .start();
+    ArmSim::attach(&arm, nodes);
+    let introspection = Rosapi::new(
+        registry.clone().recipient(),
+        arm.clone().recipient(),
+        arm.clone().recipient(),
+        &joint_names::<2>(),
+    );
+    Rosapi::attach(&introspection.start(), nodes);
+    let ik = Ik::<2>::new(arm.clone().recipient()).start();
+    Ik::attach(&ik, nodes);
+    let tracker = GoalTracker {
+        track: arm.clone().recipient(),
+        end: arm.clone().recipient(),
+    };
+    let action = IkAction::<2>::new(ik.recipient(), tracker, registry.clone().recipient()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        settle: action.recipient(),
+    };
+    let rng = fastrand::Rng::with_seed(1);
+    let trial =
+        IkTrial::<2>::new(arm.recipient(), goals, registry.clone().recipient(), rng).start();
+    IkTrial::attach(&trial, nodes);
+}
+
+/// The node.
+struct Node(Rc<Desk>);
+
+impl Actor for Node {
+    type Context = Context<Self>;
+}
+
+impl Handler<ServiceCall> for Node {
+    type Result = ();
+
+    fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
+        let ServiceCall {
+            service,
+            arguments,
+            mut reply,
+        } = call;
+        match self.0.manner.get().unwrap_or(Manner::Prompt) {
+            Manner::Prompt => {
+                let status = Fields::read(&arguments, service)
+                    .map_or_else(|why| why.to_string(), |_| String::new());
+                reply.conclude(&json!({}), &status);
+            }
+            Manner::Holding => self.0.held.borrow_mut().push_back(reply),
+            Manner::Late => {
+                ctx.run_later(Duration::from_millis(700), move |_, _| {
+                    reply.succeed(&json!({}))
+                });
+            }
+            Manner::Forgetful => drop(reply),
+        }
+    }
+}
+
+impl Handler<TopicMessage> for Node {
+    type Result = ();
+
+    fn handle(&mut self, _: TopicMessage, _: &mut Context<Self>) {}
+}
+
+impl Handler<Interest> for Node {
+    type Result = ();
+
+    fn handle(&mut self, _: Interest, _: &mut Context<Self>) {}
+}
