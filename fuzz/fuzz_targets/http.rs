@@ -11,6 +11,7 @@
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
+use pendularm::actors::budget::Totals;
 use pendularm::actors::connection::gate::Gate;
 use pendularm::protocol::token::Token;
 use pendularm::web::Door;
@@ -95,7 +96,7 @@ fn gate(settings: u8) -> Gate {
 
 /// Sends all of it, then the end; gives what comes up to the end.
 async fn converse(gate: Gate, bytes: &[u8], piece: usize) -> Vec<u8> {
-    let stage = Stage::new(gate).await;
+    let stage = Stage::new(gate, Totals::default()).await;
     let (mut input, mut output) = split(stage.connect(256));
     let mut answer = Vec::new();
     let talk = async {
@@ -119,10 +120,14 @@ async fn converse(gate: Gate, bytes: &[u8], piece: usize) -> Vec<u8> {
     assert!(timeout(LONG, talk).await.is_ok(), "it does not end");
     assert!(answer.len() < LONGEST);
     let mut waited = 0;
-    while stage.gauges.connections() > 0 {
+    while !stage.is_empty() {
         tokio::time::sleep(Duration::from_millis(100)).await;
         waited += 1;
-        assert!(waited < 600, "the connection outlives its client");
+        assert!(
+            waited < 600,
+            "something outlives the client: {:?}",
+            stage.gauges
+        );
     }
     answer
 }

@@ -48,6 +48,10 @@ enum Step {
     Pass {
         milliseconds: u16,
     },
+    /// From the next message on only so much may wait, where that is less than ever.
+    Limit {
+        bytes: u32,
+    },
 }
 
 fuzz_target!(|steps: Vec<Step>| {
@@ -107,6 +111,11 @@ fuzz_target!(|steps: Vec<Step>| {
                 model.write(bytes);
             }
             Step::Pass { milliseconds } => now += Duration::from_millis(milliseconds.into()),
+            Step::Limit { bytes } => {
+                let bytes = usize::try_from(bytes).unwrap_or(usize::MAX) % (MAX_TOPIC_BYTES + 10);
+                outbox.limit_topics(bytes);
+                model.scarce = Some(bytes);
+            }
         }
         compare(&mut outbox, &model);
     }
@@ -150,9 +159,14 @@ struct Model {
     /// What is being written: what is left of it, and whether it is a response.
     in_flight: Vec<(usize, bool)>,
     dropped: u64,
+    scarce: Option<usize>,
 }
 
 impl Model {
+    fn most(&self) -> usize {
+        self.scarce.unwrap_or(MAX_TOPIC_BYTES).min(MAX_TOPIC_BYTES)
+    }
+
     fn topic_bytes(&self) -> usize {
         let waiting = self.queue.iter().chain(&self.held);
         waiting
@@ -187,7 +201,7 @@ impl Model {
 
     fn push(&mut self, topic: usize, length: usize, now: Instant) {
         self.release(now);
-        if length > MAX_TOPIC_BYTES {
+        if length > self.most() {
             self.dropped += 1;
             return;
         }
@@ -216,7 +230,7 @@ impl Model {
                 self.enqueue(Some(topic), length);
             }
         }
-        while self.topic_bytes() > MAX_TOPIC_BYTES {
+        while self.topic_bytes() > self.most() {
             let messages = self
                 .queue
                 .iter()

@@ -2,7 +2,7 @@
 //!
 //! What holds is said in [`pendularm_fuzz::session`], and that every position and velocity that the arm publishes is a number.
 //!
-//! Input: the script; half of them speak through a WebSocket.
+//! Input: whether room is scarce, whether they speak through a WebSocket, the script.
 
 #![no_main]
 
@@ -10,7 +10,8 @@ use libfuzzer_sys::fuzz_target;
 use pendularm_fuzz::client::Door;
 use pendularm_fuzz::session::{Step, play_with_arm};
 
-fuzz_target!(|script: (bool, Vec<Step<'_>>)| {
-    let (is_socket, steps) = script;
-    play_with_arm(if is_socket { Door::Socket } else { Door::Plain }, &steps);
+fuzz_target!(|script: (bool, bool, Vec<Step<'_>>)| {
+    let (is_scarce, is_socket, steps) = script;
+    let door = if is_socket { Door::Socket } else { Door::Plain };
+    play_with_arm(door, is_scarce, &steps);
 });

@@ -2,7 +2,7 @@
 //!
 //! What holds is said in [`pendularm_fuzz::session`].
 //!
-//! Input: the script.
+//! Input: whether room is scarce, the script.
 
 #![no_main]
 
@@ -10,4 +10,7 @@ use libfuzzer_sys::fuzz_target;
 use pendularm_fuzz::client::Door;
 use pendularm_fuzz::session::{Step, play};
 
-fuzz_target!(|steps: Vec<Step<'_>>| play(Door::Socket, &steps));
+fuzz_target!(|script: (bool, Vec<Step<'_>>)| {
+    let (is_scarce, steps) = script;
+    play(Door::Socket, is_scarce, &steps);
+});

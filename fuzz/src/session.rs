@@ -4,12 +4,16 @@
 //! - A call gets exactly one response with its `id`, as long as its client stays, reads, and breaks no rule; never two.
 //! - Of one client's messages on a topic another hears each at most once, in the order in which they were sent.
 //! - A connection ends when its client has ended, and nothing else ends it but the rules that say so.
+//! - When all have left, nothing is counted as held for anybody.
+//!
+//! All of it holds too where all clients together have little room.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::time::Duration;
 
 use arbitrary::Arbitrary;
+use pendularm::actors::budget::Totals;
 use pendularm::actors::connection::gate::Gate;
 use pendularm::actors::connection::{ANSWERS_OWED, LINGER, STALL_LIMIT};
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
@@ -19,7 +23,7 @@ use tokio::time::sleep;
 use crate::cbor;
 use crate::client::{Client, Door, Received};
 use crate::json::Json;
-use crate::stage::{Manner, Stage, run, run_apart};
+use crate::stage::{Manner, Stage, run, run_apart, scarce};
 
 /// What happens in one execution, and to how many clients.
 const MAX_STEPS: usize = 48;
@@ -160,9 +164,9 @@ const VALUES: [&str; 12] = [
 ];
 
 /// Plays a script with clients of one kind, and one node that serves everything.
-pub fn play(door: Door, steps: &[Step<'_>]) {
+pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run(async {
-        let stage = Stage::new(Gate::default()).await;
+        let stage = Stage::new(Gate::default(), totals(is_scarce)).await;
         Session::new(door, Cast::Stub, stage)
             .perform_all(steps)
             .await;
@@ -170,13 +174,21 @@ pub fn play(door: Door, steps: &[Step<'_>]) {
 }
 
 /// Plays a script with the runtime's own nodes. In less time: an arm of tiny timesteps computes for as long as it may.
-pub fn play_with_arm(door: Door, steps: &[Step<'_>]) {
+pub fn play_with_arm(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run_apart(async {
-        let stage = Stage::with_arm(Gate::default()).await;
+        let stage = Stage::with_arm(Gate::default(), totals(is_scarce)).await;
         Session::new(door, Cast::Arm, stage)
             .perform_all(steps)
             .await;
     });
+}
+
+fn totals(is_scarce: bool) -> Totals {
+    if is_scarce {
+        scarce()
+    } else {
+        Totals::default()
+    }
 }
 
 /// Who serves.
@@ -532,7 +544,11 @@ impl Session {
                     TAKE_TIME
                 };
                 let stalled = player.idle >= patience;
-                assert!(player.is_excused || stalled, "ended for no reason");
+                assert!(
+                    player.is_excused || stalled,
+                    "ended for no reason: {}",
+                    player.client.rest()
+                );
                 assert!(
                     stalled || player.client.ended_in_order(),
                     "ended within a frame: {}",
@@ -577,12 +593,13 @@ impl Session {
             player.is_excused = true;
         }
         self.hear();
-        assert!(self.has_emptied(), "a connection outlives its client");
+        let left = (self.stage.gauges.connections(), self.stage.gauges.totals());
+        assert!(self.has_emptied(), "left when all have left: {left:?}");
     }
 
     fn has_emptied(&self) -> bool {
         let mut players = self.players.iter();
-        self.stage.gauges.connections() == 0 && players.all(|player| player.client.has_ended())
+        self.stage.is_empty() && players.all(|player| player.client.has_ended())
     }
 
     fn all_answered(&self) -> bool {

@@ -13,6 +13,7 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::arm_sim::{ArmSim, joint_names};
+use pendularm::actors::budget::{Budget, Totals};
 use pendularm::actors::connection::Connection;
 use pendularm::actors::connection::gate::Gate;
 use pendularm::actors::gauges::Gauges;
@@ -77,6 +78,17 @@ struct Desk {
     held: RefCell<VecDeque<Reply>>,
 }
 
+/// Little room for all clients together: what a few of them can fill in one execution.
+#[must_use]
+pub fn scarce() -> Totals {
+    Totals {
+        responses: Budget::of(1 << 20),
+        messages: Budget::of(1 << 17),
+        input: Budget::of(1 << 23),
+        names: Budget::of(1 << 12),
+    }
+}
+
 /// The runtime's side.
 pub struct Stage {
     pub registry: Addr<Registry>,
@@ -87,20 +99,21 @@ pub struct Stage {
 
 impl Stage {
     /// A gateway whose one node answers at once.
-    pub async fn new(gate: Gate) -> Self {
-        Self::raised(gate, |_, _, _| {}).await
+    pub async fn new(gate: Gate, totals: Totals) -> Self {
+        Self::raised(gate, totals, |_, _, _| {}).await
     }
 
     /// A gateway with the runtime's own nodes. Computations, which have threads of their own, are left to the one node.
-    pub async fn with_arm(gate: Gate) -> Self {
-        Self::raised(gate, start_nodes).await
+    pub async fn with_arm(gate: Gate, totals: Totals) -> Self {
+        Self::raised(gate, totals, start_nodes).await
     }
 
     async fn raised(
         gate: Gate,
+        totals: Totals,
         start: impl FnOnce(&Addr<Registry>, &Arc<Gauges>, &mut Nodes),
     ) -> Self {
-        let gauges = Arc::new(Gauges::default());
+        let gauges = Arc::new(Gauges::with(totals));
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let desk = Rc::new(Desk::default());
         let node = Node(Rc::clone(&desk)).start();
@@ -134,6 +147,19 @@ impl Stage {
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
         Connection::start_behind(gate, local, theirs, registry, gauges);
         ours
+    }
+
+    /// Whether nobody is connected, and nothing is held for anybody.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let totals = self.gauges.totals();
+        let all = [
+            &totals.responses,
+            &totals.messages,
+            &totals.input,
+            &totals.names,
+        ];
+        self.gauges.connections() == 0 && all.into_iter().all(|total| total.used() == 0)
     }
 
     /// How the node treats calls from now on.

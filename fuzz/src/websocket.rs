@@ -71,7 +71,7 @@ pub struct Reader {
     bytes: Vec<u8>,
     /// The kind of the message that has begun, and what of it came.
     unfinished: Option<(u8, Vec<u8>)>,
-    closed: bool,
+    closed: Option<String>,
 }
 
 /// What came.
@@ -96,17 +96,17 @@ impl Reader {
         self.bytes.is_empty() && self.unfinished.is_none()
     }
 
-    /// Whether a close frame came.
+    /// Why the server has closed, if it has.
     #[must_use]
-    pub fn is_closed(&self) -> bool {
-        self.closed
+    pub fn closed(&self) -> Option<&str> {
+        self.closed.as_deref()
     }
 
     /// The next whole message or control frame.
     pub fn event(&mut self) -> Option<Event> {
         loop {
             let (first, payload) = self.frame()?;
-            assert!(!self.closed, "a frame after the close frame");
+            assert!(self.closed.is_none(), "a frame after the close frame");
             assert_eq!(first & 0x70, 0, "no extension was agreed on");
             let is_last = first & 0x80 != 0;
             let opcode = first & 0x0f;
@@ -144,7 +144,7 @@ impl Reader {
                 assert_ne!(payload.len(), 1, "a code has two bytes");
                 let reason = payload.get(2..).unwrap_or_default();
                 assert!(std::str::from_utf8(reason).is_ok(), "a reason is UTF-8");
-                self.closed = true;
+                self.closed = Some(String::from_utf8_lossy(reason).into_owned());
                 Event::Close
             }
             other => panic!("opcode {other}"),
