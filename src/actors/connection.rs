@@ -8,6 +8,7 @@
 //!
 //! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
 
+mod due;
 pub mod gate;
 mod reader;
 mod reception;
@@ -28,6 +29,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::net::tcp::OwnedWriteHalf;
 use tokio::sync::Notify;
 use tokio::time::{Instant, timeout};
 
@@ -107,6 +109,16 @@ struct Shared {
     unbatched: Cell<bool>,
     /// Whether frames may be binary: over raw TCP they are text.
     binary: Cell<bool>,
+    /// The sending half of a plain TCP stream, for those who write without waiting.
+    stream: RefCell<Option<Rc<RefCell<OwnedWriteHalf>>>>,
+    /// The writing task is in the middle of a write, or has to go on with what was [`begun`](Self::begun).
+    writing: Cell<bool>,
+    /// What is left of a frame of which the socket has taken the beginning.
+    begun: Cell<Option<Bytes>>,
+    /// Whether the connection is on the list of those to be written to.
+    due: Cell<bool>,
+    /// When the connection was made.
+    since: Instant,
     /// Bytes of responses in the outbox, for the registry to look at.
     backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
@@ -145,6 +157,11 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             refusing: Cell::new(false),
             unbatched: Cell::new(false),
             binary: Cell::new(false),
+            stream: RefCell::default(),
+            writing: Cell::new(false),
+            begun: Cell::default(),
+            due: Cell::new(false),
+            since: Instant::now(),
             backlog: Arc::default(),
             gauges,
         });
@@ -161,13 +178,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// A topic message for this client. From the registry; may be dropped, oldest first, when the client is slow.
+/// A topic message for this client, or several, one behind the other. From the registry; may be dropped, oldest first, when the client is slow.
 #[derive(Message, Clone)]
 #[rtype(result = "()")]
 pub struct Deliver {
     /// The topic, for throttling.
     pub topic: Arc<str>,
-    /// The whole frame, shared by all subscribers.
+    /// The whole frame, or a [series](crate::protocol::series) of them, shared by all subscribers.
     pub frame: Bytes,
 }
 
@@ -239,12 +256,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connectio
     type Result = ();
 
     fn handle(&mut self, message: Deliver, _: &mut Context<Self>) {
-        let mut outbox = self.shared.outbox.borrow_mut();
-        let before = outbox.dropped();
-        outbox.limit_topics(self.shared.topic_room(message.frame.len()));
-        outbox.push(&message.topic, message.frame, Instant::now().into_std());
-        self.shared.gauges.add_dropped(outbox.dropped() - before);
-        self.shared.outgoing.notify_one();
+        self.shared.deliver(&message.topic, message.frame);
     }
 }
 

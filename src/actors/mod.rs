@@ -14,6 +14,7 @@
 //! | [`registry::Connect`] / [`registry::Disconnect`] | connection | registry | a client is there, is gone |
 //! | [`registry::Retire`] | connection | registry | the client has stopped sending: its registrations go, its answers still come |
 //! | [`registry::Request`] | connection | registry | one rosbridge op of that client |
+//! | [`registry::Relay`] | connection | registry | messages of that client that need no reading |
 //! | [`node::ServiceCall`] | registry | the node that serves it | answered exactly once, through its [`node::Reply`] |
 //! | [`node::TopicMessage`] | registry | the node that subscribes | a message on a topic the runtime listens to |
 //! | [`follower::ActionRequest`] | registry | `ik_action` | a goal of the action, or its end; the client follows by its [`follower::Follower`] |

@@ -3,11 +3,16 @@
 //! A frame is one JSON object. It ends where its braces and brackets balance outside strings, or at a newline. Anything else
 //! runs to the newline and is one malformed frame.
 //!
-//! **Invariant:** every byte is looked at once, and no more is kept than one unfinished frame and what was last pushed.
+//! Messages that need no reading (see [`series`](super::series)) are taken as they are.
+//!
+//! **Invariant:** no byte is looked at more than twice, and no more is kept than one unfinished frame and what was last pushed.
+
+use bytes::Bytes;
 
 use super::json;
 use super::nesting::{Event, Nesting};
 pub use super::opening::{Foreign, Opening, is_host_line, opening};
+use super::series::{self, Series};
 use super::text;
 
 /// Longest frame, in bytes without the newline: a 3-link trajectory has under 1 KiB, an expression of 1 MB has to pass.
@@ -129,6 +134,25 @@ impl FrameReader {
         self.buffer.extend_from_slice(bytes);
     }
 
+    /// The series of messages that the stream goes on with, if it does; to be asked for before the next frame is.
+    pub fn series(&mut self) -> Option<Series> {
+        if self.state != State::Between {
+            return None;
+        }
+        let rest = self.rest();
+        let space = rest.iter().position(|byte| !is_space(*byte))?;
+        let rest = rest.get(space..)?;
+        let (topic, length) = series::leading(rest)?;
+        let series = Series {
+            topic: topic.into(),
+            // A copy of its own: whoever keeps it keeps nothing else of the stream.
+            frames: Bytes::copy_from_slice(rest.get(..length)?),
+        };
+        self.at += space + length;
+        self.start = self.at;
+        Some(series)
+    }
+
     /// How much memory the reader holds, in bytes.
     #[must_use]
     pub const fn buffered(&self) -> usize {
@@ -201,9 +225,7 @@ impl FrameReader {
     /// Skips white space up to the first byte of something.
     fn skip_space(&mut self) {
         let rest = self.rest();
-        let space = rest
-            .iter()
-            .position(|byte| !matches!(byte, b' ' | b'\t' | b'\r' | b'\n'));
+        let space = rest.iter().position(|byte| !is_space(*byte));
         let first = space.and_then(|space| rest.get(space)).copied();
         self.at += space.unwrap_or(rest.len());
         self.start = self.at;
@@ -334,4 +356,8 @@ impl Iterator for FrameReader {
             }
         }
     }
+}
+
+const fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b'\r' | b'\n')
 }

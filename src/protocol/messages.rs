@@ -9,7 +9,7 @@ use bytes::Bytes;
 use serde::Serialize;
 use serde_json::value::RawValue;
 
-use super::json;
+use super::{json, series};
 
 /// Room for a frame before it grows: the state of a 3-link arm and any status of ours fit.
 const USUAL_FRAME: usize = 512;
@@ -217,17 +217,21 @@ pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
         .end()
 }
 
-/// A frame that [`publish`] has made for `topic`, for those who know it by another spelling.
+/// A frame that [`publish`] has made for `topic`, or a [series](super::series) of them, for those who know it by another spelling.
 #[must_use]
-pub fn respelled(topic: &str, spelling: &str, frame: &Bytes) -> Bytes {
+pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
     if topic == spelling {
-        return frame.clone();
+        return frames.clone();
     }
-    let msg = message_text(topic, frame);
-    let mut line = Line::with_room("publish", frame.len()).text("topic", spelling);
-    line.key("msg");
-    line.text.extend_from_slice(msg);
-    line.end()
+    let mut text = Vec::with_capacity(frames.len());
+    for frame in series::messages(frames.clone()) {
+        let mut line = Line::after(text, "publish").text("topic", spelling);
+        line.key("msg");
+        line.text.extend_from_slice(message_text(topic, &frame));
+        line.text.extend_from_slice(b"}\n");
+        text = line.text;
+    }
+    Bytes::from(text)
 }
 
 /// The message within a frame that [`publish`] has made for `topic`, as JSON.
@@ -345,7 +349,11 @@ impl Line {
     }
 
     fn with_room(op: &str, bytes: usize) -> Self {
-        let mut text = Vec::with_capacity(bytes);
+        Self::after(Vec::with_capacity(bytes), op)
+    }
+
+    /// A frame behind what is there.
+    fn after(mut text: Vec<u8>, op: &str) -> Self {
         text.extend_from_slice(b"{\"op\":\"");
         text.extend_from_slice(op.as_bytes());
         text.push(b'"');

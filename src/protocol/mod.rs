@@ -19,6 +19,7 @@ pub mod outbox;
 pub mod parameters;
 pub mod rosapi;
 pub mod scene_messages;
+pub mod series;
 pub mod streamed;
 pub(crate) mod text;
 mod throttle;

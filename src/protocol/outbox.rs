@@ -3,9 +3,11 @@
 //! Topic messages may be lost, oldest first; responses may not. Both leave in the order in which they were produced. A message
 //! that `throttle_rate` holds back takes its place in that order when its time comes.
 //!
+//! What is pushed may be a [series](super::series): it is queued as one piece, and dropped and held back message by message.
+//!
 //! Told the time; knows no socket and no clock.
 //!
-//! **Invariant:** dropping removes, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages wait, held back ones included.
+//! **Invariant:** dropping removes whole messages, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages wait, held back ones included.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -13,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
+use super::series::{first_message, messages};
 use super::throttle::Throttles;
 
 /// Most bytes of topic messages that wait for one connection: the longest message that a client may send (and the newline
@@ -58,18 +61,27 @@ impl Outbox {
         self.scarce.unwrap_or(MAX_TOPIC_BYTES)
     }
 
-    /// Adds a message on a topic: queued, or held back if the topic is throttled. If it does not fit, the oldest go.
+    /// Adds a message on a topic, or a series: queued, or held back if the topic is throttled. If it does not fit, the oldest go.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         self.release(now);
-        if frame.len() > self.most_topic_bytes() {
+        // Of a series that is too long its newest messages may still fit.
+        if frame.len() > self.most_topic_bytes() && first_message(&frame) == frame.len() {
             self.dropped += 1;
             return;
         }
-        let number = self.number();
-        if let Some(frame) = self.throttles.offer(topic, number, frame, now) {
+        if self.throttles.concerns(topic) {
+            self.offer(topic, frame, now);
+        } else {
+            let number = self.number();
             self.enqueue(number, frame);
         }
         self.make_room();
+    }
+
+    /// Whether [`push`](Self::push) and [`take_batch`](Self::take_batch) look at the time they are told.
+    #[must_use]
+    pub fn is_throttled(&self) -> bool {
+        !self.throttles.is_empty()
     }
 
     /// Adds a response or a status. What throttling holds back of the topics in `supersedes` is discarded: it is from before.
@@ -97,7 +109,7 @@ impl Outbox {
     }
 
     /// Moves the next frames into `batch`, at least one if any waits, as many as `max_frames` and `max_bytes` allow. They count as being
-    /// written until [`written`](Self::written) says otherwise.
+    /// written until [`written`](Self::written) says otherwise. A series counts as one, unless one frame is all that is asked for.
     pub fn take_batch(
         &mut self,
         now: Instant,
@@ -119,14 +131,23 @@ impl Outbox {
             } else {
                 &mut self.topics
             };
-            let length = queue.front().map_or(0, |(_, frame)| frame.len());
+            let Some((_, next)) = queue.front_mut() else {
+                break;
+            };
+            let single = max_frames <= 1 && !is_response;
+            let length = if single {
+                first_message(next)
+            } else {
+                next.len()
+            };
             bytes += length;
             if taken > 0 && bytes > max_bytes {
                 break;
             }
-            let Some((_, frame)) = queue.pop_front() else {
-                break;
-            };
+            let frame = next.split_to(length);
+            if next.is_empty() {
+                queue.pop_front();
+            }
             if !is_response {
                 self.topic_bytes -= length;
             }
@@ -134,6 +155,47 @@ impl Outbox {
             batch.push(frame);
         }
         self.shrink();
+    }
+
+    /// Whether nothing waits, nothing is being written and nothing is throttled: the next message may go straight to the client.
+    #[must_use]
+    pub fn is_idle(&self) -> bool {
+        self.is_empty() && self.in_flight.is_empty() && self.throttles.is_empty()
+    }
+
+    /// What may be written at once, in order: topic messages, where nothing else waits or is being written.
+    #[must_use]
+    pub fn ready(&self) -> Option<impl Iterator<Item = &Bytes>> {
+        let is_plain = self.responses.is_empty() && self.in_flight.is_empty();
+        (is_plain && self.throttles.is_empty()).then(|| self.topics.iter().map(|(_, frame)| frame))
+    }
+
+    /// `bytes` of what was [`ready`](Self::ready) have been written. Gives what is left of a frame that was begun: it comes next.
+    pub fn taken(&mut self, mut bytes: usize) -> Option<Bytes> {
+        while let Some((_, frame)) = self.topics.front_mut() {
+            if bytes == 0 {
+                break;
+            }
+            let length = frame.len();
+            if length > bytes {
+                // A series may end behind any of its messages.
+                let mut begun = 0;
+                while begun < bytes {
+                    begun += first_message(frame.get(begun..).unwrap_or_default()).max(1);
+                }
+                let rest = frame.split_to(begun.min(length)).split_off(bytes);
+                self.topic_bytes -= begun.min(length);
+                if frame.is_empty() {
+                    self.topics.pop_front();
+                }
+                return Some(rest).filter(|rest| !rest.is_empty());
+            }
+            bytes -= length;
+            self.topic_bytes -= length;
+            self.topics.pop_front();
+        }
+        self.shrink();
+        None
     }
 
     /// The next `bytes` of what was taken have been written.
@@ -186,6 +248,16 @@ impl Outbox {
         self.produced
     }
 
+    /// Gives the throttle each message by itself.
+    fn offer(&mut self, topic: &Arc<str>, frames: Bytes, now: Instant) {
+        for frame in messages(frames) {
+            let number = self.number();
+            if let Some(frame) = self.throttles.offer(topic, number, frame, now) {
+                self.enqueue(number, frame);
+            }
+        }
+    }
+
     fn enqueue(&mut self, number: u64, frame: Bytes) {
         self.topic_bytes += frame.len();
         self.topics.push_back((number, frame));
@@ -206,8 +278,12 @@ impl Outbox {
             let held = self.throttles.oldest();
             if held.is_some_and(|held| queued.is_none_or(|queued| held < queued)) {
                 self.throttles.drop_oldest();
-            } else if let Some((_, frame)) = self.topics.pop_front() {
-                self.topic_bytes -= frame.len();
+            } else if let Some((_, frames)) = self.topics.front_mut() {
+                let oldest = frames.split_to(first_message(frames));
+                if frames.is_empty() {
+                    self.topics.pop_front();
+                }
+                self.topic_bytes -= oldest.len();
             } else {
                 debug_assert!(false, "bytes are counted that no message has");
                 return;

@@ -61,6 +61,16 @@ impl Throttle {
 }
 
 impl Throttles {
+    /// Whether messages of that topic may be held back.
+    pub(super) fn concerns(&self, topic: &str) -> bool {
+        !self.topics.is_empty() && self.topics.contains_key(topic)
+    }
+
+    /// Whether there is no throttle at all, and so nothing held back.
+    pub(super) fn is_empty(&self) -> bool {
+        self.topics.is_empty()
+    }
+
     /// Bytes held back.
     pub(super) const fn bytes(&self) -> usize {
         self.bytes

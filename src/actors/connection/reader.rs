@@ -1,7 +1,7 @@
 //! The reading task of a connection: frames as they come, one op at a time.
 //!
 //! **Invariant:** the next frame is looked at only when the last op has taken effect (pure computations excepted), so
-//! all that a client asks of the runtime happens in the order in which it asked.
+//! all that a client asks of the runtime happens in the order in which it asked. A series of messages counts as one op.
 
 use std::rc::Rc;
 use std::time::Duration;
@@ -14,16 +14,17 @@ use tokio::time::{Instant, timeout, timeout_at};
 use super::gate::{HEAD_TIME, MAX_LOCKED};
 use super::transport::{CHUNK, Inbound};
 use super::unfinished::Unfinished;
-use super::{ANSWERS_OWED, Finish, LOOK_AGAIN, Shared};
+use super::{ANSWERS_OWED, Finish, LOOK_AGAIN, Shared, due};
 use crate::actors::ConnectionId;
 use crate::actors::awake::stay_awake;
 use crate::actors::budget::{Claim, Share};
-use crate::actors::registry::{Disconnect, Handled, Registry, Request, Respond, Retire};
+use crate::actors::registry::{Disconnect, Handled, Registry, Relay, Request, Respond, Retire};
 use crate::protocol::catalog::Service;
 use crate::protocol::fragments::{Fragments, MAX_AGE};
 use crate::protocol::frame::{Foreign, Frame, FrameError, FrameReader, is_host_line};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
+use crate::protocol::series::Series;
 use crate::protocol::token::Token;
 
 /// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
@@ -55,6 +56,14 @@ pub(super) struct Reader {
     locked: Option<Token>,
     /// An object has come: this is no HTTP request, whose body could be one, but not its head.
     speaks_json: bool,
+}
+
+/// What a stream goes on with.
+enum Next {
+    /// Messages on a topic of clients that can go out as they are: one op, as it were.
+    Series(Series),
+    /// Anything else.
+    Frame(Result<Frame, FrameError>),
 }
 
 /// Why a client that has to show a token is not let in.
@@ -124,9 +133,12 @@ impl Reader {
                 // A long message is no reason to keep as much for the next.
                 chunk = BytesMut::new();
             }
-            while let Some(frame) = self.next_frame().await {
+            while let Some(next) = self.next().await {
                 self.unfinished.begin_anew();
-                self.take(frame).await;
+                match next {
+                    Next::Series(series) => self.relay(series).await,
+                    Next::Frame(frame) => self.take(frame).await,
+                }
                 if self.shared.refusing.get() {
                     return Ok(());
                 }
@@ -235,12 +247,25 @@ impl Reader {
         }
     }
 
-    /// The next complete frame, once the client may be read.
-    async fn next_frame(&mut self) -> Option<Result<Frame, FrameError>> {
+    /// What comes next and is complete, once the client may be read.
+    async fn next(&mut self) -> Option<Next> {
         while !self.shared.may_read() && !self.shared.finishing.get() {
             self.shared.room.notified().await;
         }
-        self.frames.next()
+        if self.locked.is_none()
+            && let Some(series) = self.frames.series()
+        {
+            return Some(Next::Series(series));
+        }
+        self.frames.next().map(Next::Frame)
+    }
+
+    /// Passes messages on as they are.
+    async fn relay(&self, series: Series) {
+        self.shared.unbatched.set(false);
+        let from = self.id;
+        let _ = self.registry.send(Relay { from, series }).await;
+        due::done().await;
     }
 
     /// Performs one frame, to its end.
@@ -359,12 +384,16 @@ impl Reader {
             self.shared.enqueue_computation(request, room, registry);
             return;
         }
+        let publishes = matches!(request.op, Op::Publish { .. });
         if let Ok(handled) = self.registry.send(request).await
             && let Some(effect) = handled.0
         {
             stay_awake();
             // The sender is dropped, never used: its end is the news.
             let _ = effect.await;
+        }
+        if publishes {
+            due::done().await;
         }
     }
 }

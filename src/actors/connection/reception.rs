@@ -3,6 +3,7 @@
 //! **Invariant:** nothing of what a client sends is read as JSON before its opening is decided, and what has been read by
 //! then is not lost.
 
+use std::cell::RefCell;
 use std::net::SocketAddr;
 use std::rc::Rc;
 use std::sync::Arc;
@@ -14,7 +15,7 @@ use tokio::time::{Instant, sleep_until, timeout};
 
 use super::gate::{Gate, HEAD_TIME};
 use super::reader::{Reader, discard};
-use super::transport::{CHUNK, Inbound, Outbound, Plain, read_some};
+use super::transport::{CHUNK, Inbound, Outbound, Plain, Sending, read_some, take_tcp};
 use super::unfinished::FRAME_TIME;
 use super::{Finish, LINGER, Shared, writer};
 use crate::actors::ConnectionId;
@@ -62,11 +63,7 @@ impl Reception {
         self.shared.id.set(Some(id));
         let mut first = BytesMut::with_capacity(CHUNK);
         match self.greet(&mut stream, &mut first).await {
-            Greeting::Json => {
-                let (input, output) = tokio::io::split(stream);
-                let reader = self.reader(id, self.gate.token.clone());
-                self.talk(reader, Plain(input), Plain(output), first).await;
-            }
+            Greeting::Json => self.serve_json(stream, id, first).await,
             #[cfg(feature = "web")]
             Greeting::Web => self.serve_web(stream, id, first).await,
             Greeting::Foreign(explanation) => {
@@ -76,6 +73,25 @@ impl Reception {
             Greeting::Finished => {
                 let _ = timeout(LINGER, stream.shutdown()).await;
             }
+        }
+    }
+
+    /// Speaks JSON over the plain stream.
+    async fn serve_json<S>(&self, stream: S, id: ConnectionId, first: BytesMut)
+    where
+        S: AsyncRead + AsyncWrite + Unpin + 'static,
+    {
+        let reader = self.reader(id, self.gate.token.clone());
+        let mut stream = Some(stream);
+        if let Some(tcp) = take_tcp(&mut stream) {
+            let (input, output) = tcp.into_split();
+            let output = Rc::new(RefCell::new(output));
+            self.shared.stream.replace(Some(Rc::clone(&output)));
+            let output = Plain(Sending(output));
+            self.talk(reader, Plain(input), output, first).await;
+        } else if let Some(stream) = stream {
+            let (input, output) = tokio::io::split(stream);
+            self.talk(reader, Plain(input), Plain(output), first).await;
         }
     }
 
@@ -146,6 +162,7 @@ impl Reception {
     {
         let mut reading = actix_rt::spawn(reader.run(input, first));
         let all_written = writer::run(output, &self.shared, &self.registry).await;
+        self.shared.stream.take();
         if all_written && self.shared.refusing.get() {
             let _ = reading.await;
         } else if !(all_written && O::END_IS_ANSWERED)

@@ -3,11 +3,18 @@
 //! **Invariant:** whatever the transport, the reader sees a stream of bytes in which every frame ends as contract section 1
 //! says, and the writer hands over whole frames that end in a newline.
 
+use std::any::Any;
+use std::cell::RefCell;
 use std::future::Future;
 use std::io::{self, IoSlice};
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::{Context, Poll};
 
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::net::TcpStream;
+use tokio::net::tcp::OwnedWriteHalf;
 
 use super::writer::{BATCH_BYTES, BATCH_FRAMES};
 
@@ -56,6 +63,11 @@ impl<W: AsyncWrite + Unpin> Outbound for Plain<W> {
     const END_IS_ANSWERED: bool = false;
 
     async fn write(&mut self, frames: &[Bytes]) -> Option<usize> {
+        if let [frame] = frames {
+            let offered = frame.get(..BATCH_BYTES).unwrap_or(frame);
+            let written = self.0.write(offered).await;
+            return written.ok().filter(|&written| written > 0);
+        }
         let mut slices = [IoSlice::new(&[]); BATCH_FRAMES];
         let mut room = BATCH_BYTES;
         let mut count = 0;
@@ -89,4 +101,43 @@ pub(super) async fn read_some<R: AsyncRead + Unpin>(
 ) -> io::Result<usize> {
     chunk.reserve(CHUNK);
     input.read_buf(chunk).await
+}
+
+/// Takes `stream`, if it is a TCP stream and nothing around it: its halves need no lock between them.
+pub(super) fn take_tcp<S: 'static>(stream: &mut Option<S>) -> Option<TcpStream> {
+    let stream: &mut dyn Any = stream;
+    stream.downcast_mut::<Option<TcpStream>>()?.take()
+}
+
+/// The sending half of a TCP stream, which [`due`](super::due) writes to as well, never in the middle of a frame.
+pub(super) struct Sending(pub(super) Rc<RefCell<OwnedWriteHalf>>);
+
+impl AsyncWrite for Sending {
+    fn poll_write(
+        self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut *self.0.borrow_mut()).poll_write(cx, bytes)
+    }
+
+    fn poll_write_vectored(
+        self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        slices: &[IoSlice<'_>],
+    ) -> Poll<io::Result<usize>> {
+        Pin::new(&mut *self.0.borrow_mut()).poll_write_vectored(cx, slices)
+    }
+
+    fn is_write_vectored(&self) -> bool {
+        true
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut *self.0.borrow_mut()).poll_flush(cx)
+    }
+
+    fn poll_shutdown(self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut *self.0.borrow_mut()).poll_shutdown(cx)
+    }
 }

@@ -1,4 +1,5 @@
-//! The writing task of a connection: drains the outbox, several frames at a time.
+//! The writing task of a connection: drains the outbox, several frames at a time. Topic messages that a socket takes at once
+//! have gone by then (see [`due`](super::due)).
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 
@@ -25,7 +26,7 @@ pub(super) async fn run<O: Outbound>(
     shared: &Shared,
     registry: &Addr<Registry>,
 ) -> bool {
-    let mut batch = Vec::with_capacity(BATCH_FRAMES);
+    let mut batch = Vec::new();
     loop {
         let now = Instant::now().into_std();
         // Clients that end no line take what one read gives them for one frame.
@@ -34,10 +35,13 @@ pub(super) async fn run<O: Outbound>(
         } else {
             BATCH_FRAMES
         };
-        shared
-            .outbox
-            .borrow_mut()
-            .take_batch(now, frames, BATCH_BYTES, &mut batch);
+        if let Some(rest) = shared.begun.take() {
+            batch.push(rest);
+        } else {
+            let mut outbox = shared.outbox.borrow_mut();
+            outbox.take_batch(now, frames, BATCH_BYTES, &mut batch);
+        }
+        shared.writing.set(!batch.is_empty());
         if !batch.is_empty() {
             if !write_batch(&mut output, &mut batch, shared, registry).await {
                 return false;

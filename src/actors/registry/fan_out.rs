@@ -13,34 +13,45 @@ use crate::actors::ConnectionId;
 use crate::actors::connection::Deliver;
 use crate::protocol::catalog::Topic;
 use crate::protocol::op::{Compression, Encoding};
-use crate::protocol::{cbor, fragments, messages, names};
+use crate::protocol::{cbor, fragments, messages, names, series};
 
 impl Registry {
-    /// Delivers a message to everybody who subscribes to `topic`, an absolute name, under whichever spelling; `encode` makes
-    /// the JSON frame for a spelling.
+    /// Delivers a message, or a series of them, to everybody who subscribes to `topic`, an absolute name, under whichever spelling;
+    /// `encode` makes the JSON for a spelling.
     pub(super) fn fan_out(&self, topic: &str, encode: impl Fn(&str) -> Bytes) {
         for spelling in names::spellings(topic) {
             let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
                 continue;
             };
             let plain = self.count(encode(spelling));
-            let mut made: Vec<(Encoding, Option<Bytes>)> = Vec::new();
+            let mut made: Vec<(Encoding, Vec<Bytes>)> = Vec::new();
             for subscriber in subscribers {
                 let encoding = subscriber.encoding;
-                let frame = if encoding == Encoding::default() {
-                    Some(plain.clone())
-                } else if let Some((_, frame)) = made.iter().find(|(one, _)| *one == encoding) {
-                    frame.clone()
-                } else {
-                    let frame = self.encoded(name, &plain, encoding);
-                    made.push((encoding, frame.clone()));
-                    frame
-                };
-                if let Some(frame) = frame {
-                    deliver(subscriber, name, frame);
+                if encoding == Encoding::default() && !subscriber.throttled {
+                    deliver(subscriber, name, plain.clone());
+                    continue;
+                }
+                if !made.iter().any(|(one, _)| *one == encoding) {
+                    let encode = |message: Bytes| self.encoded(name, &message, encoding);
+                    made.push((encoding, self.singly(&plain).filter_map(encode).collect()));
+                }
+                let made = made.iter().find(|(one, _)| *one == encoding);
+                for frame in made.into_iter().flat_map(|(_, frames)| frames) {
+                    deliver(subscriber, name, frame.clone());
                 }
             }
         }
+    }
+
+    /// The messages of a series each by itself: who keeps one keeps none of the others in memory.
+    fn singly(&self, frames: &Bytes) -> impl Iterator<Item = Bytes> {
+        let all = frames.len();
+        series::messages(frames.clone()).map(move |message| {
+            if message.len() == all {
+                return message;
+            }
+            self.count(Bytes::copy_from_slice(&message))
+        })
     }
 
     /// A latched topic's last message, to a subscriber who came after it.

@@ -17,6 +17,7 @@ use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::Level;
 use crate::protocol::op::Op;
 use crate::protocol::rosapi::Census;
+use crate::protocol::series::Series;
 
 /// The runtime's nodes. From the runtime, once, before any client is accepted.
 #[derive(Message)]
@@ -77,6 +78,16 @@ pub struct Request {
     pub id: Option<Box<RawValue>>,
     /// What it asks.
     pub op: Op,
+}
+
+/// Messages of a client on a topic of clients, one behind the other. From its connection, which waits until they are on their way.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Relay {
+    /// The client.
+    pub from: ConnectionId,
+    /// Topic and frames.
+    pub series: Series,
 }
 
 /// The op has been routed; if it went to a node, the receiver ends when it has taken effect there.

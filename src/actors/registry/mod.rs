@@ -25,7 +25,7 @@ use self::census::{Tally, Use};
 use self::messages::TimedOut;
 pub use self::messages::{
     Attach, Connect, Disconnect, FinishAll, Handled, Outlets, Progress, Publish, RefuseCalls,
-    Refused, Request, Respond, Retire, TakeCensus,
+    Refused, Relay, Request, Respond, Retire, TakeCensus,
 };
 use self::refusal::Refusal;
 use self::services::{Forwarded, Services};
@@ -212,6 +212,20 @@ impl Handler<Request> for Registry {
             return Handled(None);
         }
         self.perform(request, ctx)
+    }
+}
+
+impl Handler<Relay> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Relay { from, series }: Relay, _: &mut Context<Self>) {
+        let topic = &*series.topic;
+        let client = self.clients.get(&from);
+        if client.is_some_and(|client| client.advertised.contains_key(topic)) {
+            self.fan_out(topic, |spelling| {
+                frames::respelled(topic, spelling, &series.frames)
+            });
+        }
     }
 }
 

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 use super::census::Use;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Provider, Services};
-use super::topics::{Subscription, Throttle, encoding_of};
+use super::topics::{Subscription, Throttle};
 use super::{
     Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
     Registry, Request, TimedOut,
@@ -226,8 +226,7 @@ impl Registry {
             _share: share,
         });
         let throttle = Throttle::of(subscriptions);
-        let encoding = encoding_of(subscriptions);
-        self.topics.set_encoding(&name, origin.from, encoding);
+        self.topics.configure(&name, origin.from, subscriptions);
         let shared = Arc::clone(&name);
         client.outlets.configure.do_send(Configure {
             topic: name,
@@ -265,8 +264,7 @@ impl Registry {
         if left.is_empty() {
             self.drop_subscriber(&name, origin.from);
         } else {
-            let encoding = encoding_of(&left);
-            self.topics.set_encoding(&name, origin.from, encoding);
+            self.topics.configure(&name, origin.from, &left);
             client.subscriptions.insert(name, left);
         }
     }

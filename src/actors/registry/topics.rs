@@ -54,10 +54,12 @@ pub(super) struct Subscriber {
     pub(super) outlet: Recipient<Deliver>,
     /// What its subscriptions come to.
     pub(super) encoding: Encoding,
+    /// Whether some of its messages are held back or left out.
+    pub(super) throttled: bool,
 }
 
 /// What a connection's subscriptions to one topic come to.
-pub(super) fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
+fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
     let all = subscriptions.iter().map(|one| one.encoding);
     all.reduce(Encoding::merged).unwrap_or_default()
 }
@@ -87,21 +89,24 @@ impl Topics {
                 connection,
                 outlet,
                 encoding: Encoding::default(),
+                throttled: false,
             });
         }
         (name, new)
     }
 
-    /// Sets how a subscriber's messages are written.
-    pub(super) fn set_encoding(
+    /// Sets how a subscriber's messages are written, by what its subscriptions come to.
+    pub(super) fn configure(
         &mut self,
         topic: &Arc<str>,
         connection: ConnectionId,
-        encoding: Encoding,
+        subscriptions: &[Subscription],
     ) {
         let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
         for subscriber in subscribers.filter(|one| one.connection == connection) {
-            subscriber.encoding = encoding;
+            subscriber.encoding = encoding_of(subscriptions);
+            let throttle = Throttle::of(subscriptions);
+            subscriber.throttled = throttle.is_some_and(|throttle| !throttle.interval.is_zero());
         }
     }
 
