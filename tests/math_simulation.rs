@@ -308,6 +308,16 @@ fn a_reset_puts_back_pose_clock_setpoint_integral_and_effort_and_nothing_else() 
 }
 
 #[test]
+fn new_gains_are_those_of_the_next_step() {
+    let mut simulation = moving(Method::Rk4);
+    simulation.enable(true);
+    simulation.set_gains(no_gains());
+    assert_eq!(simulation.pid().gains(), &no_gains());
+    simulation.step();
+    assert_eq!(simulation.effort(), &[0.0; 2]);
+}
+
+#[test]
 fn disabling_control_zeroes_the_effort_at_once_and_leaves_the_motion() {
     let mut simulation = moving(Method::Rk4);
     simulation.advance(50);

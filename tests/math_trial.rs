@@ -566,6 +566,18 @@ fn the_end_is_not_missed_by_rounding() {
     }
 }
 
+/// `0.3 - 0.1` and the like round once each; a sum of such differences would round at every one of them.
+#[test]
+fn what_has_elapsed_is_one_difference_however_often_the_same_time_is_told() {
+    let mut trial = in_flight();
+    for tenth in 101..=300 {
+        let now = f64::from(tenth) / 10.0;
+        trial.tick(now);
+        trial.tick(now);
+        assert_eq!(status(&trial).elapsed, now - 10.0);
+    }
+}
+
 #[test]
 fn a_reset_of_the_simulation_clock_adds_nothing_and_takes_nothing_away() {
     let mut trial = in_flight();

@@ -340,6 +340,8 @@ fn a_huge_throttle_rate_is_clamped() {
             "{text}"
         );
     }
+    // A year.
+    assert_eq!(MAX_THROTTLE, Duration::from_secs(31_536_000));
     assert_eq!(
         subscribe(r#","throttle_rate":1e-300"#).throttle,
         Duration::ZERO
@@ -448,6 +450,8 @@ fn a_timeout_is_a_positive_number_of_seconds_and_bounded() {
         Some(Duration::from_millis(1500))
     );
     assert_eq!(call(r#","timeout":1e300"#).timeout, Some(MAX_TIMEOUT));
+    // A day.
+    assert_eq!(MAX_TIMEOUT, Duration::from_secs(86_400));
     for bad in ["0", "-1", "1e999", "null", "\"1\"", "true"] {
         let (service, message) = failed_call(&format!(
             r#"{{"op":"call_service","service":"/x","timeout":{bad}}}"#

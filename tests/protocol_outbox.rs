@@ -15,6 +15,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
+use pendularm::protocol::frame::MAX_FRAME;
 use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, Outbox};
 use proptest::prelude::*;
 
@@ -134,6 +135,14 @@ fn a_message_of_the_greatest_length_fits_and_a_longer_one_is_dropped_alone() {
         (bench.outbox.dropped(), bench.outbox.topic_bytes()),
         (3, MAX_TOPIC_BYTES)
     );
+}
+
+#[test]
+fn the_longest_message_that_a_client_may_send_fits_with_its_newline() {
+    let mut bench = Bench::new();
+    bench.push("/a", vec![0; MAX_FRAME + 1]);
+    assert_eq!(bench.outbox.dropped(), 0);
+    assert_eq!(bench.take(1, usize::MAX).len(), 1);
 }
 
 #[test]

@@ -88,7 +88,7 @@ impl Nesting {
     fn open(&mut self, bracket: u128) -> Option<Event> {
         self.depth += 1;
         if self.depth <= MAX_NESTING {
-            self.brackets = (self.brackets << 1) | bracket;
+            self.brackets = (self.brackets << 1) + bracket;
         }
         (self.depth == MAX_NESTING + 1).then_some(Event::TooDeep)
     }
