@@ -146,6 +146,19 @@ fn the_longest_message_that_a_client_may_send_fits_with_its_newline() {
 }
 
 #[test]
+fn an_outbox_is_empty_when_neither_a_message_nor_a_response_can_be_taken() {
+    let mut bench = Bench::new();
+    assert!(bench.outbox.is_empty());
+    bench.push("/a", "1");
+    assert!(!bench.outbox.is_empty());
+    bench.take_all();
+    bench.respond("r", &[]);
+    assert!(!bench.outbox.is_empty());
+    bench.take_all();
+    assert!(bench.outbox.is_empty());
+}
+
+#[test]
 fn responses_count_until_they_have_been_written() {
     let mut bench = Bench::new();
     bench.respond("12345678", &[]);

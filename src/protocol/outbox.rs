@@ -301,3 +301,32 @@ impl Outbox {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Room for `frames` topic messages and as many responses, taken at once: what of it is still held.
+    fn held_after(frames: usize) -> [usize; 2] {
+        let mut outbox = Outbox::new();
+        let (now, topic) = (Instant::now(), Arc::<str>::from("/a"));
+        for _ in 0..frames {
+            outbox.push(&topic, Bytes::from_static(b"x"), now);
+            outbox.push_response(Bytes::from_static(b"y"), &[]);
+        }
+        let mut batch = Vec::new();
+        outbox.take_batch(now, usize::MAX, usize::MAX, &mut batch);
+        assert_eq!(batch.len(), 2 * frames);
+        [outbox.topics.capacity(), outbox.responses.capacity()]
+    }
+
+    #[test]
+    fn the_memory_of_a_burst_is_given_back_and_that_of_a_few_ticks_kept() {
+        for held in held_after(10_000) {
+            assert!((KEPT_FRAMES..4 * KEPT_FRAMES).contains(&held), "{held}");
+        }
+        for held in held_after(4 * KEPT_FRAMES) {
+            assert!(held >= 4 * KEPT_FRAMES, "{held}");
+        }
+    }
+}

@@ -126,7 +126,11 @@ mod tests {
 
     #[test]
     fn every_field_of_a_parameter_is_one_that_its_service_takes_and_answers() {
-        for (service, field) in Parameter::ALL.into_iter().filter_map(Parameter::field) {
+        for parameter in Parameter::ALL {
+            let Some((service, field)) = parameter.field() else {
+                assert_eq!(parameter, Parameter::RobotDescription);
+                continue;
+            };
             assert!(service.fields().iter().any(|one| one.name == field));
             assert!(
                 service
