@@ -572,8 +572,8 @@ fn what_has_elapsed_is_one_difference_however_often_the_same_time_is_told() {
     let mut trial = in_flight();
     for tenth in 101..=300 {
         let now = f64::from(tenth) / 10.0;
-        trial.tick(now);
-        trial.tick(now);
+        assert_eq!(trial.tick(now), []);
+        assert_eq!(trial.tick(now), []);
         assert_eq!(status(&trial).elapsed, now - 10.0);
     }
 }
