@@ -94,6 +94,24 @@ fn every_angle_is_within_one_number_of_the_c_library() {
     }
 }
 
+/// The corrections of the last bit are worth their instructions: with all of them 4 % of the results are not the nearest number, which is what
+/// the C library gives nearly always; with any of them off or of the wrong sign it is 8 % or more.
+#[test]
+fn nineteen_results_of_twenty_are_those_of_the_c_library_to_the_bit() {
+    let (mut off, mut all) = ([0_u32; 2], 0_u32);
+    for k in -100_000..=100_000 {
+        for angle in [f64::from(k) * 1.234_567e-5, f64::from(k) * 0.212_345_67] {
+            let ((sin, cos), (want_sin, want_cos)) = (one(angle), angle.sin_cos());
+            all += 1;
+            off[0] += u32::from(sin != want_sin);
+            off[1] += u32::from(cos != want_cos);
+        }
+    }
+    for off in off {
+        assert!(off < all / 20, "{off} of {all}");
+    }
+}
+
 #[test]
 fn the_sine_is_odd_and_the_cosine_even_to_the_bit() {
     for k in 1..200_000 {

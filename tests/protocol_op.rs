@@ -175,6 +175,18 @@ fn what_is_no_operation_is_named() {
         status(r#"{"op":{}}"#),
         "malformed frame: op must be a string, got an object"
     );
+    // As the frame's reader writes the names that JSON does not have.
+    for (literal, name) in [
+        ("9e999", "NaN"),
+        ("1e999", "Infinity"),
+        ("-1e999", "-Infinity"),
+        ("-9e999", "-9e999"),
+    ] {
+        assert_eq!(
+            status(&format!(r#"{{"op":{literal}}}"#)),
+            format!("malformed frame: op must be a string, got {name}")
+        );
+    }
     assert_eq!(status(r#"{"op":"fly"}"#), "unknown op \"fly\"");
     assert_eq!(status(r#"{"op":""}"#), "unknown op \"\"");
 }

@@ -245,7 +245,7 @@ impl Throttles {
 
     /// Rebuilds an index once most of it is out of date: constant time per message, all told.
     fn tidy(&mut self) {
-        if self.ages.len() > 2 * self.count + SLACK {
+        if is_stale(self.ages.len(), self.count) {
             let topics = &self.topics;
             self.ages.retain(|(number, topic)| {
                 topics
@@ -253,7 +253,7 @@ impl Throttles {
                     .is_some_and(|throttle| throttle.holds(*number))
             });
         }
-        if self.releases.len() > 2 * self.topics.len() + SLACK {
+        if is_stale(self.releases.len(), self.topics.len()) {
             self.releases.clear();
             let waiting = self
                 .topics
@@ -269,9 +269,74 @@ impl Throttles {
     }
 }
 
+/// Whether an index of so many entries is to be rebuilt, of which at most `valid` are up to date.
+const fn is_stale(entries: usize, valid: usize) -> bool {
+    entries > 2 * valid + SLACK
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_index_is_rebuilt_once_more_than_half_of_it_and_the_slack_is_out_of_date() {
+        for valid in [0, 1, 10] {
+            assert!(!is_stale(2 * valid + 32, valid));
+            assert!(is_stale(2 * valid + 33, valid));
+            assert!(is_stale(1000, valid));
+        }
+    }
+
+    impl Throttles {
+        fn check(&self) {
+            let held = || self.topics.values().flat_map(|throttle| &throttle.held);
+            assert_eq!(self.count, held().count());
+            assert_eq!(
+                self.bytes,
+                held().map(|(_, frame)| frame.len()).sum::<usize>()
+            );
+        }
+    }
+
+    /// Whichever way messages leave, what is counted is what is there.
+    #[test]
+    fn messages_and_their_bytes_are_counted_as_long_as_they_are_held_back() {
+        let topics = ["/a", "/b"].map(Arc::<str>::from);
+        let second = Duration::from_secs(1);
+        let mut now = Instant::now();
+        let mut throttles = Throttles::default();
+        let fill = |throttles: &mut Throttles, first: u64, now| {
+            for (number, topic) in (first..).zip((0..10).flat_map(|_| &topics)) {
+                let frame = Bytes::from("x".repeat(1 + throttles.count));
+                let _ = throttles.offer(topic, number, frame, now);
+                throttles.check();
+            }
+        };
+        for topic in &topics {
+            throttles.set(topic, Some((second, 5)));
+        }
+        fill(&mut throttles, 0, now);
+        assert_eq!(throttles.count, 10);
+        throttles.set(&topics[0], Some((second, 2)));
+        throttles.check();
+        assert_eq!(throttles.count, 7);
+        for _ in 0..3 {
+            throttles.drop_oldest();
+            throttles.check();
+        }
+        assert_eq!(throttles.count, 4);
+        now += second;
+        assert!(throttles.release(now).is_some());
+        throttles.check();
+        assert_eq!(throttles.count, 3);
+        fill(&mut throttles, 100, now);
+        throttles.discard(&topics[0]);
+        throttles.check();
+        assert_eq!(throttles.count, 5);
+        assert_eq!(throttles.forget(&topics[1]).len(), 5);
+        throttles.check();
+        assert_eq!(throttles.count, 0);
+    }
 
     /// One message is held back for a year, in front of all that comes after it in both indexes.
     #[test]
