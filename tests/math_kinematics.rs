@@ -696,6 +696,11 @@ fn wrapping_takes_away_whole_turns_to_the_last_digit() {
     for angle in [0.0, 1.0, -3.0, PI, (-PI).next_up(), 1e-300] {
         assert_eq!(wrap(angle), angle);
     }
+    // Taken through its sine and cosine, every other one would come back with another last digit.
+    for thousandth in -3141..=3141 {
+        let angle = f64::from(thousandth) / 1000.0;
+        assert_eq!(wrap(angle), angle);
+    }
     assert_eq!(wrap(-PI), PI);
     // A rounded 3π is 9e-16 off a true one, on the side where half a turn stays positive.
     assert!((wrap(3.0 * PI).abs() - PI).abs() < 1e-15);
@@ -731,6 +736,11 @@ fn a_refusal_says_which_limit_is_exceeded_and_by_which_numbers() {
     assert_eq!(
         refusal([1.0, 1.0, 1.0], aimed(1.5, 0.0, PI)),
         "phi = 3.141592653589793 puts the wrist 2.5 m from the base, beyond the reach of links 1 and 2, 2 m"
+    );
+    // Of another size, in metres all the same.
+    assert_eq!(
+        refusal([4.0, 4.0, 4.0], aimed(6.0, 0.0, PI)),
+        "phi = 3.141592653589793 puts the wrist 10 m from the base, beyond the reach of links 1 and 2, 8 m"
     );
     assert_eq!(
         refusal([2.0, 0.5, 1.0], aimed(2.0, 0.0, 0.0)),

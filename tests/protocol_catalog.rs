@@ -230,6 +230,16 @@ fn three_services_compute_and_eight_take_all_or_nothing() {
     );
 }
 
+/// What changes seldom has to reach those that come late.
+#[test]
+fn the_fixed_frames_and_the_description_are_latched_and_nothing_else_is() {
+    let latched: Vec<_> = Topic::ALL
+        .into_iter()
+        .filter(|topic| topic.is_latched())
+        .collect();
+    assert_eq!(latched, [Topic::TfStatic, Topic::RobotDescription]);
+}
+
 #[test]
 fn gains_and_params_have_the_members_that_their_services_have_as_fields() {
     for service in [Service::Stability, Service::Rollout] {
