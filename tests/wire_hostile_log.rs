@@ -109,6 +109,11 @@ impl Drop for Talkative {
 fn assert_records(log: &str) {
     assert!(log.ends_with('\n') && log.lines().count() > 3, "{log:?}");
     for line in log.split_terminator('\n') {
+        // On a machine that is busy enough the log's own complaint is among them.
+        let lost = line.strip_suffix(" log lines were dropped: nobody read them fast enough");
+        if lost.is_some_and(|count| count.bytes().all(|byte| byte.is_ascii_digit())) {
+            continue;
+        }
         let mut words = line.split_whitespace();
         let time = words.next().unwrap_or_default();
         assert!(
