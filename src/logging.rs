@@ -149,6 +149,13 @@ impl Log {
         Ok(log)
     }
 
+    /// Puts a line into the log, whatever its level is.
+    pub fn say(&self, line: &str) {
+        let line = format!("{line}\n");
+        // What does not fit is lost, as any line.
+        let _ = self.clone().write_all(line.as_bytes());
+    }
+
     /// Waits until what was logged so far is written, for a moment at most.
     pub fn finish(&self) {
         let (written, all) = sync_channel(1);

@@ -6,11 +6,13 @@ use std::fmt::Display;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use pendularm::actors::runtime;
+use pendularm::actors::{panics, runtime};
 use pendularm::logging;
 use pendularm::options::{Options, Parsed};
 use pendularm::report;
 
+/// Exit status for whatever else fails.
+const FAILED: u8 = 1;
 /// Exit status for a bad option or a bad environment variable.
 const BAD_USAGE: u8 = 2;
 
@@ -44,6 +46,12 @@ fn serve(options: &Options) -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
+    let lines = log.clone();
+    panics::end_with(move |what| {
+        lines.say(&format!("pendularm: internal error, ending: {what}"));
+        lines.finish();
+        std::process::exit(i32::from(FAILED));
+    });
     let outcome = runtime::run(options);
     log.finish();
     match outcome {

@@ -31,6 +31,7 @@ use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::net::tcp::OwnedWriteHalf;
 use tokio::sync::Notify;
+use tokio::task::JoinHandle;
 use tokio::time::{Instant, timeout};
 
 use self::gate::Gate;
@@ -39,6 +40,7 @@ use super::ConnectionId;
 use super::budget::{Claim, Share};
 use super::gauges::Gauges;
 use super::node::SMALL_ANSWER;
+use super::panics::{contain, contained};
 use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Request, Throttle};
 use crate::options::DEFAULT_BIND;
 use crate::protocol::catalog::{Node, Service, Topic};
@@ -88,6 +90,17 @@ pub struct Connection<S> {
     gate: Arc<Gate>,
     /// The address that the client has connected to.
     local: SocketAddr,
+    /// What reads and writes, once the registry has answered.
+    task: Option<Task<()>>,
+}
+
+/// A task that ends, where it stands, with whoever has this.
+struct Task<T>(JoinHandle<T>);
+
+impl<T> Drop for Task<T> {
+    fn drop(&mut self) {
+        self.0.abort();
+    }
 }
 
 /// What the actor and its two tasks share; one thread, so plain cells do.
@@ -171,6 +184,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             shared,
             gate,
             local,
+            task: None,
         }
         .start()
     }
@@ -244,6 +258,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
     }
 
     fn stopped(&mut self, _: &mut Context<Self>) {
+        self.task = None;
         if let Some(id) = self.shared.id.take() {
             self.registry.do_send(Disconnect(id));
         }
@@ -255,43 +270,48 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connection<S> {
     type Result = ();
 
-    fn handle(&mut self, message: Deliver, _: &mut Context<Self>) {
-        self.shared.deliver(&message.topic, message.frame);
+    fn handle(&mut self, message: Deliver, ctx: &mut Context<Self>) {
+        self.contain(ctx, |connection| {
+            connection.shared.deliver(&message.topic, message.frame);
+        });
     }
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Answer> for Connection<S> {
     type Result = ();
 
-    fn handle(&mut self, answer: Answer, _: &mut Context<Self>) {
-        let of_arm = answer
-            .service
-            .is_some_and(|one| one.owner() == Node::ArmSim);
-        self.shared
-            .send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] });
-        if answer.service.is_some_and(Service::is_computation) {
-            self.shared.computations.borrow_mut().running = None;
-            self.shared.start_computation(&self.registry);
-            self.shared.room.notify_one();
-        }
+    fn handle(&mut self, answer: Answer, ctx: &mut Context<Self>) {
+        self.contain(ctx, |connection| {
+            let shared = &connection.shared;
+            let service = answer.service;
+            let of_arm = service.is_some_and(|one| one.owner() == Node::ArmSim);
+            shared.send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] });
+            if service.is_some_and(Service::is_computation) {
+                shared.computations.borrow_mut().running = None;
+                shared.start_computation(&connection.registry);
+                shared.room.notify_one();
+            }
+        });
     }
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Configure> for Connection<S> {
     type Result = ();
 
-    fn handle(&mut self, configure: Configure, _: &mut Context<Self>) {
-        let mut outbox = self.shared.outbox.borrow_mut();
-        match configure.throttle {
-            Some(Throttle {
-                interval,
-                queue_length,
-            }) => {
-                outbox.set_throttle(&configure.topic, Some((interval, queue_length)));
+    fn handle(&mut self, configure: Configure, ctx: &mut Context<Self>) {
+        self.contain(ctx, |connection| {
+            let mut outbox = connection.shared.outbox.borrow_mut();
+            match configure.throttle {
+                Some(Throttle {
+                    interval,
+                    queue_length,
+                }) => {
+                    outbox.set_throttle(&configure.topic, Some((interval, queue_length)));
+                }
+                None => outbox.forget(&configure.topic),
             }
-            None => outbox.forget(&configure.topic),
-        }
-        self.shared.outgoing.notify_one();
+            connection.shared.outgoing.notify_one();
+        });
     }
 }
 
@@ -327,10 +347,20 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             local: self.local,
         };
         let address = ctx.address();
-        actix_rt::spawn(async move {
-            reception.run(stream, admitted).await;
+        self.task = Some(Task(actix_rt::spawn(async move {
+            if let Err(panic) = contained(reception.run(stream, admitted)).await {
+                tracing::error!(%panic, "a client's task failed; its connection ends");
+            }
             address.do_send(Ended);
-        });
+        })));
+    }
+
+    /// Does `work`; its panic ends this client and nothing else.
+    fn contain(&mut self, ctx: &mut Context<Self>, work: impl FnOnce(&mut Self)) {
+        if let Err(panic) = contain(|| work(self)) {
+            tracing::error!(%panic, "a client's actor failed; its connection ends");
+            ctx.stop();
+        }
     }
 }
 

@@ -50,6 +50,7 @@ pub mod ik_trial;
 pub mod integration;
 pub mod listener;
 pub mod node;
+pub mod panics;
 pub mod registry;
 pub mod rosapi;
 pub mod rosout;

@@ -11,10 +11,11 @@
 //! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
 
 use std::collections::VecDeque;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
+
+use super::panics::contain;
 
 /// How long one computation may keep a worker before the next one has its turn: short beside the 5 ms that a client
 /// may be delayed, long beside the cost of changing over.
@@ -196,9 +197,9 @@ impl Shared {
 
     fn work(&self) {
         while let Some(mut job) = self.take() {
-            let slice = AssertUnwindSafe(|| job.computation.advance(Instant::now() + SLICE));
-            let progress = catch_unwind(slice).unwrap_or_else(|_| {
-                tracing::error!("a computation panicked; its caller is told that it ended");
+            let progress = contain(|| job.computation.advance(Instant::now() + SLICE));
+            let progress = progress.unwrap_or_else(|panic| {
+                tracing::error!(%panic, "a computation ended; its caller is told so");
                 Progress::Finished
             });
             self.put_back(job, progress);
@@ -247,10 +248,14 @@ impl Shared {
             queue.closed
         };
         // Dropped outside the lock: the end of a computation may free many megabytes.
-        if progress != Progress::Finished {
-            job.computation.refuse(closed.unwrap_or_default());
+        let end = contain(move || {
+            if progress != Progress::Finished {
+                job.computation.refuse(closed.unwrap_or_default());
+            }
+        });
+        if let Err(panic) = end {
+            tracing::error!(%panic, "the end of a computation failed");
         }
-        drop(job);
         let mut queue = self.lock();
         queue.running -= 1;
         queue.end(was_long);

@@ -135,6 +135,12 @@ impl Peer {
             .collect()
     }
 
+    /// Takes what comes up to the end of the stream.
+    pub async fn drain(&mut self) {
+        let mut bytes = Vec::new();
+        let _ = tokio::io::AsyncReadExt::read_to_end(&mut self.input, &mut bytes).await;
+    }
+
     /// Takes just this many bytes out of the pipe.
     pub async fn take(&mut self, bytes: usize) {
         let mut buffer = vec![0; bytes];

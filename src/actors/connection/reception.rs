@@ -17,8 +17,9 @@ use super::gate::{Gate, HEAD_TIME};
 use super::reader::{Reader, discard};
 use super::transport::{CHUNK, Inbound, Outbound, Plain, Sending, read_some, take_tcp};
 use super::unfinished::FRAME_TIME;
-use super::{Finish, LINGER, Shared, writer};
+use super::{Finish, LINGER, Shared, Task, writer};
 use crate::actors::ConnectionId;
+use crate::actors::panics::contained;
 use crate::actors::registry::{Disconnect, Refused, Registry};
 #[cfg(feature = "web")]
 use crate::protocol::frame::Foreign;
@@ -160,15 +161,24 @@ impl Reception {
         I: Inbound + 'static,
         O: Outbound,
     {
-        let mut reading = actix_rt::spawn(reader.run(input, first));
+        let (shared, registry) = (Rc::clone(&self.shared), self.registry.clone());
+        let mut reading = Task(actix_rt::spawn(async move {
+            if let Err(panic) = contained(reader.run(input, first)).await {
+                tracing::error!(%panic, "a client's reader failed; its connection ends");
+                shared.abandon_computations();
+                if let Some(id) = shared.id.get() {
+                    let _ = registry.send(Disconnect(id)).await;
+                }
+                shared.finish();
+            }
+        }));
         let all_written = writer::run(output, &self.shared, &self.registry).await;
         self.shared.stream.take();
+        // Whatever still reads after this ends here.
         if all_written && self.shared.refusing.get() {
-            let _ = reading.await;
-        } else if !(all_written && O::END_IS_ANSWERED)
-            || timeout(LINGER, &mut reading).await.is_err()
-        {
-            reading.abort();
+            let _ = (&mut reading.0).await;
+        } else if all_written && O::END_IS_ANSWERED {
+            let _ = timeout(LINGER, &mut reading.0).await;
         }
     }
 }
