@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-browser test-clients fuzz lint audit doc report mutants bench bench-load bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-slow test-browser test-clients fuzz lint audit doc report mutants bench bench-load bench-peers clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -22,6 +22,10 @@ run: build ## Build, then serve clients in the foreground until SIGINT or SIGTER
 test: ## Run every test but those of the page
 	@echo "make test: unit, property, wire and documentation tests"
 	$(CARGO) test --locked
+
+test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
+	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"
+	$(CARGO) test --locked --test wire_faults_slow -- --ignored --test-threads 1
 
 test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
 	@echo "make test-browser: the page in headless Chromium"

@@ -16,7 +16,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use pendularm::actors::registry::{MAX_CONNECTIONS, Nodes, Publish};
+use pendularm::actors::registry::{DEFAULT_TIMEOUT, MAX_CONNECTIONS, Nodes, Publish};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::messages;
 use serde_json::{Value, json};
@@ -32,7 +32,11 @@ fn a_call_waits_ten_seconds_for_its_provider_or_as_long_as_its_caller_says() {
         let gateway = Gateway::bare().await;
         let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
-        for (timeout, seconds) in [(None, 10.0), (Some(2.5), 2.5), (Some(600.0), 600.0)] {
+        for (timeout, seconds) in [
+            (None, DEFAULT_TIMEOUT.as_secs_f64()),
+            (Some(2.5), 2.5),
+            (Some(600.0), 600.0),
+        ] {
             let began = Instant::now();
             let mut frame = json!({"op": "call_service", "service": "/s", "id": 1});
             if let Some(timeout) = timeout {

@@ -21,7 +21,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::arm_sim::{
-    ArmSettings, ArmSim, Consult, ControlLoop, HeldLimit, Present, TakeSnapshot,
+    ArmSettings, ArmSim, Consult, ControlLoop, HeldLimit, LEAST_PAUSE, Present, TakeSnapshot,
 };
 use pendularm::actors::gauges::Gauges;
 use pendularm::actors::node::{Interest, Reply, ServiceCall, TopicMessage};
@@ -807,6 +807,32 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
             value(told.last().unwrap(), "warning"),
             "rk4 is predicted to be unstable at every timestep with the controller off"
         );
+    });
+}
+
+/// A setpoint that is dragged asks for a prediction now and then, not at every tick; the last one has its own.
+#[test]
+fn a_setpoint_that_goes_on_moving_is_predicted_now_and_then() {
+    in_virtual_time(|| async {
+        let stage = Stage::new(0.004).await;
+        stage.want(Topic::Diagnostics, true).await;
+        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.questions().await;
+        let time = Duration::from_secs(2);
+        let moves = 100_u32;
+        for n in 1..=moves {
+            stage.set_setpoint([f64::from(n) * 1e-2, 0.0]).await;
+            sleep(time / moves).await;
+        }
+        let asked = stage.questions().await;
+        let most = usize::try_from(time.as_millis() / LEAST_PAUSE.as_millis()).unwrap() + 2;
+        assert!(
+            asked.len() > 5 && asked.len() <= most,
+            "{} questions",
+            asked.len()
+        );
+        let last = f64::from(moves) * 1e-2;
+        assert_eq!(asked.last().unwrap().setpoint.position, [last, 0.0]);
     });
 }
 

@@ -22,7 +22,7 @@ use pendularm::actors::budget::{
 use pendularm::actors::connection::unfinished::FREE_INPUT;
 use pendularm::actors::connection::{MAX_TOPIC_BYTES_SCARCE, SMALL_FRAME, STALL_LIMIT};
 use pendularm::actors::integration::Integration;
-use pendularm::actors::node::SMALL_ANSWER;
+use pendularm::actors::node::{ROOM_TIME, SMALL_ANSWER};
 use pendularm::actors::registry::{MAX_CONNECTIONS, Nodes, REGISTRATION_BYTES};
 use pendularm::actors::workers::WorkerPool;
 use pendularm::protocol::catalog::Service;
@@ -305,6 +305,7 @@ fn computations_whose_answers_would_exceed_the_total_are_refused_and_all_others_
         }
         let mut honest = gateway.connect(WIDE);
         let mut most = 0;
+        let began = std::time::Instant::now();
         while workers.is_idle() {
             settle().await;
         }
@@ -318,6 +319,7 @@ fn computations_whose_answers_would_exceed_the_total_are_refused_and_all_others_
             most = most.max(total.used());
         }
         assert!(most <= limit, "{most}");
+        assert!(began.elapsed() >= ROOM_TIME, "none is refused before");
         let mut refused = 0;
         for client in &mut deaf {
             let response = client.receive().await;

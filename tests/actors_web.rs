@@ -19,6 +19,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use futures_util::{SinkExt, StreamExt};
+use pendularm::actors::budget::{Budget, Totals};
 use pendularm::actors::connection::gate::Gate;
 use pendularm::actors::connection::unfinished::FRAME_TIME;
 use pendularm::actors::connection::{Connection, STALL_LIMIT};
@@ -331,6 +332,114 @@ fn a_slow_client_loses_the_oldest_messages_and_no_response() {
             messages += 1;
         }
         assert_eq!(messages + dropped, 100);
+    });
+}
+
+/// The head of a masked frame with the mask 0: so its payload goes as it is.
+fn frame_head(opcode: u8, length: usize) -> Vec<u8> {
+    let mut head = vec![opcode];
+    if let Ok(short @ 0..126) = u8::try_from(length) {
+        head.push(0x80 | short);
+    } else {
+        head.push(0x80 | 127);
+        head.extend_from_slice(&u64::try_from(length).unwrap().to_be_bytes());
+    }
+    head.extend_from_slice(&[0; 4]);
+    head
+}
+
+/// What the peer is told in the close frame: code and reason, behind whatever else comes.
+async fn farewell(stream: &mut DuplexStream) -> (u16, String) {
+    let mut bytes = Vec::new();
+    stream
+        .read_to_end(&mut bytes)
+        .await
+        .expect("an orderly end");
+    let close = bytes
+        .iter()
+        .rposition(|byte| *byte == 0x88)
+        .expect("a close frame");
+    let code = u16::from_be_bytes([bytes[close + 2], bytes[close + 3]]);
+    (
+        code,
+        String::from_utf8_lossy(&bytes[close + 4..]).into_owned(),
+    )
+}
+
+/// Byte by byte within a frame; and in parts of a message, between which the peer answers every ping.
+#[test]
+fn a_message_that_does_not_end_is_given_up_after_a_minute() {
+    run(async {
+        for pongs in [false, true] {
+            let gateway = Gateway::bare().await;
+            let mut stream = open(&gateway, WIDE).await.into_inner();
+            let (opcode, length) = if pongs {
+                (0x01, 1000)
+            } else {
+                (0x81, 1_000_000)
+            };
+            let began = Instant::now();
+            stream.write_all(&frame_head(opcode, length)).await.unwrap();
+            stream.write_all(&[b' '; 1000]).await.unwrap();
+            for _ in 0..FRAME_TIME.as_secs() - 1 {
+                sleep(Duration::from_secs(1)).await;
+                let bytes = if pongs {
+                    frame_head(0x8a, 0)
+                } else {
+                    vec![b' ']
+                };
+                stream.write_all(&bytes).await.unwrap();
+            }
+            let (code, why) = farewell(&mut stream).await;
+            assert_eq!(
+                (code, why.contains("within a minute")),
+                (1008, true),
+                "{why}"
+            );
+            // It is noticed with the next ping at the latest.
+            let time = began.elapsed();
+            assert!(
+                time >= FRAME_TIME && time <= FRAME_TIME + PING_INTERVAL,
+                "{time:?}"
+            );
+            drop(stream);
+            settle().await;
+            assert_eq!(gateway.gauges.connections(), 0);
+        }
+    });
+}
+
+#[test]
+fn a_message_for_which_there_is_no_room_closes_its_connection_with_a_reason() {
+    run(async {
+        let input = Budget::of(1024 * 1024);
+        let totals = Totals {
+            input: input.clone(),
+            ..Totals::default()
+        };
+        let gateway = Gateway::within(totals, Nodes::default()).await;
+        let mut modest = open(&gateway, WIDE).await;
+        let mut stream = open(&gateway, WIDE).await.into_inner();
+        stream
+            .write_all(&frame_head(0x81, 3_000_000))
+            .await
+            .unwrap();
+        stream.write_all(&vec![b' '; 1_000_000]).await.unwrap();
+        let (code, why) = farewell(&mut stream).await;
+        assert_eq!(
+            (code, why.contains("try again later")),
+            (1013, true),
+            "{why}"
+        );
+        drop(stream);
+        settle().await;
+        assert_eq!(input.used(), 0);
+        send(
+            &mut modest,
+            json!({"op": "call_service", "service": "/nobody", "id": 1}),
+        )
+        .await;
+        assert!(receive(&mut modest).await.is_text());
     });
 }
 

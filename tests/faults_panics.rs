@@ -36,7 +36,6 @@ static ENDS: OnceLock<Mutex<Vec<String>>> = OnceLock::new();
 fn ends() -> Vec<String> {
     let ends = ENDS.get_or_init(|| {
         panics::end_with(|what| {
-            eprintln!("{what}");
             ENDS.get().unwrap().lock().unwrap().push(what.to_owned());
         });
         Mutex::default()

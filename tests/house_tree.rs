@@ -192,3 +192,14 @@ fn no_line_ends_in_white_space_and_every_text_ends_in_a_newline() {
         );
     }
 }
+
+/// What is decided by time is decided by the monotonic clock: a wall clock may jump.
+#[test]
+fn nothing_asks_the_wall_clock() {
+    for path in rust_files("src") {
+        let text = fs::read_to_string(&path).unwrap();
+        for clock in ["SystemTime", "UNIX_EPOCH"] {
+            assert!(!text.contains(clock), "{} names {clock}", path.display());
+        }
+    }
+}

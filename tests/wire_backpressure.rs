@@ -19,6 +19,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use common::{Client, PATIENCE, Runtime};
+use pendularm::actors::registry::MAX_BACKLOG;
 use serde_json::{Value, json};
 
 const MIB: usize = 1024 * 1024;
@@ -166,7 +167,7 @@ fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() 
     assert!(busy > 50, "{busy} of 200 refused");
     let peak = peak_memory(&runtime);
     assert!(
-        peak < BASE + 80 * MIB,
+        peak < BASE + MAX_BACKLOG + 16 * MIB,
         "{peak} bytes for 64 MiB that may wait"
     );
 }

@@ -18,6 +18,7 @@ mod web_client;
 use std::net::SocketAddr;
 
 use common::{Client, Runtime};
+use pendularm::actors::connection::gate::MAX_LOCKED;
 use serde_json::json;
 #[cfg(feature = "web")]
 use web_client::{Socket, get, handshake, request, try_handshake};
@@ -120,7 +121,7 @@ fn a_client_that_sends_much_before_the_token_is_closed() {
     );
     let mut client = runtime.connect();
     client.send_bytes("{\"pad\":\"".as_bytes());
-    client.send_bytes(&vec![b'x'; 100_000]);
+    client.send_bytes(&vec![b'x'; MAX_LOCKED]);
     assert!(explanation(&mut client).contains("16384 bytes"));
 }
 

@@ -138,4 +138,18 @@ mod tests {
             assert_eq!(Name::parse(rest), None, "{rest}");
         }
     }
+
+    #[test]
+    fn a_file_may_be_so_long_and_no_longer() {
+        let folder = std::env::temp_dir().join(format!("pendularm-report-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
+        let name = Name::parse("a.csv").unwrap();
+        for (length, is_read) in [(MAX_FILE, true), (MAX_FILE + 1, false)] {
+            // Nothing is written: such a file has a length and no content on the disk.
+            file.set_len(length).unwrap();
+            assert_eq!(name.read(&folder).is_some(), is_read, "{length}");
+        }
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
 }

@@ -22,7 +22,7 @@ use crate::study::linear::no_control;
 
 /// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may come
 /// by the thousand a second.
-const LEAST_PAUSE: Duration = Duration::from_millis(100);
+pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 

@@ -27,7 +27,7 @@ pub use self::by_hand::MAX_STEPS;
 use self::goals::Goals;
 pub use self::goals::{ArmPose, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::limit::LimitWatch;
-pub use self::limit::{ArmSettings, Consult, ControlLoop, HeldLimit, Present};
+pub use self::limit::{ArmSettings, Consult, ControlLoop, HeldLimit, LEAST_PAUSE, Present};
 use self::telemetry::Telemetry;
 use super::awake::stay_awake;
 use super::gauges::Gauges;

@@ -103,3 +103,27 @@ impl Tally {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn so_many_topics_and_services_are_listed_and_no_more() {
+        let mut tally = Tally::default();
+        for n in 0..=MAX_LISTED {
+            tally.add(&format!("/{n:05}"), Use::Advertised, None);
+            tally.provide(&format!("/{n:05}"), None);
+        }
+        let census = tally.take();
+        assert_eq!(
+            (census.topics.len(), census.services.len()),
+            (MAX_LISTED, MAX_LISTED)
+        );
+        tally.remove("/00000", Use::Advertised);
+        assert_eq!(
+            &*tally.take().topics[MAX_LISTED - 1].name,
+            format!("/{MAX_LISTED:05}")
+        );
+    }
+}

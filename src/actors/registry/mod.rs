@@ -15,6 +15,7 @@ use std::cell::Cell;
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -52,6 +53,8 @@ pub const MAX_ADVERTISED: usize = 1024;
 pub const MAX_PROVIDED: usize = 256;
 /// Calls of one connection that wait for clients to answer.
 pub const MAX_WAITING_CALLS: usize = 256;
+/// How long a provider may take when its caller does not say.
+pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// What a registration takes of the total of names, beside three times its name: its places in the tables.
 pub const REGISTRATION_BYTES: usize = 1024;
 /// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,

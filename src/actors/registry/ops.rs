@@ -3,7 +3,6 @@
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -15,8 +14,8 @@ use super::refusal::Refusal;
 use super::services::{Forwarded, Provider, Services};
 use super::topics::{Subscription, Throttle};
 use super::{
-    Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
-    Registry, Request, TimedOut,
+    DEFAULT_TIMEOUT, Handled, MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS,
+    MAX_WAITING_CALLS, Registry, Request, TimedOut,
 };
 use crate::actors::ConnectionId;
 use crate::actors::budget::Claim;
@@ -26,9 +25,6 @@ use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::{Arguments, CallService, Compression, MAX_NAME, Op, Subscribe};
-
-/// How long a provider may take when its caller does not say.
-const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Who sent the frame that is being performed, and its `id`.
 struct Origin {
