@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow test-browser test-clients fuzz lint audit doc report mutants bench bench-load bench-peers clean vendor submission test-submission
+.PHONY: help build run test test-slow test-browser test-clients fuzz lint audit doc report mutants bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -76,6 +76,10 @@ bench-load: ## Measure many clients' messages beside redis and mosquitto; ARGS=-
 bench-peers: ## Measure beside Pinocchio and MuJoCo, installed from PyPI into benches/peers/.venv; KEEP=1 as above
 	@echo "make bench-peers: downloads about 100 MB once, compiles, then some minutes"
 	@KEEP="$(KEEP)" bash benches/peers/run.sh
+
+soak: ## Let badly behaved clients come and go for MINUTES (1), and check what must hold; SEED=n repeats one
+	@echo "make soak: builds, then $(or $(MINUTES),1) minutes and a little more"
+	@MINUTES="$(MINUTES)" SEED="$(SEED)" ALLOCATOR="$(ALLOCATOR)" bash scripts/soak.sh
 
 clean: ## Remove what was built and packed; vendored sources stay
 	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"

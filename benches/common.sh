@@ -1,4 +1,4 @@
-# Sourced by run.sh and peers/run.sh: where results go, and on what they were measured.
+# Sourced by run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
 # Needs: `root` (this project). Sets: `benches`, `built`. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches

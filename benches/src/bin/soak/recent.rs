@@ -1,0 +1,37 @@
+//! The last frames of a client, shortened, for a report of what went before a fault.
+//!
+//! **Invariant:** bounded, however much a client sends.
+
+use std::collections::VecDeque;
+
+/// How much of a frame is kept, in bytes, and of how many.
+const LENGTH: usize = 200;
+const FRAMES: usize = 6;
+
+/// The last frames.
+#[derive(Default)]
+pub struct Recent(VecDeque<String>);
+
+impl Recent {
+    /// Keeps a frame, instead of the oldest.
+    pub fn keep(&mut self, frame: &str) {
+        self.keep_bytes(frame.as_bytes());
+    }
+
+    /// The same for one that may be anything.
+    pub fn keep_bytes(&mut self, frame: &[u8]) {
+        if self.0.len() >= FRAMES {
+            self.0.pop_front();
+        }
+        let mut shown = String::from_utf8_lossy(&frame[..frame.len().min(LENGTH)]).into_owned();
+        if frame.len() > LENGTH {
+            shown += &format!("... ({} bytes)", frame.len());
+        }
+        self.0.push_back(shown);
+    }
+
+    /// What is kept, oldest first.
+    pub fn frames(&self) -> Vec<String> {
+        self.0.iter().cloned().collect()
+    }
+}

@@ -1,0 +1,430 @@
+//! One client on the wire, over raw TCP or WebSocket, that reads while it writes and checks every response it gets.
+//!
+//! **Invariant:** no response passes unchecked: whoever asks for the next frame is told of it only after the ledger.
+
+use std::io::ErrorKind;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+use bytes::{Buf, BytesMut};
+use serde_json::{Value, json};
+use tokio::io::{AsyncWriteExt, Interest};
+use tokio::net::{TcpSocket, TcpStream};
+use tokio::time::timeout_at;
+
+use crate::ledger::{Check, Ledger};
+use crate::recent::Recent;
+use crate::websocket;
+use crate::world::{Fault, PATIENCE, World};
+
+/// Which door the client came through.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Door {
+    /// One JSON object per line.
+    Tcp,
+    /// One per message.
+    Web,
+}
+
+impl Door {
+    /// Mostly the first.
+    pub fn any(rng: &mut fastrand::Rng) -> Self {
+        if rng.u8(..) < 90 {
+            Self::Web
+        } else {
+            Self::Tcp
+        }
+    }
+}
+
+/// What came.
+pub enum Came {
+    /// A response, which was the right one.
+    Answer(Value),
+    /// Anything else.
+    Other(Value),
+    /// A binary message.
+    Binary,
+    /// The stream has ended, orderly or not.
+    End,
+    /// Nothing in the time given.
+    Nothing,
+}
+
+/// A client.
+pub struct Client {
+    /// Who it is, for reports.
+    pub name: String,
+    /// What it shares with all.
+    pub world: Rc<World>,
+    /// Its calls.
+    pub ledger: Ledger,
+    stream: TcpStream,
+    door: Door,
+    /// Bytes that came and are not yet read as frames; of them, how many hold no newline.
+    inbox: BytesMut,
+    scanned: usize,
+    /// A WebSocket message of which some frames came.
+    begun: Option<(u8, BytesMut)>,
+    /// What is to be sent with the next [`Client::flush`].
+    out: Vec<u8>,
+    ended: bool,
+    sent: Recent,
+    came: Recent,
+}
+
+impl Client {
+    /// Connects. Over WebSocket it asks for every status, as there are over TCP.
+    pub async fn connect(world: &Rc<World>, kind: &str, door: Door) -> Result<Self, Fault> {
+        Self::with_buffer(world, kind, door, None).await
+    }
+
+    /// The same, with a receive buffer of about so many bytes.
+    pub async fn with_buffer(
+        world: &Rc<World>,
+        kind: &str,
+        door: Door,
+        buffer: Option<u32>,
+    ) -> Result<Self, Fault> {
+        let name = format!("{kind} {}", world.number());
+        let connecting = async {
+            let socket = TcpSocket::new_v4()?;
+            if let Some(size) = buffer {
+                socket.set_recv_buffer_size(size)?;
+            }
+            let stream = socket.connect(world.address).await?;
+            stream.set_nodelay(true)?;
+            Ok::<_, std::io::Error>(stream)
+        };
+        let stream = tokio::time::timeout(PATIENCE, connecting)
+            .await
+            .map_err(|_| Fault::of(&name, "not accepted in time"))?
+            .map_err(|error| Fault::of(&name, format!("not accepted: {error}")))?;
+        world.count("connections", 1);
+        let mut client = Self {
+            name,
+            world: Rc::clone(world),
+            ledger: Ledger::default(),
+            stream,
+            door,
+            inbox: BytesMut::new(),
+            scanned: 0,
+            begun: None,
+            out: Vec::new(),
+            ended: false,
+            sent: Recent::default(),
+            came: Recent::default(),
+        };
+        if door == Door::Web {
+            client.shake_hands().await?;
+        }
+        Ok(client)
+    }
+
+    async fn shake_hands(&mut self) -> Result<(), Fault> {
+        let hello = websocket::handshake(&self.world.address.to_string());
+        self.send_bytes(hello.as_bytes()).await?;
+        let deadline = Instant::now() + PATIENCE;
+        let right = loop {
+            if let Some(right) = websocket::take_answer(&mut self.inbox) {
+                break right;
+            }
+            if self.ended || !self.wait_readable(deadline).await? {
+                return Err(self.fault("the handshake is not answered"));
+            }
+        };
+        if !right {
+            return Err(self.fault("the handshake is answered wrongly"));
+        }
+        self.world.count("connections over WebSocket", 1);
+        self.push(&json!({"op": "set_level", "level": "info"}));
+        Ok(())
+    }
+
+    /// The door that it came through.
+    pub fn door(&self) -> Door {
+        self.door
+    }
+
+    /// A fault of this client, with what went before it.
+    pub fn fault(&self, what: impl Into<String>) -> Fault {
+        Fault {
+            client: self.name.clone(),
+            what: what.into(),
+            sent: self.sent.frames(),
+            came: self.came.frames(),
+        }
+    }
+
+    /// Appends a frame to what goes out next.
+    pub fn push(&mut self, frame: &Value) {
+        self.push_text(&frame.to_string());
+    }
+
+    /// The same for a frame as text.
+    pub fn push_text(&mut self, frame: &str) {
+        self.sent.keep(frame);
+        self.world.count("frames sent", 1);
+        match self.door {
+            Door::Tcp => {
+                self.out.extend(frame.as_bytes());
+                self.out.push(b'\n');
+            }
+            Door::Web => {
+                // Any mask will do, as long as it is not always the same.
+                let mask = 0x5bd1_e995_u32.wrapping_mul(self.out.len() as u32 | 1);
+                websocket::push_frame(&mut self.out, websocket::TEXT, true, frame.as_bytes(), mask);
+            }
+        }
+    }
+
+    /// Takes what would go out next.
+    pub fn take_out(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.out)
+    }
+
+    /// Appends a call and notes what has to come back; `extra` are further fields of the frame, such as `timeout`.
+    pub fn push_call(
+        &mut self,
+        service: &str,
+        args: Value,
+        extra: Value,
+        ordered: bool,
+        check: Check,
+    ) {
+        let number = self.world.number();
+        // Ids of every kind: they come back as they went.
+        let id = match number % 4 {
+            0 => json!(number),
+            1 => json!([self.name, number]),
+            2 => json!({"n": number}),
+            _ => json!(format!("{}/{number}", self.name)),
+        };
+        let mut frame = json!({"op": "call_service", "service": service, "id": id, "args": args});
+        if let (Some(frame), Some(extra)) = (frame.as_object_mut(), extra.as_object()) {
+            frame.extend(extra.clone());
+        }
+        self.ledger.ask(&id, service, ordered, check);
+        self.world.count("calls asked", 1);
+        self.push(&frame);
+    }
+
+    /// Sends what was appended.
+    pub async fn flush(&mut self) -> Result<(), Fault> {
+        let out = self.take_out();
+        self.send_bytes(&out).await
+    }
+
+    /// Sends bytes as they are, and takes in what comes meanwhile: the program need not read whoever does not.
+    pub async fn send_bytes(&mut self, mut bytes: &[u8]) -> Result<(), Fault> {
+        let deadline = Instant::now() + PATIENCE;
+        while !bytes.is_empty() {
+            let interest = if self.ended {
+                Interest::WRITABLE
+            } else {
+                Interest::READABLE | Interest::WRITABLE
+            };
+            let ready = timeout_at(deadline.into(), self.stream.ready(interest)).await;
+            let Ok(Ok(ready)) = ready else {
+                return Err(self.fault("the program takes nothing more"));
+            };
+            if ready.is_readable() && !self.ended {
+                self.take_in();
+            }
+            if ready.is_writable() {
+                match self.stream.try_write(bytes) {
+                    Ok(written) => {
+                        self.world.count("bytes sent", written as u64);
+                        bytes = &bytes[written..];
+                    }
+                    Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                    Err(error) => return Err(self.fault(format!("cannot send: {error}"))),
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends without reading anything; how many bytes were taken within `time`.
+    pub async fn send_deaf(&mut self, bytes: &[u8], time: Duration) -> usize {
+        let mut written = 0;
+        let deadline = Instant::now() + time;
+        while written < bytes.len() {
+            match timeout_at(deadline.into(), self.stream.write(&bytes[written..])).await {
+                Ok(Ok(more)) => written += more,
+                Ok(Err(_)) | Err(_) => break,
+            }
+        }
+        self.world.count("bytes sent", written as u64);
+        written
+    }
+
+    fn take_in(&mut self) {
+        match self.stream.try_read_buf(&mut self.inbox) {
+            Ok(0) => self.ended = true,
+            Ok(read) => self.world.count("bytes received", read as u64),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+            Err(_) => self.ended = true,
+        }
+    }
+
+    /// Waits for bytes; false if none came until `deadline`.
+    async fn wait_readable(&mut self, deadline: Instant) -> Result<bool, Fault> {
+        match timeout_at(deadline.into(), self.stream.readable()).await {
+            Ok(Ok(())) => {
+                self.take_in();
+                Ok(true)
+            }
+            Ok(Err(error)) => Err(self.fault(format!("cannot read: {error}"))),
+            Err(_) => Ok(false),
+        }
+    }
+
+    /// At most so many bytes of what has come so far, thrown away: a slow reader reads like that.
+    pub fn sip(&mut self, most: usize) -> usize {
+        let mut buffer = vec![0; most];
+        match self.stream.try_read(&mut buffer) {
+            Ok(0) => {
+                self.ended = true;
+                0
+            }
+            Ok(read) => {
+                buffer.truncate(read);
+                self.world.count("bytes received", read as u64);
+                self.inbox.extend_from_slice(&buffer);
+                read
+            }
+            Err(error) => {
+                self.ended |= error.kind() != ErrorKind::WouldBlock;
+                0
+            }
+        }
+    }
+
+    /// Whether the stream has ended, with all of it read.
+    pub fn is_over(&self) -> bool {
+        self.ended
+    }
+
+    /// The next frame within `patience`; responses are settled on the way.
+    pub async fn next(&mut self, patience: Duration) -> Result<Came, Fault> {
+        let deadline = Instant::now() + patience;
+        loop {
+            if let Some(came) = self.take_frame().await? {
+                return Ok(came);
+            }
+            if self.ended {
+                return Ok(Came::End);
+            }
+            if !self.wait_readable(deadline).await? {
+                return Ok(Came::Nothing);
+            }
+        }
+    }
+
+    /// A frame of what has come already.
+    async fn take_frame(&mut self) -> Result<Option<Came>, Fault> {
+        let text = match self.door {
+            Door::Tcp => self.take_line(),
+            Door::Web => match self.take_message().await? {
+                Some((websocket::BINARY, _)) => return Ok(Some(Came::Binary)),
+                message => message.map(|(_, text)| text),
+            },
+        };
+        let Some(text) = text else { return Ok(None) };
+        self.came.keep_bytes(&text);
+        self.world.count("frames received", 1);
+        let frame: Value = serde_json::from_slice(&text).map_err(|error| {
+            self.fault(format!("{} bytes that are no JSON: {error}", text.len()))
+        })?;
+        if frame["op"] != "service_response" {
+            return Ok(Some(Came::Other(frame)));
+        }
+        self.ledger.settle(&frame).map_err(|why| self.fault(why))?;
+        self.world.count("calls answered and checked", 1);
+        Ok(Some(Came::Answer(frame)))
+    }
+
+    /// A text or binary message of what has come already; pings are answered on the way.
+    async fn take_message(&mut self) -> Result<Option<(u8, BytesMut)>, Fault> {
+        while let Some(frame) =
+            websocket::take_frame(&mut self.inbox).map_err(|why| self.fault(why))?
+        {
+            match frame.kind {
+                websocket::TEXT | websocket::BINARY if self.begun.is_none() => {
+                    self.begun = Some((frame.kind, frame.content));
+                }
+                websocket::MORE if self.begun.is_some() => {
+                    if let Some((_, content)) = &mut self.begun {
+                        content.unsplit(frame.content);
+                    }
+                }
+                websocket::PING => {
+                    let mut pong = Vec::new();
+                    websocket::push_frame(&mut pong, websocket::PONG, true, &frame.content, 7);
+                    self.send_bytes(&pong).await?;
+                    self.world.count("pings answered", 1);
+                    continue;
+                }
+                websocket::CLOSE => {
+                    self.ended = true;
+                    continue;
+                }
+                websocket::PONG => continue,
+                kind => return Err(self.fault(format!("a WebSocket frame of kind {kind}"))),
+            }
+            if frame.last {
+                return Ok(self.begun.take());
+            }
+        }
+        Ok(None)
+    }
+
+    fn take_line(&mut self) -> Option<BytesMut> {
+        let Some(at) = self.inbox[self.scanned..]
+            .iter()
+            .position(|byte| *byte == b'\n')
+        else {
+            self.scanned = self.inbox.len();
+            return None;
+        };
+        let mut line = self.inbox.split_to(self.scanned + at + 1);
+        self.scanned = 0;
+        line.truncate(line.len() - 1);
+        if self.inbox.is_empty() {
+            self.inbox = BytesMut::new();
+        }
+        Some(line)
+    }
+
+    /// Stops sending; what is owed still comes.
+    pub async fn shut_down(&mut self) -> Result<(), Fault> {
+        self.stream
+            .shutdown()
+            .await
+            .map_err(|error| self.fault(format!("cannot shut down: {error}")))
+    }
+
+    /// Throws away what came; the number of bytes up to the end, or an error if the end does not come in time.
+    pub async fn swallow(&mut self, patience: Duration) -> Result<usize, Fault> {
+        let deadline = Instant::now() + patience;
+        let mut swallowed = 0;
+        loop {
+            swallowed += self.inbox.len();
+            self.inbox.advance(self.inbox.len());
+            self.scanned = 0;
+            if self.ended {
+                return Ok(swallowed);
+            }
+            if !self.wait_readable(deadline).await? {
+                return Err(self.fault("the program does not end the connection"));
+            }
+        }
+    }
+
+    /// Goes with a reset instead of an orderly end.
+    pub fn reset(self) {
+        let _ = self.stream.set_zero_linger();
+        self.world.count("connections reset", 1);
+    }
+}
