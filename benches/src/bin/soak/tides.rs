@@ -38,6 +38,8 @@ const RESIDENTS: u64 = 2 + Watch::CONNECTIONS;
 
 /// All that a soak has found out.
 pub struct Outcome {
+    /// Whether the program's allocator was told to keep no freed memory.
+    pub give_back: bool,
     /// What was done, by name.
     pub counts: Vec<(&'static str, u64)>,
     /// Faults of clients.
@@ -101,6 +103,7 @@ pub fn soak(path: &str, time: Duration, seed: u64, give_back: bool) -> Result<Ou
     );
     let (counts, faults, lives) = (world.counts(), world.faults(), world.lives.take());
     Ok(Outcome {
+        give_back,
         counts,
         faults,
         before,
