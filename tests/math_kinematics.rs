@@ -626,6 +626,21 @@ fn a_present_orientation_is_kept_to_the_last_digit_where_its_range_is_narrowest(
             assert!(turn(before, after).abs() < 1e-15, "{present:?}: {q:?}");
         }
     }
+    // And so it is near the hole in the middle, with everything folded.
+    let lengths = [2.0, 0.5, 0.6];
+    for hair in [1e-8, 1e-9, 1e-12] {
+        for present in [
+            [0.3, PI, PI - hair],
+            [0.3, PI - hair, PI],
+            [-2.0, PI - hair, hair - PI],
+        ] {
+            let DVec2 { x, y } = forward(&lengths, &present).position;
+            let q = solve(&lengths, &present, &at(x, y)).unwrap();
+            let before = forward(&lengths, &present).orientation;
+            let after = forward(&lengths, &q).orientation;
+            assert!(turn(before, after).abs() < 4e-15, "{present:?}: {q:?}");
+        }
+    }
 }
 
 #[test]

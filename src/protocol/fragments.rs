@@ -318,6 +318,19 @@ mod tests {
     }
 
     #[test]
+    fn what_is_kept_and_since_when_can_be_asked() {
+        let now = Instant::now();
+        let later = now + Duration::from_secs(1);
+        let mut fragments = Fragments::default();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
+        fragments.take(piece("a", 0, 2, "abc"), now).unwrap();
+        fragments.take(piece("b", 0, 2, "de"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(now)));
+        fragments.take(piece("a", 1, 2, "f"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (2, Some(later)));
+    }
+
+    #[test]
     fn what_is_forgotten_makes_room() {
         let now = Instant::now();
         let much = "x".repeat(MAX_FRAME / 2 + 1);
