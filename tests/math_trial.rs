@@ -85,6 +85,18 @@ fn assert_cleared(status: &Status) {
     assert_eq!(status.action_status, ActionStatus::Idle);
 }
 
+#[test]
+fn a_status_goes_by_the_name_that_messages_use() {
+    for (status, name) in [
+        (ActionStatus::Idle, "idle"),
+        (ActionStatus::Active, "active"),
+        (ActionStatus::Reached, "reached"),
+        (ActionStatus::Preempted, "preempted"),
+    ] {
+        assert_eq!((status.name(), &*status.to_string()), (name, name));
+    }
+}
+
 // -------------------------------------------------------------------------------------------------------------- start
 
 #[test]
