@@ -261,7 +261,8 @@ impl Reader {
     }
 
     /// Passes messages on as they are.
-    async fn relay(&self, series: Series) {
+    async fn relay(&mut self, series: Series) {
+        self.speaks_json = true;
         self.shared.unbatched.set(false);
         let from = self.id;
         let _ = self.registry.send(Relay { from, series }).await;
