@@ -116,6 +116,15 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     const SERIES: &str = "{\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{}}\n{\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{}}\n";
     let mut outbox = with(&[SERIES, "next"]);
     assert_eq!(take(&mut outbox, 2), [SERIES, "next"]);
+    // Another topic's throttle does not take it apart.
+    let mut outbox = Outbox::new();
+    outbox.set_throttle(&Arc::from("/b"), Some((Duration::from_secs(1), 1)));
+    outbox.push(
+        &topic(),
+        Bytes::from_static(SERIES.as_bytes()),
+        Instant::now(),
+    );
+    assert_eq!(take(&mut outbox, 2), [SERIES]);
     let mut outbox = with(&[SERIES]);
     assert_eq!(take(&mut outbox, 1), [&SERIES[..SERIES.len() / 2]]);
 }
