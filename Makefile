@@ -25,7 +25,7 @@ test: ## Run every test but those of the page
 
 test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"
-	$(CARGO) test --locked --test wire_faults_slow -- --ignored --test-threads 1
+	$(CARGO) test --locked --test wire_faults_slow -- --ignored --nocapture --test-threads 1
 
 test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
 	@echo "make test-browser: the page in headless Chromium"

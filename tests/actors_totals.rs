@@ -90,6 +90,8 @@ fn the_totals_are_as_the_readme_says_and_leave_room_for_every_client() {
     // What is granted to every client beside the totals.
     let beside = MAX_CONNECTIONS * (2 * FREE_INPUT + MAX_TOPIC_BYTES_SCARCE + 32 * KIB);
     let totals = MAX_RESPONSES_TOTAL + MAX_MESSAGES_TOTAL + MAX_INPUT_TOTAL + MAX_NAMES_TOTAL;
+    #[cfg(feature = "web")]
+    let beside = beside + usize::try_from(pendularm::web::MAX_FILES_TOTAL).unwrap();
     let sum = totals + beside;
     assert!(
         sum + sum / 4 <= MAX_MEMORY,

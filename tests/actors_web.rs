@@ -26,7 +26,8 @@ use pendularm::actors::connection::{Connection, STALL_LIMIT};
 use pendularm::actors::registry::{FinishAll, Nodes, Publish};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::token::Token;
-use pendularm::web::MAX_REQUESTS;
+use pendularm::web::access::Access;
+use pendularm::web::{Door, MAX_FILES_TOTAL, MAX_REQUESTS};
 use serde_json::{Value, json};
 use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
 use tokio::time::{Instant, sleep, timeout};
@@ -137,6 +138,41 @@ fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() 
         let mut byte = [0];
         silent.read_exact(&mut byte).await.unwrap();
         assert_eq!(byte, *b"{");
+    });
+}
+
+/// Two of the longest files are on their way to clients that don't take them: there is no room for a third, until one of them is gone.
+#[test]
+fn files_of_a_report_that_are_being_sent_have_a_total() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let folder = std::env::temp_dir().join(format!("pendularm-files-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        // It has a length, and no content on the disk.
+        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
+        file.set_len(MAX_FILES_TOTAL / 2 - 100_000).unwrap();
+        let door = Door::new(Access::default(), folder.clone());
+        let gate = Arc::new(Gate { token: None, door });
+        let request = HEAD.replace("GET /", "GET /report/a.csv") + "\r\n";
+        let mut deaf = Vec::new();
+        for _ in 0..2 {
+            let mut stream = connect_through(&gateway, &gate, 1024);
+            stream.write_all(request.as_bytes()).await.unwrap();
+            assert_eq!(stream.read_u8().await.unwrap(), b'H');
+            deaf.push(stream);
+        }
+        let mut late = connect_through(&gateway, &gate, WIDE);
+        late.write_all(request.as_bytes()).await.unwrap();
+        let answer = rest(&mut late).await;
+        assert!(answer.starts_with("HTTP/1.1 503 "), "{answer}");
+        deaf.pop();
+        settle().await;
+        let mut next = connect_through(&gateway, &gate, 1024);
+        next.write_all(request.as_bytes()).await.unwrap();
+        let mut status = [0; 12];
+        next.read_exact(&mut status).await.unwrap();
+        assert_eq!(&status, b"HTTP/1.1 200");
+        std::fs::remove_dir_all(&folder).unwrap();
     });
 }
 

@@ -645,3 +645,30 @@ proptest! {
         let _ = opening(&pieces.concat());
     }
 }
+
+#[test]
+fn a_frame_that_is_given_up_is_skipped_to_its_end_and_nothing_of_it_is_kept() {
+    for (begun, rest) in [("{\"a\":[\"x", "y\"]}"), ("nonsense", " and more")] {
+        let mut reader = FrameReader::new();
+        assert!(!reader.give_up() && !reader.is_unfinished());
+        reader.push(b"{} \n");
+        assert!(reader.next().is_some() && reader.next().is_none());
+        assert!(!reader.give_up() && !reader.is_unfinished());
+        assert_eq!(reader.kept(), 0);
+        reader.push(begun.as_bytes());
+        assert!(reader.next().is_none());
+        assert!(reader.is_unfinished());
+        assert_eq!(reader.kept(), begun.len());
+        assert!(reader.give_up());
+        assert_eq!(reader.kept(), 0);
+        assert!(
+            reader.is_unfinished() && !reader.give_up(),
+            "it is being skipped"
+        );
+        reader.push(rest.as_bytes());
+        assert!(reader.next().is_none());
+        reader.push(b"\n{\"b\":1}\n");
+        assert_eq!(reader.next().unwrap().unwrap().text, "{\"b\":1}");
+        assert!(reader.next().is_none() && !reader.is_unfinished());
+    }
+}

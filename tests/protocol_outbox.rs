@@ -595,3 +595,34 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn where_room_is_scarce_fewer_messages_wait_and_never_more_than_usual() {
+    let mut bench = Bench::new();
+    for _ in 0..4 {
+        bench.push("/t", vec![b'x'; 1000]);
+    }
+    bench.outbox.limit_topics(2500);
+    assert_eq!(bench.outbox.topic_bytes(), 4000, "from the next message on");
+    bench.push("/t", vec![b'y'; 1000]);
+    assert_eq!(
+        (bench.outbox.topic_bytes(), bench.outbox.dropped()),
+        (2000, 3)
+    );
+    bench.push("/t", vec![b'z'; 2501]);
+    assert_eq!(
+        (bench.outbox.topic_bytes(), bench.outbox.dropped()),
+        (2000, 4),
+        "too long"
+    );
+    bench.push("/t", vec![b'z'; 2500]);
+    assert_eq!(
+        (bench.outbox.topic_bytes(), bench.outbox.dropped()),
+        (2500, 6)
+    );
+    bench.outbox.limit_topics(2 * MAX_TOPIC_BYTES);
+    bench.push("/t", vec![b'z'; MAX_TOPIC_BYTES + 1]);
+    assert_eq!(bench.outbox.dropped(), 7, "the usual limit holds");
+    bench.push("/t", vec![b'z'; MAX_TOPIC_BYTES]);
+    assert_eq!(bench.outbox.topic_bytes(), MAX_TOPIC_BYTES);
+}

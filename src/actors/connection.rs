@@ -12,39 +12,33 @@ mod due;
 pub mod gate;
 mod reader;
 mod reception;
+mod shared;
 mod transport;
 pub mod unfinished;
 #[cfg(feature = "web")]
 mod web;
 mod writer;
 
-use std::cell::{Cell, RefCell};
-use std::collections::VecDeque;
 use std::net::SocketAddr;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite};
-use tokio::net::tcp::OwnedWriteHalf;
-use tokio::sync::Notify;
 use tokio::task::JoinHandle;
-use tokio::time::{Instant, timeout};
 
 use self::gate::Gate;
 use self::reception::Reception;
+use self::shared::Shared;
 use super::ConnectionId;
-use super::budget::{Claim, Share};
 use super::gauges::Gauges;
-use super::node::SMALL_ANSWER;
 use super::panics::{contain, contained};
-use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Request, Throttle};
+use super::registry::{Connect, Disconnect, Outlets, Refused, Registry, Throttle};
 use crate::options::DEFAULT_BIND;
 use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::outbox::{MAX_TOPIC_BYTES, Outbox};
 
 /// While more bytes of responses than this wait, the client is not read and none of its computations starts.
 pub const MAX_RESPONSES_WAITING: usize = 32 * 1024 * 1024;
@@ -103,48 +97,6 @@ impl<T> Drop for Task<T> {
     }
 }
 
-/// What the actor and its two tasks share; one thread, so plain cells do.
-struct Shared {
-    id: Cell<Option<ConnectionId>>,
-    outbox: RefCell<Outbox>,
-    /// Since when responses have been waiting without a break.
-    responses_since: Cell<Option<Instant>>,
-    computations: RefCell<Computations>,
-    /// Something may be written, or the connection is finishing.
-    outgoing: Notify,
-    /// Something was written or computed: the reader may go on.
-    room: Notify,
-    /// What is owed is still sent; nothing more is read.
-    finishing: Cell<bool>,
-    /// The client speaks something else, or is one too many: it is told so, and its input swallowed.
-    refusing: Cell<bool>,
-    /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
-    unbatched: Cell<bool>,
-    /// Whether frames may be binary: over raw TCP they are text.
-    binary: Cell<bool>,
-    /// The sending half of a plain TCP stream, for those who write without waiting.
-    stream: RefCell<Option<Rc<RefCell<OwnedWriteHalf>>>>,
-    /// The writing task is in the middle of a write, or has to go on with what was [`begun`](Self::begun).
-    writing: Cell<bool>,
-    /// What is left of a frame of which the socket has taken the beginning.
-    begun: Cell<Option<Bytes>>,
-    /// Whether the connection is on the list of those to be written to.
-    due: Cell<bool>,
-    /// When the connection was made.
-    since: Instant,
-    /// Bytes of responses in the outbox, for the registry to look at.
-    backlog: Arc<AtomicUsize>,
-    gauges: Arc<Gauges>,
-}
-
-/// The heavy calls of one connection: one runs, some wait.
-#[derive(Default)]
-struct Computations {
-    waiting: VecDeque<(Request, Share)>,
-    /// Room for a small answer or a failure, and for the request itself, while one runs.
-    running: Option<Share>,
-}
-
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
     /// Starts the actor for `stream` in the present system; nothing is asked of the client first.
     pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
@@ -159,25 +111,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         registry: Addr<Registry>,
         gauges: Arc<Gauges>,
     ) -> Addr<Self> {
-        let shared = Rc::new(Shared {
-            id: Cell::new(None),
-            outbox: RefCell::new(Outbox::new()),
-            responses_since: Cell::new(None),
-            computations: RefCell::default(),
-            outgoing: Notify::new(),
-            room: Notify::new(),
-            finishing: Cell::new(false),
-            refusing: Cell::new(false),
-            unbatched: Cell::new(false),
-            binary: Cell::new(false),
-            stream: RefCell::default(),
-            writing: Cell::new(false),
-            begun: Cell::default(),
-            due: Cell::new(false),
-            since: Instant::now(),
-            backlog: Arc::default(),
-            gauges,
-        });
+        let shared = Rc::new(Shared::new(gauges));
         Self {
             stream: Some(stream),
             registry,
@@ -361,128 +295,5 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             tracing::error!(%panic, "a client's actor failed; its connection ends");
             ctx.stop();
         }
-    }
-}
-
-impl Shared {
-    /// Puts a response or a status into the outbox.
-    fn send(&self, frame: Bytes) {
-        self.send_superseding(frame, &[]);
-    }
-
-    /// The same; messages of `topics` that throttling still holds back are discarded, being older than the response.
-    fn send_superseding(&self, frame: Bytes, topics: &[&str]) {
-        let mut outbox = self.outbox.borrow_mut();
-        if outbox.response_bytes() == 0 {
-            self.responses_since.set(Some(Instant::now()));
-        }
-        outbox.push_response(frame, topics);
-        self.backlog
-            .store(outbox.response_bytes(), Ordering::Relaxed);
-        self.outgoing.notify_one();
-    }
-
-    /// The client may be read: neither its responses nor its computations pile up.
-    fn may_read(&self) -> bool {
-        self.may_compute() && self.computations.borrow().waiting.len() < MAX_COMPUTATIONS_WAITING
-    }
-
-    /// Another computation may start: its answer would not come on top of too many.
-    fn may_compute(&self) -> bool {
-        self.outbox.borrow().response_bytes() <= MAX_RESPONSES_WAITING
-    }
-
-    /// So many bytes are on their way to the client: there may be room again.
-    fn written(&self, bytes: usize, registry: &Addr<Registry>) {
-        let mut outbox = self.outbox.borrow_mut();
-        outbox.written(bytes);
-        self.backlog
-            .store(outbox.response_bytes(), Ordering::Relaxed);
-        if outbox.response_bytes() == 0 {
-            self.responses_since.set(None);
-        }
-        drop(outbox);
-        self.room.notify_one();
-        self.start_computation(registry);
-    }
-
-    /// Bytes of topic messages that may wait for this client, now that one of `length` bytes comes. Where all clients together have
-    /// much waiting, this one may keep the newest message; where they have nearly all, only a little.
-    fn topic_room(&self, length: usize) -> usize {
-        let messages = &self.gauges.totals().messages;
-        if messages.has_room(Claim::Heavy) {
-            MAX_TOPIC_BYTES
-        } else if messages.has_room(Claim::Last) {
-            length.max(MAX_TOPIC_BYTES_SCARCE)
-        } else {
-            MAX_TOPIC_BYTES_SCARCE
-        }
-    }
-
-    /// Waits for room for the answer to a frame of so many bytes, and for what is kept of the frame until then. A small frame of a
-    /// client without backlog finds some as long as every client keeps to that.
-    async fn room_for(&self, length: usize) -> Share {
-        let responses = &self.gauges.totals().responses;
-        let bytes = SMALL_ANSWER + length + length / 2;
-        loop {
-            let is_modest = length <= SMALL_FRAME && self.outbox.borrow().response_bytes() == 0;
-            let claim = if is_modest {
-                Claim::Last
-            } else {
-                Claim::Ordinary
-            };
-            if let Some(share) = responses.take(bytes, claim) {
-                return share;
-            }
-            if self.finishing.get() {
-                return responses.note(0);
-            }
-            let _ = timeout(LOOK_AGAIN, self.room.notified()).await;
-        }
-    }
-
-    /// Queues a heavy call behind the connection's others.
-    fn enqueue_computation(&self, request: Request, room: Share, registry: &Addr<Registry>) {
-        let mut computations = self.computations.borrow_mut();
-        computations.waiting.push_back((request, room));
-        drop(computations);
-        self.start_computation(registry);
-    }
-
-    /// Starts the next computation if none runs and its answer would find room.
-    fn start_computation(&self, registry: &Addr<Registry>) {
-        let mut computations = self.computations.borrow_mut();
-        if computations.running.is_some() || !self.may_compute() {
-            return;
-        }
-        if let Some((request, room)) = computations.waiting.pop_front() {
-            computations.running = Some(room);
-            registry.do_send(request);
-        }
-    }
-
-    /// True while a computation runs or waits.
-    fn is_computing(&self) -> bool {
-        let computations = self.computations.borrow();
-        computations.running.is_some() || !computations.waiting.is_empty()
-    }
-
-    /// Nobody waits for the computations any more.
-    fn abandon_computations(&self) {
-        *self.computations.borrow_mut() = Computations::default();
-    }
-
-    /// Waits for that.
-    async fn finished(&self) {
-        while !self.finishing.get() {
-            self.outgoing.notified().await;
-        }
-    }
-
-    /// Nothing more is read; what is owed is sent.
-    fn finish(&self) {
-        self.finishing.set(true);
-        self.outgoing.notify_one();
-        self.room.notify_one();
     }
 }

@@ -344,6 +344,21 @@ mod tests {
         assert_eq!(fragments.bytes, much.len());
     }
 
+    #[test]
+    fn what_is_kept_is_known_by_its_bytes_and_its_oldest() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
+        fragments.take(piece("a", 0, 2, "one"), now).unwrap();
+        let later = now + Duration::from_secs(1);
+        fragments.take(piece("b", 0, 2, "three"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (8, Some(now)));
+        fragments.forget_old(now + MAX_AGE);
+        assert_eq!(fragments.bytes(), 8);
+        fragments.forget_old(later + MAX_AGE);
+        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(later)));
+    }
+
     /// Characters of one to four bytes, cut at every size: together again they are what they were.
     #[test]
     fn a_frame_in_pieces_is_the_frame_again() {

@@ -34,8 +34,13 @@ use self::access::Access;
 
 /// Requests that are read or answered at once. A browser opens six connections; the rest is for other people's.
 pub const MAX_REQUESTS: usize = 64;
+/// Bytes of files of the report that are kept at once while they are sent: two of the longest, or the whole of one report.
+pub const MAX_FILES_TOTAL: u64 = 64 * 1024 * 1024;
 /// Folder of the report, unless another is named.
 pub const DEFAULT_REPORT: &str = "report";
+
+/// Bytes that room for files is counted in.
+pub(crate) const ROOM: u64 = 64 * 1024;
 
 /// What is served over HTTP, and to whom.
 #[derive(Debug)]
@@ -46,6 +51,8 @@ pub struct Door {
     pub report: PathBuf,
     /// Places for requests.
     pub(crate) places: Arc<Semaphore>,
+    /// Room for files, in [`ROOM`].
+    pub(crate) room: Arc<Semaphore>,
 }
 
 impl Door {
@@ -56,6 +63,9 @@ impl Door {
             access,
             report,
             places: Arc::new(Semaphore::new(MAX_REQUESTS)),
+            room: Arc::new(Semaphore::new(
+                usize::try_from(MAX_FILES_TOTAL / ROOM).unwrap_or(1),
+            )),
         }
     }
 }

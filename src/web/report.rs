@@ -72,18 +72,29 @@ impl Name {
         Some(Self { path, kind })
     }
 
-    /// Reads the file from `folder`; `None` if there is none to be had. It may block for as long as the disk takes.
-    #[must_use]
-    pub fn read(&self, folder: &Path) -> Option<File> {
+    /// The file in `folder`, and its length; `None` if there is none to be had, or it is longer than [`MAX_FILE`].
+    fn find(&self, folder: &Path) -> Option<(PathBuf, u64)> {
         let folder = folder.canonicalize().ok()?;
         let path = folder.join(&self.path).canonicalize().ok()?;
         if !path.starts_with(&folder) {
             return None;
         }
         // Asked first: opening what is no file, a pipe say, could wait for ever.
-        if !path.metadata().ok()?.is_file() {
-            return None;
-        }
+        let about = path.metadata().ok()?;
+        let fits = about.is_file() && about.len() <= MAX_FILE;
+        fits.then_some((path, about.len()))
+    }
+
+    /// The length of the file in `folder`, as [`Name::read`] would read it now.
+    #[must_use]
+    pub fn length(&self, folder: &Path) -> Option<u64> {
+        self.find(folder).map(|(_, length)| length)
+    }
+
+    /// Reads the file from `folder`; `None` if there is none to be had. It may block for as long as the disk takes.
+    #[must_use]
+    pub fn read(&self, folder: &Path) -> Option<File> {
+        let (path, _) = self.find(folder)?;
         let mut bytes = Vec::new();
         let file = std::fs::File::open(path).ok()?;
         file.take(MAX_FILE + 1).read_to_end(&mut bytes).ok()?;

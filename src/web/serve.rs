@@ -4,17 +4,19 @@
 //! once; a client that does neither costs a place for a few seconds.
 
 use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::sync::OwnedSemaphorePermit;
 use tokio::time::{timeout, timeout_at};
 
 use super::access::Refusal;
 use super::authority::Authority;
 use super::head::{self, HeadError, MAX_HEAD, Request};
 use super::response::{Response, Status};
-use super::{Door, page, report, upgrade};
+use super::{Door, ROOM, page, report, upgrade};
 
 /// How long a client may take no byte of an answer.
 pub const TAKE_TIME: Duration = Duration::from_secs(10);
@@ -64,9 +66,13 @@ pub async fn serve<S: AsyncRead + AsyncWrite + Unpin>(
             return None;
         }
     };
-    let response = match judge(&request, door, local) {
-        Outcome::Answer(response) => response,
-        Outcome::Report(name, cookie) => with_cookie(read_report(name, door).await, cookie),
+    // What a file takes is given back once it has been sent.
+    let (response, _room) = match judge(&request, door, local) {
+        Outcome::Answer(response) => (response, None),
+        Outcome::Report(name, cookie) => {
+            let (response, room) = read_report(name, door).await;
+            (with_cookie(response, cookie), room)
+        }
         Outcome::Upgrade(head) => {
             let sent = take(stream.write_all(&head)).await;
             return sent.map(|()| behind.freeze());
@@ -185,16 +191,28 @@ fn find(request: &Request, own: &Authority) -> Outcome {
     Outcome::Answer(Response::text(Status::NotFound, sentence))
 }
 
+const TOO_MANY_FILES: &str = "too many files of the report are being sent; try again";
 const NO_SUCH_FILE: &str = "there is no such file in the report; the report is at /report/, if there is one. It is read from \
      the folder that --report names";
 
-/// Reads a file where waiting for the disk holds up nobody.
-async fn read_report(name: report::Name, door: &Door) -> Response {
-    let folder = door.report.clone();
-    let read = tokio::task::spawn_blocking(move || name.read(&folder)).await;
-    match read {
-        Ok(Some(file)) => Response::file(file.kind, report::POLICY, file.bytes),
-        _ => Response::text(Status::NotFound, NO_SUCH_FILE),
+/// Reads a file where waiting for the disk holds up nobody, if there is room for it.
+async fn read_report(name: report::Name, door: &Door) -> (Response, Option<OwnedSemaphorePermit>) {
+    let (folder, room) = (door.report.clone(), Arc::clone(&door.room));
+    let read = tokio::task::spawn_blocking(move || {
+        let room_needed = name.length(&folder)? / ROOM + 1;
+        let taken = room.try_acquire_many_owned(u32::try_from(room_needed).ok()?);
+        let Ok(taken) = taken else {
+            return Some(None);
+        };
+        Some(Some((name.read(&folder)?, taken)))
+    });
+    match read.await {
+        Ok(Some(Some((file, taken)))) => {
+            let response = Response::file(file.kind, report::POLICY, file.bytes);
+            (response, Some(taken))
+        }
+        Ok(Some(None)) => (Response::text(Status::Unavailable, TOO_MANY_FILES), None),
+        _ => (Response::text(Status::NotFound, NO_SUCH_FILE), None),
     }
 }
 
