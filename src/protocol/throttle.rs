@@ -298,6 +298,28 @@ mod tests {
         }
     }
 
+    /// Setting one topic's throttle again and again has the index of dues rebuilt.
+    #[test]
+    fn what_is_due_is_known_after_its_index_was_rebuilt() {
+        let [calm, busy] = ["/calm", "/busy"].map(Arc::<str>::from);
+        let second = Duration::from_secs(1);
+        let now = Instant::now();
+        let mut throttles = Throttles::default();
+        for topic in [&calm, &busy] {
+            throttles.set(topic, Some((second, 1)));
+            for number in 0..2 {
+                let _ = throttles.offer(topic, number, Bytes::from_static(b"x"), now);
+            }
+        }
+        for _ in 0..10 * SLACK {
+            throttles.set(&busy, Some((second, 1)));
+        }
+        throttles.discard(&busy);
+        assert_eq!(throttles.next_release(), Some(now + second));
+        assert!(throttles.release(now + second).is_some());
+        assert_eq!(throttles.next_release(), None);
+    }
+
     /// Whichever way messages leave, what is counted is what is there.
     #[test]
     fn messages_and_their_bytes_are_counted_as_long_as_they_are_held_back() {
