@@ -3,7 +3,7 @@
 //! A frame is one JSON object. It ends where its braces and brackets balance outside strings, or at a newline. Anything else
 //! runs to the newline and is one malformed frame.
 //!
-//! Messages that need no reading (see [`series`](super::series)) are taken as they are.
+//! Messages that need no reading (see [`series`]) are taken as they are.
 //!
 //! **Invariant:** no byte is looked at more than twice, and no more is kept than one unfinished frame and what was last pushed.
 

@@ -217,7 +217,7 @@ pub fn publish_raw(topic: &str, msg: &RawValue) -> Bytes {
         .end()
 }
 
-/// A frame that [`publish`] has made for `topic`, or a [series](super::series) of them, for those who know it by another spelling.
+/// A frame that [`publish`] has made for `topic`, or a [series] of them, for those who know it by another spelling.
 #[must_use]
 pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
     if topic == spelling {

@@ -87,7 +87,7 @@ pub fn opening(first: &[u8]) -> Opening {
 /// Whether a malformed line is one that every request of a browser has in its head: `start` is how the line begins.
 ///
 /// A page may choose its request's method where browsers think that it speaks to its own server, which a hostile name server
-/// makes them think. Then the opening is none of [`METHODS`], but the head comes before the body all the same, and has a line
+/// makes them think. Then the opening is none of `METHODS`, but the head comes before the body all the same, and has a line
 /// that names the host.
 #[must_use]
 pub fn is_host_line(start: &str) -> bool {

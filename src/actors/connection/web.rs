@@ -254,7 +254,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
     }
 }
 
-/// What a peer is told whose message takes longer than [`FRAME_TIME`](super::unfinished::FRAME_TIME).
+/// What a peer is told whose message takes longer than [`FRAME_TIME`].
 const TOO_SLOW: &str = "a message that has begun must be complete within a minute";
 /// What a peer is told for whose message there is no room.
 const NO_ROOM: (CloseCode, &str) = (
