@@ -169,7 +169,7 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
     Some(at + word.len())
 }
 
-/// Past a number without an exponent.
+/// Past a number without an exponent; before an exponent, which nothing that may follow a value begins with.
 fn number(bytes: &[u8], start: usize) -> Option<usize> {
     let mut at = start;
     if *bytes.get(at)? == b'-' {
@@ -188,8 +188,7 @@ fn number(bytes: &[u8], start: usize) -> Option<usize> {
             return None;
         }
     }
-    let is_plain = !matches!(bytes.get(at)?, b'e' | b'E') && at - start <= MAX_DIGITS;
-    is_plain.then_some(at)
+    (at - start <= MAX_DIGITS).then_some(at)
 }
 
 /// Eight copies of a byte.
