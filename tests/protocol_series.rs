@@ -319,3 +319,15 @@ fn object((values, space): (Vec<String>, &'static str)) -> String {
         .collect();
     format!("{{{space}{}}}", members.join(&format!(",{space}")))
 }
+
+#[test]
+fn what_closes_another_bracket_than_was_opened_is_no_series() {
+    for msg in [
+        "{\"a\":{\"b\":1]}",
+        "{\"a\":[1}}",
+        "{\"a\":[1}",
+        "{\"a\":1]",
+    ] {
+        assert_eq!(series(line("/x", msg).as_bytes()), None, "{msg}");
+    }
+}
