@@ -616,14 +616,15 @@ fn a_present_orientation_at_the_very_edge_of_what_is_admissible_is_kept() {
 fn a_present_orientation_is_kept_to_the_last_digit_where_its_range_is_narrowest() {
     // Near full stretch the range of orientations is as narrow as the root of what is left of the reach: its ends,
     // though right to every digit of the distance, are good to 1e-8 rad only.
-    let lengths = [1.0, 0.7, 0.5];
-    for hair in [1e-7, 1e-8, 1e-9, 1e-12] {
-        for present in [[0.3, 0.0, hair], [0.3, hair, 0.0], [-2.0, hair, -hair]] {
-            let DVec2 { x, y } = forward(&lengths, &present).position;
-            let q = solve(&lengths, &present, &at(x, y)).unwrap();
-            let before = forward(&lengths, &present).orientation;
-            let after = forward(&lengths, &q).orientation;
-            assert!(turn(before, after).abs() < 1e-15, "{present:?}: {q:?}");
+    for lengths in [[1.0, 0.7, 0.5], [1.0, 0.7, 2.5]] {
+        for hair in [1e-7, 1e-8, 1e-9, 1e-12] {
+            for present in [[0.3, 0.0, hair], [0.3, hair, 0.0], [-2.0, hair, -hair]] {
+                let DVec2 { x, y } = forward(&lengths, &present).position;
+                let q = solve(&lengths, &present, &at(x, y)).unwrap();
+                let before = forward(&lengths, &present).orientation;
+                let after = forward(&lengths, &q).orientation;
+                assert!(turn(before, after).abs() < 1e-15, "{present:?}: {q:?}");
+            }
         }
     }
     // And so it is near the hole in the middle, with everything folded.
