@@ -11,7 +11,7 @@ cd "$(dirname "$0")/.."
 
 seconds=${TIME:-60}
 folder=${CARGO_TARGET_DIR:-target}/fuzz
-all="frame op fields expression inverse_kinematics simulation outbox cbor http connection websocket runtime"
+all="frame op fields expression inverse_kinematics simulation study outbox cbor http connection websocket runtime"
 
 say() { echo "fuzz: $*"; }
 fail() { echo "fuzz: $*" >&2; exit 1; }
@@ -32,7 +32,7 @@ for target in ${*:-$all}; do
     mkdir -p "$folder/corpus/$target" "$folder/failures/$target"
     log=$folder/$target.log
     case $target in
-        inverse_kinematics | simulation | outbox) words=() ;;
+        inverse_kinematics | simulation | study | outbox) words=() ;;
         expression | http) words=(-dict="fuzz/dictionaries/$target.dict") ;;
         *) words=(-dict="fuzz/dictionaries/json.dict") ;;
     esac

@@ -28,6 +28,10 @@ use crate::stage::{Manner, Stage, run, run_apart, scarce};
 /// What happens in one execution, and to how many clients.
 const MAX_STEPS: usize = 48;
 const CLIENTS: usize = 3;
+/// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time: an arm of tiny timesteps
+/// computes for five milliseconds of the processor's in every one.
+const ARM_TIME: u16 = 200;
+const ARM_WAIT: u16 = 48;
 /// Longest that a caller lets a provider take; all is answered by then.
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(66);
 /// Every id of a call begins so; garbage must not, or it would be a call.
@@ -203,6 +207,8 @@ struct Session {
     cast: Cast,
     stage: Stage,
     players: Vec<Player>,
+    /// What is left of [`ARM_TIME`].
+    left: u16,
     /// Calls and messages so far: their numbers tell them apart.
     calls: u64,
     messages: u64,
@@ -248,6 +254,7 @@ impl Session {
             cast,
             stage,
             players: Vec::new(),
+            left: ARM_TIME,
             calls: 0,
             messages: 0,
         };
@@ -314,8 +321,9 @@ impl Session {
             Step::Wait(milliseconds) => {
                 let milliseconds = match self.cast {
                     Cast::Stub => *milliseconds,
-                    Cast::Arm => milliseconds % 256,
+                    Cast::Arm => (milliseconds % ARM_WAIT).min(self.left),
                 };
+                self.left -= milliseconds.min(self.left);
                 self.pass(Duration::from_millis(milliseconds.into())).await;
             }
             Step::Pause { client, paused } => self.player(*client).client.pause(*paused),
@@ -515,7 +523,7 @@ impl Session {
         );
         let timeout = match self.cast {
             Cast::Stub => timeout,
-            Cast::Arm => Some(timeout.unwrap_or_default() % 256),
+            Cast::Arm => Some(timeout.unwrap_or_default() % ARM_WAIT),
         };
         let seconds = timeout.map(|ms| f64::from(ms) / 1000.0);
         put(&mut frame, "timeout", seconds.as_ref());
@@ -566,7 +574,7 @@ impl Session {
         self.stage.release_all();
         let mut waited = Duration::ZERO;
         while waited < LONGEST_TIMEOUT + Duration::from_secs(5) && !self.all_answered() {
-            let step = Duration::from_millis(if waited.is_zero() { 10 } else { 1000 });
+            let step = self.patience(1000, waited);
             self.pass(step).await;
             self.stage.release_all();
             self.hear();
@@ -585,7 +593,7 @@ impl Session {
         let limit = STALL_LIMIT + ANSWERS_OWED + 2 * LINGER + Duration::from_secs(5);
         let mut waited = Duration::ZERO;
         while waited < limit && !self.has_emptied() {
-            let step = Duration::from_millis(if waited.is_zero() { 10 } else { 250 });
+            let step = self.patience(250, waited);
             sleep(step).await;
             waited += step;
         }
@@ -595,6 +603,12 @@ impl Session {
         self.hear();
         let left = (self.stage.gauges.connections(), self.stage.gauges.totals());
         assert!(self.has_emptied(), "left when all have left: {left:?}");
+    }
+
+    /// How long to wait before looking again.
+    fn patience(&self, milliseconds: u64, waited: Duration) -> Duration {
+        let soon = waited.is_zero() || self.cast == Cast::Arm;
+        Duration::from_millis(if soon { 10 } else { milliseconds })
     }
 
     fn has_emptied(&self) -> bool {
