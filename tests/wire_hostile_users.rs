@@ -199,10 +199,10 @@ fn a_guessed_id_answers_nobodys_call_but_ones_own() {
     let mut thief = runtime.connect();
     provide(&mut provider, "/s");
     provide(&mut thief, "/t");
-    caller.send(&json!({"op": "call_service", "service": "/s", "id": "mine"}));
+    caller.send(&json!({"op": "call_service", "service": "/s", "id": "mine", "timeout": 600}));
     let call = forwarded(&mut provider);
     // The thief sees how the runtime numbers calls, and is the provider of another that is outstanding.
-    caller.send(&json!({"op": "call_service", "service": "/t", "id": "other"}));
+    caller.send(&json!({"op": "call_service", "service": "/t", "id": "other", "timeout": 600}));
     let seen = forwarded(&mut thief)["id"].as_str().unwrap().to_owned();
     let (prefix, number) = seen.rsplit_once(':').expect("a prefix and a number");
     let number: u64 = number.parse().unwrap();
@@ -260,7 +260,7 @@ fn an_answer_after_the_timeout_or_a_second_one_reaches_nobody() {
     let late = forwarded(&mut provider);
     assert_eq!(caller.receive()["result"], false);
     // The same caller waits again, under the same id of its own.
-    caller.send(&json!({"op": "call_service", "service": "/s", "id": 1}));
+    caller.send(&json!({"op": "call_service", "service": "/s", "id": 1, "timeout": 600}));
     let call = forwarded(&mut provider);
     provider.send(&response(&late, json!({"late": true})));
     error(&mut provider);
@@ -384,7 +384,7 @@ fn no_frame_holds_another_for_readers_that_end_lines_at_a_carriage_return() {
     assert_eq!(list[0]["topic"], "/joint_states");
 
     victim.send_bytes(
-        b"{\"op\":\"call_service\",\"service\":\"/s\",\"id\":7,\"args\":{\"a\":\r[\r]}}\n",
+        b"{\"op\":\"call_service\",\"service\":\"/s\",\"id\":7,\"timeout\":600,\"args\":{\"a\":\r[\r]}}\n",
     );
     let call = forger.receive_line();
     assert!(!call.contains('\r'), "{call:?}");
