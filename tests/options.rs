@@ -284,6 +284,8 @@ fn the_help_shows_every_option_with_its_variable_and_default() {
         );
     }
     assert!(help.contains("--version"), "{help}");
+    let usage = "\nUsage: pendularm [OPTIONS] [COMMAND]\n";
+    assert!(help.contains(usage), "{help}");
     let build = if cfg!(feature = "web") {
         "This build has the web feature"
     } else {
