@@ -11,7 +11,7 @@ cd "$(dirname "$0")/.."
 
 seconds=${TIME:-60}
 folder=${CARGO_TARGET_DIR:-target}/fuzz
-all="frame op fields expression inverse_kinematics simulation study outbox cbor http connection websocket runtime"
+all="frame series op fields expression inverse_kinematics simulation study outbox cbor http connection websocket runtime"
 
 say() { echo "fuzz: $*"; }
 fail() { echo "fuzz: $*" >&2; exit 1; }

@@ -20,7 +20,7 @@ const TOPICS: [&str; 4] = ["/a", "/b", "/c", "/d"];
 
 #[derive(Debug, Arbitrary)]
 enum Step {
-    /// A message of that many sixteenths of all there is room for.
+    /// A message of that many sixteenths of all there is room for, and some more; none is empty.
     Push {
         topic: u8,
         sixteenths: u8,
@@ -69,7 +69,7 @@ fuzz_target!(|steps: Vec<Step>| {
             } => {
                 let topic = usize::from(topic) % TOPICS.len();
                 let length =
-                    usize::from(sixteenths % 17) * (MAX_TOPIC_BYTES / 16) + usize::from(more);
+                    usize::from(sixteenths % 17) * (MAX_TOPIC_BYTES / 16) + usize::from(more) + 1;
                 let frame = zeros.slice(..length.min(zeros.len()));
                 outbox.push(&topics[topic], frame.clone(), now);
                 model.push(topic, frame.len(), now);
