@@ -54,6 +54,29 @@ fn a_call_waits_ten_seconds_for_its_provider_or_as_long_as_its_caller_says() {
     });
 }
 
+/// Where the process has stood still, answer and timeout are heard of at the same moment, and the answer may be the first.
+#[test]
+fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_since() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        caller.call("/s", 1).await;
+        let call = provider.receive().await;
+        provider
+            .send(
+                json!({"op": "service_response", "service": "/s", "id": call["id"],
+                "values": {}, "result": true}),
+            )
+            .await;
+        tokio::time::advance(DEFAULT_TIMEOUT + Duration::from_secs(1)).await;
+        let response = caller.receive().await;
+        assert_eq!(response["result"], false, "{response}");
+        assert!(response["status"].as_str().unwrap().contains("timeout"));
+        assert_eq!(provider.receive().await["level"], "error");
+    });
+}
+
 #[test]
 fn an_answer_in_time_stops_the_clock() {
     run(async {

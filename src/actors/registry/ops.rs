@@ -8,6 +8,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::value::RawValue;
 use tokio::sync::oneshot;
+use tokio::time::{Instant, sleep_until};
 
 use super::census::Use;
 use super::refusal::Refusal;
@@ -393,9 +394,9 @@ impl Registry {
         let share = take(SMALL_ANSWER + 2 * id_bytes)?;
         client.pass(take(frame.len())?.cover(frame), None);
         let registry = ctx.address();
-        let patience = call.timeout.unwrap_or(DEFAULT_TIMEOUT);
+        let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
         let timer = actix_rt::spawn(async move {
-            actix_rt::time::sleep(patience).await;
+            sleep_until(deadline).await;
             registry.do_send(TimedOut(number));
         });
         self.services.remember(
@@ -405,6 +406,7 @@ impl Registry {
                 id: origin.id.clone(),
                 provider: provider.connection,
                 service: service.into(),
+                deadline,
                 timer: timer.abort_handle(),
                 share,
             },

@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use serde_json::value::RawValue;
 use tokio::task::AbortHandle;
+use tokio::time::Instant;
 
 use crate::actors::ConnectionId;
 use crate::actors::budget::Share;
@@ -22,6 +23,8 @@ pub(super) struct Forwarded {
     pub(super) provider: ConnectionId,
     /// The service's name as the caller spells it.
     pub(super) service: Box<str>,
+    /// When the caller's patience ends. The timer may be heard of later than that, where the process has stood still.
+    pub(super) deadline: Instant,
     pub(super) timer: AbortHandle,
     /// Room for a small answer, or a failure.
     pub(super) share: Share,
@@ -100,6 +103,9 @@ impl Services {
         let call = self.outstanding.get(&number)?;
         // One id a call: `+1` and `01` are numbers too.
         if id != Self::call_id(number) {
+            return None;
+        }
+        if Instant::now() > call.deadline {
             return None;
         }
         if call.provider != provider || names::absolute(&call.service) != names::absolute(service) {

@@ -12,8 +12,9 @@ use crate::world::Deeds;
 pub const LATE: f64 = 0.1;
 /// How far simulation time may be off wall time: a thousandth.
 pub const RATE: f64 = 0.001;
-/// How long after a reset or a pause its traces may still be read: the reader itself may be late.
-const TRACE: Duration = Duration::from_millis(500);
+/// How long after a reset or a pause its traces may still be read: where the machine stands still the reader is late too,
+/// and has them all at once then. A clock that has really stopped stands for longer.
+const TRACE: Duration = Duration::from_secs(2);
 /// How often a stamp may be repeated: a message that is late by almost a period is followed at once by the next, and no
 /// step may be due between them.
 const STILL: usize = 1;
