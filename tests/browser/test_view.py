@@ -28,7 +28,10 @@ class View:
 
     def test_every_plot_shows_every_joint(self):
         # Free swing moves all joints, so that no line covers another.
-        self.page.until("Number(document.querySelector('#sim-time').textContent) > 1.5")
+        # What is drawn begins when the page has connected, which may be late: so two seconds from then on.
+        shown = "Number(document.querySelector('#sim-time').textContent)"
+        self.page.until(f"{shown} > 0")
+        self.page.until(f"{shown} > {self.page.run(shown) + 2}")
         self.runtime.call("/arm_sim/pause", data=True)
         for plot in ("position", "velocity", "phase"):
             picture = self.image(f"#plot-{plot}")
