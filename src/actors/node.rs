@@ -25,9 +25,6 @@ use crate::protocol::op::Arguments;
 pub const SMALL_ANSWER: usize = 16 * 1024;
 /// How long a computation waits for room that is taken by answers which wait for their clients, before it is refused.
 pub const ROOM_TIME: Duration = Duration::from_secs(2);
-/// What a caller is told whose answer found no room.
-const NO_ROOM: &str =
-    "too many bytes of answers wait for clients that do not read; try again later";
 
 /// A call of one of the runtime's own services. From the registry; answered through `reply`.
 #[derive(Message)]
@@ -240,7 +237,10 @@ impl Reply {
         }
         match budget.take(frame.len(), Claim::Ordinary) {
             Some(share) => share.cover(frame),
-            None => budget.count(messages::failure(&self.name, self.id.as_deref(), NO_ROOM)),
+            None => {
+                let why = NoRoom::Now.to_string();
+                budget.count(messages::failure(&self.name, self.id.as_deref(), &why))
+            }
         }
     }
 

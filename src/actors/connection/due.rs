@@ -94,7 +94,7 @@ impl Shared {
     fn write_at_once(&self, frame: &Bytes) -> Option<usize> {
         let stream = self.stream.borrow();
         let stream = stream.as_ref()?;
-        if self.writing.get() || self.unbatched.get() || frame.len() > BATCH_BYTES {
+        if !self.may_write() || frame.len() > BATCH_BYTES {
             return None;
         }
         let cost = 1 + frame.len() / LONG;
@@ -107,6 +107,11 @@ impl Shared {
             return None;
         }
         stream.borrow().try_write(frame).ok()
+    }
+
+    /// The writing task is not in the middle of a frame, and the client wants no write for each.
+    fn may_write(&self) -> bool {
+        !self.writing.get() && !self.unbatched.get()
     }
 
     /// The writing task goes on: with what is left of a frame that was begun, if there is such.
@@ -181,9 +186,8 @@ impl Work {
 fn write(shared: &Shared) -> usize {
     let stream = shared.stream.borrow();
     let mut outbox = shared.outbox.borrow_mut();
-    let may = !shared.writing.get() && !shared.unbatched.get();
     let written = match (stream.as_ref(), outbox.ready()) {
-        (Some(stream), Some(frames)) if may => try_write(&stream.borrow(), frames),
+        (Some(stream), Some(frames)) if shared.may_write() => try_write(&stream.borrow(), frames),
         _ => None,
     };
     let rest = written.and_then(|written| outbox.taken(written));

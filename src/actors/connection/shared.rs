@@ -203,7 +203,7 @@ impl Shared {
         *self.computations.borrow_mut() = Computations::default();
     }
 
-    /// Waits for that.
+    /// Waits until nothing more is read.
     pub(super) async fn finished(&self) {
         while !self.finishing.get() {
             self.outgoing.notified().await;

@@ -41,7 +41,7 @@ pub(super) enum Refusal {
         "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
     )]
     CallerBusy(String),
-    #[error("too many bytes of answers wait for clients that do not read; try again later")]
+    #[error("{}", crate::actors::budget::NoRoom::Now)]
     NoRoom,
     #[error("too many topics and services are registered by all clients together; try again later")]
     TooManyNames,
