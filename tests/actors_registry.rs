@@ -63,12 +63,7 @@ fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_s
         provider.provide("/s").await;
         caller.call("/s", 1).await;
         let call = provider.receive().await;
-        provider
-            .send(
-                json!({"op": "service_response", "service": "/s", "id": call["id"],
-                "values": {}, "result": true}),
-            )
-            .await;
+        provider.answer(&call, json!({})).await;
         tokio::time::advance(DEFAULT_TIMEOUT + Duration::from_secs(1)).await;
         let response = caller.receive().await;
         assert_eq!(response["result"], false, "{response}");
@@ -86,12 +81,7 @@ fn an_answer_in_time_stops_the_clock() {
         caller.call("/s", 1).await;
         let call = provider.receive().await;
         sleep(Duration::from_secs(9)).await;
-        provider
-            .send(
-                json!({"op": "service_response", "service": "/s", "id": call["id"],
-                "values": {}, "result": true}),
-            )
-            .await;
+        provider.answer(&call, json!({})).await;
         assert_eq!(caller.receive().await["result"], true);
         assert!(caller.hears_nothing_for(Duration::from_secs(60)).await);
     });
@@ -108,12 +98,7 @@ fn a_caller_that_goes_leaves_no_call_behind() {
         drop(caller);
         sleep(Duration::from_secs(60)).await;
         assert_eq!(gateway.gauges.connections(), 1);
-        provider
-            .send(
-                json!({"op": "service_response", "service": "/s", "id": call["id"],
-                "values": {}, "result": true}),
-            )
-            .await;
+        provider.answer(&call, json!({})).await;
         assert_eq!(
             provider.receive().await["level"],
             "error",

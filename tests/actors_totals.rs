@@ -217,10 +217,7 @@ fn what_clients_call_from_one_another_counts_too() {
         // An answer that is longer than the room left is refused; the caller is told.
         let others = total.note(limit / 4 * 3 - total.used() - 64 * KIB);
         provider
-            .send(
-                json!({"op": "service_response", "service": "/s", "id": call["id"],
-                "values": {"x": "x".repeat(60 * KIB)}, "result": true}),
-            )
+            .answer(&call, json!({"x": "x".repeat(60 * KIB)}))
             .await;
         let response = caller.receive().await;
         assert_eq!(response["result"], false);
@@ -243,12 +240,7 @@ fn what_clients_call_from_one_another_counts_too() {
         drop((others, more));
         caller.call("/s", 3).await;
         let call = provider.receive().await;
-        provider
-            .send(
-                json!({"op": "service_response", "service": "/s", "id": call["id"],
-                "values": {}, "result": true}),
-            )
-            .await;
+        provider.answer(&call, json!({})).await;
         assert_eq!(caller.receive().await["result"], true);
         settle().await;
         assert_eq!(total.used(), 0);

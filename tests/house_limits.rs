@@ -10,32 +10,20 @@
     reason = "a helper of a test fails by panicking, as a test does"
 )]
 
+mod papers;
+
 use std::fs;
 use std::path::{Path, PathBuf};
+
+use papers::{table, text};
 
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-fn text(path: &str) -> String {
-    fs::read_to_string(root().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
-}
-
 /// The rows of the table: what, limit, beyond it, constant.
 fn rows() -> Vec<Vec<String>> {
-    let readme = text("README.md");
-    let rows: Vec<Vec<String>> = readme
-        .lines()
-        .skip_while(|line| *line != "| what | limit | beyond it | constant |")
-        .skip(2)
-        .take_while(|line| line.starts_with('|'))
-        .map(|line| {
-            line.trim_matches('|')
-                .split(" |")
-                .map(|cell| cell.trim().to_owned())
-                .collect()
-        })
-        .collect();
+    let rows = table(&text("README.md"), "what | limit | beyond it | constant");
     assert!(
         rows.len() > 40,
         "the table of limits has {} rows",

@@ -10,36 +10,13 @@
     reason = "a helper of a test fails by panicking, as a test does"
 )]
 
+mod papers;
+
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::Path;
 use std::process::Command;
 
+use papers::{table, text};
 use pendularm::protocol::catalog::{Field, Rosapi, Service, Topic};
-
-fn text(path: &str) -> String {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
-    fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
-}
-
-/// The rows of the first table whose header begins with `header`, cell by cell, without code marks.
-fn table(paper: &str, header: &str) -> Vec<Vec<String>> {
-    let start = format!("| {header} |");
-    let rows: Vec<Vec<String>> = paper
-        .lines()
-        .skip_while(|line| !line.starts_with(&start))
-        .skip(2)
-        .take_while(|line| line.starts_with('|'))
-        .map(|line| {
-            line.trim_matches('|')
-                .split(" |")
-                .map(|cell| cell.trim().to_owned())
-                .collect()
-        })
-        .collect();
-    assert!(!rows.is_empty(), "no table of {header}");
-    rows
-}
 
 /// What stands between the code marks of a cell, in order.
 fn codes(cell: &str) -> Vec<&str> {

@@ -17,16 +17,8 @@ mod common;
 #[cfg(feature = "web")]
 mod web_client;
 
-use common::{Client, Runtime};
+use common::{Client, Runtime, SET_GRAVITY};
 use serde_json::json;
-
-const SET_GRAVITY: &str =
-    "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
-
-fn assert_nothing_was_executed(runtime: &Runtime) {
-    let parameters = runtime.connect().ask("/arm_sim/set_params", json!({}));
-    assert_eq!(parameters["gravity"], 9.81);
-}
 
 /// All lines up to the end of the stream, which must come; each is an error status.
 fn complaints(client: &mut Client) -> Vec<String> {
@@ -71,7 +63,7 @@ fn a_request_of_whatever_method_is_told_so_and_closed_before_its_body() {
             assert!(last.contains("HTTP request"), "{method}, {head}: {told:?}");
         }
     }
-    assert_nothing_was_executed(&runtime);
+    runtime.assert_nothing_was_executed();
 }
 
 /// The same where the request line is longer than a frame may be, so that nothing of it is kept, and byte by byte.
@@ -99,7 +91,7 @@ fn a_request_is_known_by_its_head_however_long_its_first_line_and_however_it_is_
             .unwrap()
             .contains("HTTP request")
     );
-    assert_nothing_was_executed(&runtime);
+    runtime.assert_nothing_was_executed();
 }
 
 /// The rule is about how a connection opens: later, and where it only resembles that, a line is malformed and no more.
@@ -143,10 +135,9 @@ fn a_request_of_whatever_method_is_locked_out_by_the_token_too() {
 #[cfg(feature = "web")]
 mod web {
     use std::fs;
-    use std::path::{Path, PathBuf};
 
     use super::Runtime;
-    use crate::web_client::{Answer, exchange, get, handshake, request, try_handshake};
+    use crate::web_client::{Answer, exchange, folder, get, handshake, request, try_handshake};
 
     /// What every answer says to a browser, whatever it is about.
     const STRICT: [(&str, &str); 7] = [
@@ -180,14 +171,6 @@ mod web {
         ] {
             assert_eq!(answer.header(name), None, "{name} of {what}");
         }
-    }
-
-    /// A folder of this test's own, below the build's.
-    fn folder(name: &str) -> PathBuf {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-        let _ = fs::remove_dir_all(&folder);
-        fs::create_dir_all(&folder).unwrap();
-        folder
     }
 
     #[test]

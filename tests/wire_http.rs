@@ -18,30 +18,13 @@ mod web_client;
 use std::fs;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{Shutdown, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
 
-use common::{PATIENCE, Runtime};
+use common::{PATIENCE, Runtime, SET_GRAVITY};
 use pendularm::web::head::MAX_HEAD;
 use pendularm::web::page::ASSETS;
-use serde_json::json;
-use web_client::{Answer, exchange, get, request, rest};
-
-const SET_GRAVITY: &str =
-    "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
-
-fn assert_nothing_was_executed(runtime: &Runtime) {
-    let parameters = runtime.connect().ask("/arm_sim/set_params", json!({}));
-    assert_eq!(parameters["gravity"], 9.81);
-}
-
-/// A folder of this test's own, below the build's.
-fn folder(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
+use web_client::{Answer, exchange, folder, get, request, rest};
 
 #[test]
 fn the_page_and_its_files_are_served_with_their_types() {
@@ -280,7 +263,7 @@ fn json_behind_a_request_is_not_executed_however_it_is_hidden() {
             .count();
         assert_eq!(answers, 1, "one request, one answer: {head:?}");
     }
-    assert_nothing_was_executed(&runtime);
+    runtime.assert_nothing_was_executed();
 }
 
 #[test]
@@ -297,7 +280,7 @@ fn a_posted_command_is_not_executed_and_told_so_in_one_line() {
         assert_eq!(line.lines().count(), 1, "{line}");
         assert!(line.contains("\"level\":\"error\"") && line.contains("HTTP"));
     }
-    assert_nothing_was_executed(&runtime);
+    runtime.assert_nothing_was_executed();
 }
 
 #[test]

@@ -22,6 +22,10 @@ use serde_json::{Value, json};
 /// How long anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
+/// A call that shows in the arm's parameters, for whoever tries what must not be executed.
+pub const SET_GRAVITY: &str =
+    "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
+
 /// The program, running; ended with the value.
 pub struct Runtime {
     child: Child,
@@ -98,6 +102,12 @@ impl Runtime {
 
     pub fn pid(&self) -> u32 {
         self.child.id()
+    }
+
+    /// That [`SET_GRAVITY`], hidden in what was sent, was not executed.
+    pub fn assert_nothing_was_executed(&self) {
+        let parameters = self.connect().ask("/arm_sim/set_params", json!({}));
+        assert_eq!(parameters["gravity"], 9.81);
     }
 
     /// The exit status, if the program ends within `limit`.

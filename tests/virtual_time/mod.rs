@@ -180,6 +180,13 @@ impl Peer {
         self.send(json!({"op": "call_service", "service": service, "id": id}))
             .await;
     }
+
+    /// Answers a call that this client has received as a provider.
+    pub async fn answer(&mut self, call: &Value, values: Value) {
+        let (service, id) = (&call["service"], &call["id"]);
+        self.send(json!({"op": "service_response", "service": service, "id": id, "values": values, "result": true}))
+            .await;
+    }
 }
 
 /// Lets everything happen that needs no time, and what needs next to none.
