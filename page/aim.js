@@ -57,6 +57,13 @@ function end() {
   if (lastPlace?.answered) finish(lastPlace);
 }
 
+/** Whether a drag places the setpoint without a key: on a touch screen there is none. */
+function placesSetpoint() {
+  /** @type {HTMLInputElement} */
+  const chosen = document.querySelector("input[name=drag]:checked");
+  return chosen.value === "setpoint";
+}
+
 export function startAim(canvas) {
   const place = (event) => {
     const box = canvas.getBoundingClientRect();
@@ -66,7 +73,7 @@ export function startAim(canvas) {
     if (event.button !== 0 || state.links === 0) return;
     pointer = event.pointerId;
     canvas.setPointerCapture(pointer);
-    moveTo(place(event), event.shiftKey);
+    moveTo(place(event), event.shiftKey || placesSetpoint());
   });
   canvas.addEventListener("pointermove", (event) => {
     if (event.pointerId === pointer) moveTo(place(event), event.shiftKey || aim?.direct);

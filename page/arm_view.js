@@ -1,62 +1,96 @@
 // The arm on its canvas: grid, reach, trail of the tip, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
-// Invariant: a frame allocates nothing, and nothing is drawn while nothing changes.
+// Invariant: a frame allocates nothing, and nothing is drawn while nothing is seen to change.
 
+import { SECONDS as ARROW_SECONDS, arrowHead, drawVelocities } from "./arrows.js";
 import { drawBackdrop } from "./backdrop.js";
+import { byId } from "./dom.js";
+import { onFrame, wake } from "./frames.js";
 import { gravityLoad, joints, reach } from "./mechanics.js";
-import { Ring } from "./ring.js";
+import { follow, shown } from "./playback.js";
+import { DEFAULT_EPSILON } from "./runtime.js";
 import { MOST_LINKS, state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
+import { drawLatest, drawTrail } from "./trail.js";
 
-/** Five seconds of trail. */
-const TRAIL_ROWS = 300;
-const TRAIL_PIECES = 8;
+/** A joint that would be seen elsewhere by less has not moved [px]. */
+const SEEN = 0.1;
 const RIPPLE_MS = 700;
 const NO_DASH = [];
 const GHOST_DASH = [6, 5];
 const ROOM = 1.14; // of the reach, so that circles and labels have space
+const EFFORT_RADIUS = 19; // px
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
 const load = new Float64Array(MOST_LINKS);
+const drawn = { position: new Float64Array(MOST_LINKS), velocity: new Float64Array(MOST_LINKS), effort: new Float64Array(MOST_LINKS) };
 const REST = new Float64Array(MOST_LINKS); // stretched along +x, where the gravity load is largest
-const trail = new Ring(TRAIL_ROWS, 2);
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 
 let surface;
 let context;
 let backdrop; // grid and circles, drawn once per size
+let behind; // the same with the trail
+let behindTime = NaN;
 let stale = true;
-let drawnVersion = -1;
+let behindStale = true;
+let fullEffort = 1; // N m, all that gravity could ask for
 let reachedAt = -Infinity;
 let scale = 100; // pixels per metre
+let arrows = false; // whether velocities are drawn
 /** Where the pointer aims, while it does: { x, y, phi, direct, refused }. */
 let aim = null;
 
 export function startArmView(canvas) {
   backdrop = document.createElement("canvas");
+  behind = document.createElement("canvas");
   surface = new Surface(canvas, resized);
   context = surface.context;
   onTheme(resized);
   watch("params", resized);
-  watch("links", () => { trail.clear(); resized(); });
-  watch("setpoint", redraw);
+  watch("links", resized);
+  watch("setpoint", () => { follow(); redraw(); });
+  watch("playback", redraw);
   watch("joint", redraw);
-  watch("diagnostics", redraw);
+  let diverged = false;
+  watch("diagnostics", ({ state: now }) => {
+    if ((now === "diverged") !== diverged) redraw();
+    diverged = now === "diverged";
+  });
   watch("goal", (goal) => {
     if (goal?.outcome === "reached") reachedAt = performance.now();
     redraw();
   });
+  byId("arrows").addEventListener("change", (event) => {
+    arrows = event.target.checked;
+    redraw();
+  });
+  onFrame(drawArm);
 }
 
 export function redraw() {
   stale = true;
+  behindStale = true;
+  wake();
 }
 
-export function clearTrail() {
-  trail.clear();
-  redraw();
+/** The trail moves on, if time does; between, only its latest piece is drawn. */
+export function redrawTrail() {
+  if (behindTime !== shown.time) redraw();
+}
+
+/** Whether the arm would be seen otherwise than it was drawn last. */
+export function hasMoved() {
+  const pixels = scale * reach(lengths());
+  for (let i = 0; i < state.links; i += 1) {
+    const change = Math.abs(shown.position[i] - drawn.position[i]) * pixels;
+    const arrow = arrows ? Math.abs(shown.velocity[i] - drawn.velocity[i]) * ARROW_SECONDS * pixels : 0;
+    const sweep = Math.abs(shown.effort[i] - drawn.effort[i]) * (Math.PI / fullEffort) * EFFORT_RADIUS;
+    if (!(change < SEEN && arrow < SEEN && sweep < SEEN)) return true;
+  }
+  return false;
 }
 
 export function showAim(now) {
@@ -71,6 +105,12 @@ function lengths() {
 function resized() {
   if (!surface) return;
   scale = Math.max(1, Math.min(surface.width, surface.height) / (2 * ROOM * reach(lengths())));
+  if (state.params?.masses.length === state.links) {
+    gravityLoad(state.links, REST, state.params, load);
+    fullEffort = Math.max(1, Math.abs(load[0]));
+  }
+  behind.width = surface.canvas.width;
+  behind.height = surface.canvas.height;
   drawBackdrop(backdrop, surface, scale, lengths(), state.params?.gravity ?? 0);
   redraw();
 }
@@ -96,64 +136,44 @@ function py(metres) {
   return surface.height / 2 - metres * scale;
 }
 
-/** The latest tip joins the trail; called once per joint state. */
-export function extendTrail() {
-  const n = state.links;
-  if (!state.params || n !== state.params.lengths.length) return;
-  joints(n, state.position, state.params.lengths, x, y);
-  const { data } = trail;
-  if (trail.length > 0) {
-    const last = trail.last();
-    if (data[last] === x[n] && data[last + 1] === y[n]) return;
-  }
-  const row = trail.push();
-  data[row] = x[n];
-  data[row + 1] = y[n];
-}
-
-export function drawArm(now) {
+/** Gives whether something moves on by itself. */
+function drawArm(now) {
   const ripple = !calm.matches && now - reachedAt < RIPPLE_MS;
-  if (!stale && !ripple && drawnVersion === state.version) return;
+  if (!stale && !ripple && !hasMoved()) return false;
   stale = ripple; // one frame more after the last of it
-  drawnVersion = state.version;
+  for (const name of /** @type {const} */ (["position", "velocity", "effort"])) drawn[name].set(shown[name]);
   const { width, height } = surface;
   context.globalAlpha = 1;
   context.setLineDash(NO_DASH);
-  context.clearRect(0, 0, width, height);
-  context.drawImage(backdrop, 0, 0, width, height);
   const n = state.links;
-  if (n === 0 || state.params?.lengths.length !== n) return;
+  const known = n > 0 && state.params?.lengths.length === n;
+  if (known && behindStale) paintBehind(n);
+  context.drawImage(known ? behind : backdrop, 0, 0, width, height);
+  if (!known) return false;
   context.lineCap = "round";
   context.lineJoin = "round";
-  drawTrail();
-  if (state.setpointKnown) drawGhost(n);
+  drawLatest(context, n, lengths(), px, py, behindTime, shown.time);
+  if (shown.setpointKnown) drawGhost(n);
   drawTarget(n, ripple ? (now - reachedAt) / RIPPLE_MS : 1);
   drawLinks(n);
+  return ripple;
 }
 
-function drawTrail() {
-  const { data, length } = trail;
-  context.strokeStyle = colors.accent;
-  context.lineWidth = 2;
-  context.lineCap = "butt"; // round ends would show where two pieces meet
-  for (let piece = 0; piece < TRAIL_PIECES; piece += 1) {
-    const from = Math.floor((piece * length) / TRAIL_PIECES);
-    const to = Math.min(length - 1, Math.floor(((piece + 1) * length) / TRAIL_PIECES));
-    context.globalAlpha = (0.7 * (piece + 1)) / TRAIL_PIECES;
-    context.beginPath();
-    for (let i = from; i <= to; i += 1) {
-      const row = trail.at(i);
-      if (i === from) context.moveTo(px(data[row]), py(data[row + 1]));
-      else context.lineTo(px(data[row]), py(data[row + 1]));
-    }
-    context.stroke();
-  }
-  context.lineCap = "round";
-  context.globalAlpha = 1;
+/** What lies behind the arm: the backdrop and the trail up to now. Between two paintings the trail's latest piece is
+ * drawn on each frame. */
+function paintBehind(n) {
+  behindStale = false;
+  const paint = behind.getContext("2d", { alpha: false });
+  paint.resetTransform();
+  paint.globalAlpha = 1;
+  paint.drawImage(backdrop, 0, 0);
+  paint.setTransform(context.getTransform());
+  drawTrail(paint, n, lengths(), px, py, shown.time);
+  behindTime = shown.time;
 }
 
 function drawGhost(n) {
-  joints(n, state.setpoint, lengths(), x, y);
+  joints(n, shown.setpoint, lengths(), x, y);
   context.strokeStyle = colors.muted;
   context.lineWidth = 2;
   context.globalAlpha = state.enabled ? 0.9 : 0.5;
@@ -178,7 +198,7 @@ function drawTarget(n, ripple) {
     const done = !aim && goal?.outcome !== "active";
     const color = aim?.refused ? colors.bad : done && goal?.outcome === "reached" ? colors.good : colors.target;
     if (!aim && goal?.outcome === "active") drawWay(n, shown, color);
-    drawCross(shown, goal?.epsilon ?? 0.02, color, done ? 0.75 : 1);
+    drawCross(shown, goal?.epsilon ?? DEFAULT_EPSILON, color, done ? 0.75 : 1);
     if (ripple < 1) {
       context.globalAlpha = 1 - ripple;
       circle(shown.x, shown.y, 8 + 34 * ripple);
@@ -190,7 +210,7 @@ function drawTarget(n, ripple) {
 
 /** A thin line of what is left to go. */
 function drawWay(n, target, color) {
-  joints(n, state.position, lengths(), x, y);
+  joints(n, shown.position, lengths(), x, y);
   context.strokeStyle = color;
   context.lineWidth = 1.25;
   context.globalAlpha = 0.6;
@@ -242,7 +262,7 @@ function circle(wx, wy, radius) {
 function drawLinks(n) {
   const l = lengths();
   const diverged = state.diagnostics?.state === "diverged";
-  joints(n, state.position, l, x, y);
+  joints(n, shown.position, l, x, y);
   const room = Math.min(1, Math.min(surface.width, surface.height) / 420); // smaller on a telephone
   for (let i = 0; i < n; i += 1) {
     // Heavier rods of the same length are drawn thicker, within reason.
@@ -252,7 +272,8 @@ function drawLinks(n) {
   }
   base(room);
   for (let i = 0; i < n; i += 1) pivot(i, room);
-  drawEfforts(n, l, room);
+  drawEfforts(n, room);
+  if (arrows) drawVelocities(context, n, shown.velocity, x, y, px, py);
   context.fillStyle = colors.ink;
   context.strokeStyle = colors.panel;
   context.lineWidth = 2;
@@ -297,31 +318,19 @@ function pivot(i, room) {
 }
 
 /** Effort as an arc around its joint: counter-clockwise is positive, a half turn is all that gravity could ask for. */
-function drawEfforts(n, l, room) {
-
-  gravityLoad(n, REST, state.params, load);
-  const full = Math.max(1, Math.abs(load[0]));
+function drawEfforts(n, room) {
   context.lineWidth = 3;
   for (let i = 0; i < n; i += 1) {
-    const effort = state.effort[i];
-    const sweep = Math.PI * Math.max(-1.6, Math.min(1.6, effort / full));
+    const effort = shown.effort[i];
+    const sweep = Math.PI * Math.max(-1.6, Math.min(1.6, effort / fullEffort));
     if (Math.abs(sweep) < 0.03) continue;
-    const radius = 19 * room;
+    const radius = EFFORT_RADIUS * room;
     const end = -Math.PI / 2 - sweep;
     context.strokeStyle = colors.joints[i];
     context.fillStyle = colors.joints[i];
     context.beginPath();
     context.arc(px(x[i]), py(y[i]), radius, -Math.PI / 2, end, sweep > 0);
     context.stroke();
-    arrowHead(px(x[i]) + radius * Math.cos(end), py(y[i]) + radius * Math.sin(end), end - Math.sign(sweep) * (Math.PI / 2), 8 * room);
+    arrowHead(context, px(x[i]) + radius * Math.cos(end), py(y[i]) + radius * Math.sin(end), end - Math.sign(sweep) * (Math.PI / 2), 8 * room);
   }
-}
-
-function arrowHead(tipX, tipY, angle, size) {
-  context.beginPath();
-  context.moveTo(tipX + size * Math.cos(angle), tipY + size * Math.sin(angle));
-  context.lineTo(tipX + 0.7 * size * Math.cos(angle + 2.1), tipY + 0.7 * size * Math.sin(angle + 2.1));
-  context.lineTo(tipX + 0.7 * size * Math.cos(angle - 2.1), tipY + 0.7 * size * Math.sin(angle - 2.1));
-  context.closePath();
-  context.fill();
 }

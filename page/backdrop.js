@@ -5,14 +5,18 @@ import { fixed, significant } from "./format.js";
 import { innerReach, reach } from "./mechanics.js";
 import { colors } from "./theme.js";
 
+/** The clock stands over the upper end of the vertical axis [px]. */
+const CLOCK = 56;
 const LABEL = "11px system-ui, sans-serif";
 
 export function drawBackdrop(canvas, surface, scale, lengths, gravity) {
   canvas.width = surface.canvas.width;
   canvas.height = surface.canvas.height;
-  const context = canvas.getContext("2d");
+  const context = canvas.getContext("2d", { alpha: false });
   context.setTransform(surface.canvas.width / Math.max(1, surface.width), 0, 0, surface.canvas.height / Math.max(1, surface.height), 0, 0);
   const { width, height } = surface;
+  context.fillStyle = colors.page;
+  context.fillRect(0, 0, width, height);
   const cx = width / 2;
   const cy = height / 2;
   drawReach(context, cx, cy, scale, lengths);
@@ -64,7 +68,7 @@ function drawGrid(context, width, height, scale) {
         continue;
       }
       const label = fixed(i * metres, digits);
-      const edge = at < 24 || at > size - 24;
+      const edge = at < (vertical ? 24 : CLOCK) || at > size - 24;
       if (i % every !== 0 || edge) continue;
       context.textAlign = vertical ? "center" : "left";
       context.textBaseline = vertical ? "alphabetic" : "middle";

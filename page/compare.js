@@ -1,37 +1,49 @@
-// Two integrators side by side: the same arm, from the same state, reckoned offline by the runtime, played back together.
+// Any number of integrators and timesteps against a reference: the same arm, from the same state, reckoned offline by the
+// runtime, drawn over one another and played back together.
 // Invariant: what is compared is what the runtime answered; the live arm is not touched.
 
 import { announce } from "./announce.js";
 import { CompareView } from "./compare_view.js";
-import { METHODS } from "./controls.js";
 import { byId, el, setText } from "./dom.js";
 import { option, refusal } from "./field.js";
-import { duration, significant } from "./format.js";
-import { methodName } from "./readouts.js";
+import { METHODS, duration, fixed } from "./format.js";
 import { commonSamples } from "./resample.js";
 import { nobodyProvides } from "./rosbridge.js";
 import { rollout } from "./runtime.js";
+import { describeRun, distances, divergedAt, partsAt } from "./runs.js";
 import { state, watch } from "./store.js";
+
+const MOST_RUNS = 6;
+/** The reference is Runge-Kutta 4 at this part of the smallest timestep. */
+const REFERENCE_PART = 1 / 8;
+const PARTED = 0.1; // rad: from there on it is another motion
 
 let view;
 let said;
-let sides;
+let rows = [];
 let seconds;
 let from;
 let servo;
 let go;
+let add;
 
 export function startCompare() {
-  sides = [side("first", "euler"), side("second", "rk4")];
   seconds = option({ label: "duration", unit: "s", value: 5 });
   from = select("start", [["now", "as it is"], ["rest", "stretched out"]]);
   servo = select("servo", [["off", "off"], ["on", "on"]]);
   go = el("button", { type: "submit", class: "primary" }, "Compare");
+  add = el("button", { type: "button", class: "small", onclick: () => addRow("rk4", 0.001) }, "Add a run");
   said = refusal(go);
-  byId("compare-form").append(el("div", { class: "compare-row" }, ...sides.map((one) => one.element), seconds.element, from.element, servo.element, go), said.element);
+  byId("compare-form").append(
+    el("div", { id: "compare-rows", class: "compare-rows" }),
+    el("div", { class: "compare-row" }, add, seconds.element, from.element, servo.element, go), said.element,
+  );
+  addRow("euler", 0.01);
+  addRow("rk4", 0.01);
   byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
-  view = new CompareView(byId("compare-arm"), byId("compare-chart"), byId("compare-scrub"), byId("compare-play"));
+  view = new CompareView();
   watch("links", () => { byId("compare-result").hidden = true; });
+  watch("lesson", (lesson) => { if (lesson?.runs) showLesson(lesson); });
 }
 
 function select(label, choices) {
@@ -39,35 +51,56 @@ function select(label, choices) {
   return { input, element: el("label", { class: "option" }, el("span", {}, label), input) };
 }
 
-function side(name, method) {
-  const choice = select(`${name} integrator`, METHODS);
-  choice.input.value = method;
-  const timestep = option({ label: "timestep", unit: "s", placeholder: "as the arm", value: 0.01 });
-  return { name, choice, timestep, element: el("div", { class: `side ${name}` }, choice.element, timestep.element) };
+function addRow(method, timestep) {
+  if (rows.length >= MOST_RUNS) return;
+  const choice = el("select", { "aria-label": "integrator" }, ...METHODS.map(([value, text]) => el("option", { value }, text.replace("Runge–Kutta 4", "RK 4"))));
+  choice.value = method;
+  const step = el("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": "timestep", value: timestep });
+  const remove = el("button", { type: "button", class: "small", "aria-label": "remove this run", onclick: () => drop(row) }, "✕");
+  const element = el("div", { class: "side" }, choice, step, el("span", { class: "unit" }, "s"), remove);
+  const row = { choice, step, element };
+  rows.push(row);
+  byId("compare-rows").append(element);
+  number();
 }
 
-function timestepOf(one) {
-  return one.timestep.number() ?? state.integrator?.timestep;
+function drop(row) {
+  if (rows.length === 1) return;
+  rows = rows.filter((one) => one !== row);
+  row.element.remove();
+  number();
 }
 
-function request(one, samples) {
+function number() {
+  rows.forEach(({ element }, i) => { element.className = `side run${i + 1}`; });
+  add.disabled = rows.length >= MOST_RUNS;
+}
+
+async function showLesson({ runs, seconds: wanted }) {
+  for (const { element } of rows) element.remove();
+  rows = [];
+  for (const [method, timestep] of runs) addRow(method, timestep);
+  seconds.input.value = String(wanted);
+  from.input.value = "rest";
+  servo.input.value = "off";
+  await new Promise((done) => setTimeout(done, 300)); // the arm has its settings by then
+  compare();
+}
+
+function request(method, timestep, samples) {
   const n = state.links;
   const still = from.input.value === "rest";
-  const args = {
-    q0: still ? new Array(n).fill(0) : Array.from(state.position.subarray(0, n)),
-    qdot0: still ? new Array(n).fill(0) : Array.from(state.velocity.subarray(0, n)),
+  const zero = new Array(n).fill(0);
+  return {
+    q0: still ? zero : Array.from(state.position.subarray(0, n)),
+    qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
     duration: seconds.number(),
-    timestep: timestepOf(one),
-    integrator: one.choice.input.value,
+    timestep,
+    integrator: method,
     params: state.params,
     samples,
-    reference: true,
+    ...(servo.input.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
   };
-  if (servo.input.value === "on") {
-    args.gains = state.gains;
-    args.setpoint = state.setpointKnown ? Array.from(state.setpoint.subarray(0, n)) : new Array(n).fill(0);
-  }
-  return args;
 }
 
 async function compare() {
@@ -77,52 +110,45 @@ async function compare() {
   }
   go.disabled = true;
   setText(go, "Reckoning…");
-  const { lengths } = state.params;
-  const samples = commonSamples(seconds.number(), sides.map(timestepOf));
-  const requests = sides.map((one) => request(one, samples));
+  const wanted = rows.map(({ choice, step }) => [choice.value, step.value === "" ? state.integrator?.timestep : Number(step.value)]);
+  const finest = Math.min(...wanted.map(([, timestep]) => timestep)) * REFERENCE_PART;
+  wanted.push(["rk4", finest]);
+  const samples = commonSamples(seconds.number(), wanted.map(([, timestep]) => timestep));
+  const requests = wanted.map(([method, timestep]) => request(method, timestep, samples));
   const answers = await Promise.all(requests.map((args) => rollout(args)));
   go.disabled = false;
   setText(go, "Compare");
   const failed = answers.findIndex((answer) => !answer.result);
   if (failed >= 0) {
     const answer = answers[failed];
-    said.show(nobodyProvides(answer) ? `This runtime can't compare: ${answer.status}` : `${sides[failed].name}: ${answer.status}`);
+    const name = failed < rows.length ? `run ${failed + 1}` : "the reference";
+    said.show(nobodyProvides(answer) ? `This runtime can't compare: ${answer.status}` : `${name}: ${answer.status}`);
     return;
   }
   said.show("");
-  const runs = answers.map(({ values }, i) => run(values, requests[i]));
+  const runs = answers.map(({ values }, i) => ({ ...values, method: requests[i].integrator, timestep: requests[i].timestep }));
+  const reference = runs.pop();
+  const away = runs.map((run) => distances(run, reference));
   byId("compare-result").hidden = false;
-  const apart = view.show(runs, lengths, state.links);
-  showTable(runs, apart);
+  view.show(runs, away, reference, state.params.lengths, state.links, seconds.number());
+  showTable(runs, away, reference);
 }
 
-function run(values, args) {
-  return { ...values, method: args.integrator, timestep: args.timestep };
-}
-
-function lastOf(list) {
-  return list?.length > 0 ? list[list.length - 1] : NaN;
-}
-
-/** The worst of an error that may be one number, or one per sample. */
-function worst(error) {
-  if (Array.isArray(error)) return error.reduce((most, one) => Math.max(most, one ?? Infinity), 0);
-  return error ?? NaN;
-}
-
-function showTable(runs, apart) {
-  const rows = [
-    ["timestep", (one) => duration(one.timestep)],
-    ["energy gained", (one) => `${significant(lastOf(one.energy) - one.energy[0], 3)} J`],
-    ["largest error", (one) => `${significant(worst(one.error), 3)} rad`],
-    ["evaluations", (one) => significant(one.evaluations, 6)],
-    ["reckoned in", (one) => duration(one.wall_time)],
-  ];
+function showTable(runs, away, reference) {
+  const lasted = seconds.number();
+  const columns = [["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]];
+  const lines = runs.map((run, i) => describeRun(run, away[i], lasted));
   byId("compare-table").replaceChildren(
-    el("thead", {}, el("tr", {}, el("td"), ...runs.map((one, i) => el("th", { scope: "col", class: sides[i].name }, methodName(one.method))))),
-    el("tbody", {}, ...rows.map(([name, text]) => el("tr", {}, el("th", { scope: "row" }, name), ...runs.map((one) => el("td", {}, text(one)))))),
+    el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "run"), ...columns.map(([, name]) => el("th", { scope: "col" }, name)))),
+    el("tbody", {}, ...lines.map((line, i) => el("tr", {}, el("th", { scope: "row", class: `run${i + 1}` }, line.name), ...columns.map(([key]) => el("td", {}, line[key]))))),
   );
-  const end = `At the end the tips are ${significant(lastOf(apart), 3)} m apart, at most ${significant(Math.max(...apart.filter(Number.isFinite)), 3)} m.`;
-  setText(byId("compare-text"), end);
-  announce(end);
+  const words = runs.map((run, i) => {
+    const ended = divergedAt(run, lasted);
+    const parts = partsAt(reference.times, away[i], PARTED);
+    if (ended !== null) return `${lines[i].name} diverged at t = ${fixed(ended, 2)} s`;
+    return parts === null ? `${lines[i].name} stays within ${PARTED} rad` : `${lines[i].name} is ${PARTED} rad off after ${fixed(parts, 2)} s`;
+  });
+  const text = `Against Runge–Kutta 4 at ${duration(reference.timestep)}: ${words.join("; ")}.`;
+  setText(byId("compare-text"), text);
+  announce(text);
 }

@@ -1,89 +1,123 @@
-// Draws a comparison: two arms with their trails on one canvas, their distance on a logarithmic chart, and a time to scrub.
-// Invariant: both are shown at the same instant; a run that ends early is drawn as far as it goes.
+// Draws a comparison: all arms with their trails over one another, their error, energy and a joint's angle over time, and an
+// instant to scrub.
+// Invariant: all are shown at the same instant; a run that ends early is drawn as far as it goes, its last pose as a ghost.
 
+import { byId, setText } from "./dom.js";
 import { significant } from "./format.js";
+import { onFrame, wake } from "./frames.js";
+import { Axis } from "./axis.js";
 import { joints, reach } from "./mechanics.js";
 import { resample } from "./resample.js";
-import { MOST_LINKS } from "./store.js";
+import { LogScale } from "./scale.js";
+import { MOST_LINKS, state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
 const x = new Float64Array(MOST_LINKS + 1);
 const y = new Float64Array(MOST_LINKS + 1);
-/** Tips closer than this are drawn as together: it is where rounding begins [m]. */
-const TOGETHER = 1e-12;
-const LEFT = 46;
+/** Errors smaller than this are rounding [rad]. */
+const SMALLEST = 1e-13;
+const LEFT = 50;
+const RIGHT = 8;
 const BOTTOM = 16;
+const TOP = 6;
 
 export class CompareView {
-  constructor(arm, chart, scrub, play) {
-    this.poses = []; // of each run, at each of `times`; null where it has none
+  constructor() {
+    this.runs = [];
     this.times = [];
     this.at = 0;
     this.playing = false;
-    this.scrub = scrub;
-    this.play = play;
-    this.arm = new Surface(arm, () => this.draw());
-    this.chart = new Surface(chart, () => this.draw());
-    onTheme(() => this.draw());
-    scrub.addEventListener("input", () => {
+    this.began = 0;
+    this.stale = false;
+    this.scrub = byId("compare-scrub");
+    this.play = byId("compare-play");
+    const redraw = () => { this.stale = true; wake(); };
+    this.redraw = redraw;
+    this.arm = new Surface(byId("compare-arm"), redraw);
+    this.error = new Surface(byId("compare-chart"), redraw);
+    this.energy = new Surface(byId("compare-energy"), redraw);
+    this.angle = new Surface(byId("compare-angle"), redraw);
+    onTheme(redraw);
+    watch("joint", redraw);
+    watch("tab", redraw);
+    this.scrub.addEventListener("input", () => {
       this.stop();
-      this.at = Number(scrub.value);
-      this.draw();
+      this.at = Number(this.scrub.value);
+      redraw();
     });
-    play.addEventListener("click", () => (this.playing ? this.stop() : this.start()));
+    this.play.addEventListener("click", () => (this.playing ? this.stop() : this.start()));
+    onFrame((now) => this.frame(now));
   }
 
-  /** Takes two runs, and gives the distance between their tips at each instant [m]; NaN where one has ended. */
-  show(runs, lengths, links) {
+  /** Takes the runs, how far each is from the reference at the reference's instants, and the reference. */
+  show(runs, away, reference, lengths, links, seconds) {
     this.lengths = lengths;
     this.links = links;
-    this.times = runs.reduce((longest, { times }) => (times.at(-1) > longest.at(-1) ? times : longest), runs[0].times);
-    this.poses = runs.map((run) => resample(run, this.times));
-    this.tips = this.poses.map((poses) => poses.map((q) => {
-      if (!q) return null;
-      joints(links, q, lengths, x, y);
-      return [x[links], y[links]];
+    this.seconds = seconds;
+    this.times = reference.times;
+    this.runs = [...runs, reference].map((run, i) => ({
+      energy: { times: run.times, values: run.energy },
+      away: away[i],
+      poses: resample(run, this.times),
+      isReference: i === runs.length,
     }));
-    this.apart = this.times.map((_, k) => {
-      const [a, b] = [this.tips[0][k], this.tips[1][k]];
-      return a && b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : NaN;
-    });
+    for (const run of this.runs) {
+      run.tips = run.poses.map((q) => {
+        if (!q) return null;
+        joints(links, q, lengths, x, y);
+        return [x[links], y[links]];
+      });
+      run.last = run.poses.findLastIndex((q) => q !== null);
+    }
     this.scrub.max = String(this.times.length - 1);
     this.at = 0;
     this.start();
-    return this.apart;
   }
 
   start() {
-    const { times } = this;
-    if (times.length < 2) return;
-    if (this.at >= times.length - 1) this.at = 0;
+    if (this.times.length < 2) return;
+    if (this.at >= this.times.length - 1) this.at = 0;
     this.playing = true;
-    this.play.textContent = "Pause";
-    const began = performance.now() - 1000 * times[this.at];
-    const frame = (now) => {
-      if (!this.playing) return;
-      const time = (now - began) / 1000;
-      while (this.at < times.length - 1 && times[this.at] < time) this.at += 1;
-      this.scrub.value = String(this.at);
-      this.draw();
-      if (this.at >= times.length - 1) this.stop();
-      else requestAnimationFrame(frame);
-    };
-    requestAnimationFrame(frame);
+    this.began = performance.now() - 1000 * this.times[this.at];
+    setText(this.play, "Pause");
+    this.redraw();
   }
 
   stop() {
     this.playing = false;
-    this.play.textContent = "Play";
+    setText(this.play, "Play");
+  }
+
+  /** Gives whether it plays on. */
+  frame(now) {
+    if (this.times.length === 0 || state.tab !== "compare") return false;
+    if (this.playing) {
+      const time = (now - this.began) / 1000;
+      while (this.at < this.times.length - 1 && this.times[this.at] < time) this.at += 1;
+      this.scrub.value = String(this.at);
+      this.stale = true;
+      if (this.at >= this.times.length - 1) this.stop();
+    }
+    if (this.stale) {
+      this.stale = false;
+      this.draw();
+    }
+    return this.playing;
   }
 
   draw() {
-    if (this.times.length === 0) return;
     this.drawArms();
-    this.drawApart();
-    this.scrub.setAttribute("aria-valuetext", `${significant(this.times[this.at], 3)} s, ${significant(this.apart[this.at], 3)} m apart`);
+    this.drawError();
+    this.drawLines(this.energy, (run) => run.energy.times, (run) => run.energy.values, 5000);
+    setText(byId("compare-joint"), String(state.joint + 1));
+    this.drawLines(this.angle, () => this.times, (run) => run.poses.map((q) => (q ? q[state.joint] : null)), 300);
+    const words = this.runs.filter(({ isReference }) => !isReference).map(({ away }) => (away[this.at] === null ? "ended" : `${significant(away[this.at], 3)} rad`));
+    this.scrub.setAttribute("aria-valuetext", `${significant(this.times[this.at], 3)} s, errors ${words.join(", ")}`);
+  }
+
+  color(k) {
+    return this.runs[k].isReference ? colors.muted : colors.runs[k];
   }
 
   drawArms() {
@@ -91,7 +125,7 @@ export class CompareView {
     const scale = Math.min(width, height) / (2.2 * reach(this.lengths));
     const px = (metres) => width / 2 + metres * scale;
     const py = (metres) => height / 2 - metres * scale;
-    context.clearRect(0, 0, width, height);
+    this.arm.clear();
     context.lineCap = "round";
     context.lineJoin = "round";
     context.strokeStyle = colors.line;
@@ -99,87 +133,110 @@ export class CompareView {
     context.beginPath();
     context.arc(px(0), py(0), reach(this.lengths) * scale, 0, 2 * Math.PI);
     context.stroke();
-    const both = [colors.first, colors.second];
-    this.tips.forEach((tips, side) => {
-      context.strokeStyle = both[side];
-      context.globalAlpha = 0.55;
-      context.lineWidth = 1.5;
+    this.runs.forEach(({ tips }, k) => {
+      context.strokeStyle = this.color(k);
+      context.globalAlpha = 0.4;
+      context.lineWidth = 1.25;
       context.beginPath();
-      for (let k = 0, down = false; k <= this.at; k += 1) {
-        const tip = tips[k];
+      for (let i = 0, down = false; i <= this.at; i += 1) {
+        const tip = tips[i];
         if (tip && down) context.lineTo(px(tip[0]), py(tip[1]));
         else if (tip) context.moveTo(px(tip[0]), py(tip[1]));
         down = tip !== null;
       }
       context.stroke();
     });
-    context.globalAlpha = 1;
-    this.poses.forEach((poses, side) => {
-      const q = poses[this.at];
+    this.runs.forEach(({ poses, last }, k) => {
+      const ended = this.at > last;
+      const q = poses[ended ? last : this.at];
       if (!q) return;
       joints(this.links, q, this.lengths, x, y);
-      context.strokeStyle = both[side];
-      context.lineWidth = side === 0 ? 8 : 4; // where they agree, both are seen
+      context.globalAlpha = ended ? 0.25 : 0.85;
+      context.strokeStyle = this.color(k);
+      context.lineWidth = 3 + 2 * (this.runs.length - k); // where they agree, all are seen
       context.beginPath();
       context.moveTo(px(0), py(0));
       for (let i = 1; i <= this.links; i += 1) context.lineTo(px(x[i]), py(y[i]));
       context.stroke();
     });
+    context.globalAlpha = 1;
   }
 
-  /** Distance between the tips, a line per power of ten or so. */
-  drawApart() {
-    const { context, width, height } = this.chart;
-    const values = this.apart.filter((one) => one > TOGETHER);
-    const top = Math.ceil(Math.log10(Math.max(1e-9, ...values)));
-    const bottom = Math.max(Math.log10(TOGETHER), Math.min(top - 2, Math.floor(Math.log10(Math.min(1, ...values)))));
-    const place = (value) => 6 + ((top - Math.log10(Math.max(value, TOGETHER))) / (top - bottom)) * (height - BOTTOM - 6);
-    const across = (k) => LEFT + (k / Math.max(1, Number(this.scrub.max))) * (width - LEFT - 8);
-    context.clearRect(0, 0, width, height);
+  across(surface, time) {
+    return LEFT + (time / this.seconds) * (surface.width - LEFT - RIGHT);
+  }
+
+  begin(surface) {
+    const { context } = surface;
+    surface.clear();
     context.font = "11px system-ui, sans-serif";
     context.fillStyle = colors.muted;
     context.strokeStyle = colors.grid;
     context.lineWidth = 1;
     context.textAlign = "right";
     context.textBaseline = "middle";
-    const every = Math.max(1, Math.ceil((top - bottom) / 5));
-    for (let power = top; power >= bottom; power -= every) {
-      const at = place(10 ** power);
-      context.beginPath();
-      context.moveTo(LEFT, at);
-      context.lineTo(width - 8, at);
-      context.stroke();
-      context.fillText(`1e${power}`.replace("-", "\u2212"), LEFT - 6, at);
-    }
-    context.save();
-    context.beginPath();
-    context.rect(LEFT, 0, width - LEFT, height - BOTTOM);
-    context.clip();
-    context.strokeStyle = colors.ink;
-    context.lineWidth = 1.75;
-    context.beginPath();
-    this.apart.forEach((one, k) => {
-      if (Number.isFinite(one)) context.lineTo(across(k), place(one));
-    });
-    context.stroke();
-    context.strokeStyle = colors.accent;
-    context.lineWidth = 1.5;
-    context.beginPath();
-    context.moveTo(across(this.at), 0);
-    context.lineTo(across(this.at), height);
-    context.stroke();
-    context.restore();
-    this.drawTimes(across);
   }
 
-  drawTimes(across) {
-    const { context, height } = this.chart;
-    const { times } = this;
+  tick({ context, width }, at, text) {
+    context.beginPath();
+    context.moveTo(LEFT, at);
+    context.lineTo(width - RIGHT, at);
+    context.stroke();
+    context.fillText(text, LEFT - 6, at);
+  }
+
+  drawError() {
+    const surface = this.error;
+    const { height } = surface;
+    const values = this.runs.flatMap(({ away }) => away ?? []).filter((one) => one !== null && one > SMALLEST);
+    const high = 10 ** Math.ceil(Math.log10(Math.max(1e-9, ...values)));
+    const low = Math.max(SMALLEST, Math.min(high / 100, 10 ** Math.floor(Math.log10(Math.min(1, ...values)))));
+    const scale = new LogScale(low, high);
+    const place = (value) => height - BOTTOM - scale.place(Math.max(value, low)) * (height - BOTTOM - TOP);
+    this.begin(surface);
+    for (const tick of scale.ticks(6)) this.tick(surface, place(tick), significant(tick, 1));
+    this.runs.forEach(({ away }, k) => { if (away) this.line(surface, this.times, away, place, k); });
+    this.finish(surface);
+  }
+
+  drawLines(surface, timesOf, valuesOf, sane) {
+    const { height } = surface;
+    const axis = new Axis(3, 0.1, sane);
+    for (const run of this.runs) for (const value of valuesOf(run)) if (value !== null) axis.offer(value);
+    axis.end();
+    const place = (value) => height - BOTTOM - axis.place(value) * (height - BOTTOM - TOP);
+    this.begin(surface);
+    for (let i = 0; i < axis.count; i += 1) this.tick(surface, place(axis.values[i]), axis.labels[i]);
+    this.runs.forEach((run, k) => this.line(surface, timesOf(run), valuesOf(run), place, k));
+    this.finish(surface);
+  }
+
+  line(surface, times, values, place, k) {
+    const { context, width } = surface;
+    context.save();
+    context.beginPath();
+    context.rect(LEFT, 0, width - LEFT - RIGHT, surface.height - BOTTOM);
+    context.clip();
+    context.strokeStyle = this.color(k);
+    context.lineWidth = 1.5;
+    context.beginPath();
+    values.forEach((value, i) => { if (Number.isFinite(value) && value !== null) context.lineTo(this.across(surface, times[i]), place(value)); });
+    context.stroke();
+    context.restore();
+  }
+
+  /** The instant, and times along the bottom. */
+  finish(surface) {
+    const { context, height } = surface;
+    context.strokeStyle = colors.accent;
+    context.beginPath();
+    context.moveTo(this.across(surface, this.times[this.at]), 0);
+    context.lineTo(this.across(surface, this.times[this.at]), height - BOTTOM);
+    context.stroke();
     context.textAlign = "center";
     context.textBaseline = "alphabetic";
-    for (const part of [0, 0.25, 0.5, 0.75]) {
-      const k = Math.floor(part * (times.length - 1));
-      context.fillText(`${significant(times[k], 3)} s`, across(k) + (part === 0 ? 10 : 0), height - 3);
+    for (const part of [0, 0.25, 0.5, 0.75, 1]) {
+      context.fillText(`${significant(part * this.seconds, 3)} s`, Math.min(surface.width - 16, this.across(surface, part * this.seconds)), height - 3);
     }
   }
 }

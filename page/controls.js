@@ -3,14 +3,15 @@
 
 import { byId, el, setText } from "./dom.js";
 import { numberField, option, refusal } from "./field.js";
-import { disturb, enable, sendSetpoint, setGains, setIntegrator, setParams } from "./runtime.js";
+import { METHODS } from "./format.js";
+import { disturb, enable, sendSetpoint, setGains, setIntegrator, setParams, suggestGains } from "./runtime.js";
 import { set, state, watch } from "./store.js";
 
-export const METHODS = [["euler", "Euler"], ["midpoint", "Midpoint"], ["verlet", "Verlet"], ["rk4", "Runge–Kutta 4"]];
 const PLACES = [["Earth", 9.81], ["Moon", 1.62], ["Mars", 3.72], ["Jupiter", 24.79], ["none", 0]];
 const PUSH_EFFORT = 50; // N m, as on the classic page
 const PUSH_SECONDS = 0.1;
 
+const SUGGEST = "Suggest gains for this arm";
 const ECHO_MS = 300;
 
 let placed = []; // the setpoint that was sent last
@@ -20,12 +21,15 @@ let pushEffort;
 let pushSeconds;
 let pushSaid;
 let servoSaid;
+let suggestButton;
+let suggestSaid;
 
 export function startControls() {
   startIntegrator();
   startGravity();
   startServo();
   startPush();
+  startSuggestion();
   watch("links", makeJointFields);
   for (const key of ["params", "gains", "setpoint"]) watch(key, showStored);
 }
@@ -46,7 +50,7 @@ function startIntegrator() {
   }));
   byId("methods").after(said.element);
   const check = () => {
-    for (const radio of document.getElementsByName("method")) radio.checked = radio.value === state.integrator?.method;
+    for (const radio of radios("method")) radio.checked = radio.value === state.integrator?.method;
   };
   const timestep = numberField({
     label: "timestep", unit: "s", low: 1e-5, high: 0.2, log: true, commit: (value) => setIntegrator({ timestep: value }),
@@ -81,6 +85,27 @@ function startServo() {
 export async function switchServo(on) {
   const answer = await enable(on);
   servoSaid.show(answer.result ? "" : answer.status);
+}
+
+/** Gains that the runtime finds for the present arm; hidden where it offers none. */
+function startSuggestion() {
+  suggestButton = el("button", { type: "button", class: "small", onclick: takeSuggestion }, SUGGEST);
+  suggestSaid = refusal(suggestButton);
+  byId("suggest").append(suggestButton, suggestSaid.element);
+  watch("offersGains", (offered) => { byId("suggest").hidden = !offered; });
+}
+
+/** Asks for gains, and sets them: a change like any other, which can be undone. */
+export async function takeSuggestion() {
+  if (suggestButton.disabled) return;
+  suggestButton.disabled = true;
+  setText(suggestButton, "Searching…");
+  const found = await suggestGains();
+  suggestButton.disabled = false;
+  setText(suggestButton, SUGGEST);
+  const { kp, ki, kd } = found.values.gains ?? found.values;
+  const answer = found.result ? await setGains({ kp, ki, kd }) : found;
+  suggestSaid.show(answer.result ? "" : answer.status);
 }
 
 function startPush() {
@@ -146,8 +171,13 @@ function makeJointFields(links) {
   showStored();
 }
 
+/** @param {string} name @returns {HTMLInputElement[]} */
+function radios(name) {
+  return /** @type {any} */ ([...document.getElementsByName(name)]);
+}
+
 /** One field per joint of the array `key` in the stored `group`; a change sends the whole array. */
-function fill(id, links, { key, unit, low, high, log, zero, name }, group, send) {
+function fill(id, links, { key, unit, low, high, log, zero = false, name }, group, send) {
   const fields = Array.from({ length: links }, (_, joint) => numberField({
     label: `${name} ${joint + 1}`, short: String(joint + 1), unit, low, high, log, zero, className: `joint${joint + 1}`,
     commit: (value) => {
@@ -188,6 +218,6 @@ function makeJointChoice(links) {
 }
 
 watch("joint", (joint) => {
-  const radio = document.getElementsByName("joint")[joint];
+  const radio = radios("joint")[joint];
   if (radio) radio.checked = true;
 });

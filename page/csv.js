@@ -1,19 +1,23 @@
-// What was recorded, as a CSV file: one row per joint state, SI units named in the header.
-// Invariant: the page's memory is not kept: the text is handed to the browser and let go.
+// @ts-check
+// What was recorded, as a CSV file: the settings in lines that begin with #, then one row per joint state, SI units named in
+// the header.
+// Invariant: what is not known, or not finite, is an empty field.
 
-import { EFFORT, ENERGY, LOAD, POSITION, SETPOINT, TIME, VELOCITY, record } from "./recorder.js";
-import { el } from "./dom.js";
+import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, record } from "./recorder.js";
+import { toFragment } from "./settings.js";
 
-const COLUMNS = [
+/** @typedef {import("./settings.js").Settings} Settings */
+
+const COLUMNS = /** @type {[string, string, number][]} */ ([
   ["position", "rad", POSITION],
   ["setpoint", "rad", SETPOINT],
   ["velocity", "rad/s", VELOCITY],
   ["effort", "N m", EFFORT],
   ["gravity_load", "N m", LOAD],
-];
+]);
 
-/** The file's text, for an arm with `links` links. */
-export function csvText(links) {
+/** The file's text, for an arm with `links` links. @param {number} links @param {Settings | null} settings those in force now */
+export function csvText(links, settings) {
   const names = ["time [s]"];
   const offsets = [TIME];
   for (const [name, unit, offset] of COLUMNS) {
@@ -22,22 +26,16 @@ export function csvText(links) {
       offsets.push(offset + joint);
     }
   }
-  names.push("energy [J]");
-  offsets.push(ENERGY);
-  const lines = [names.join(",")];
+  names.push("kinetic [J]", "potential [J]", "energy [J]");
+  offsets.push(KINETIC, POTENTIAL, ENERGY);
+  const about = settings ? toFragment(settings, links).split("&").map((one) => `# ${one}`) : [];
+  const lines = ["# pendularm; settings as they were when this was saved", ...about, names.join(",")];
   for (let i = 0; i < record.length; i += 1) {
     const row = record.at(i);
-    // What is not known, or not finite, is an empty field.
     lines.push(offsets.map((offset) => {
       const value = record.data[row + offset];
       return Number.isFinite(value) ? value : "";
     }).join(","));
   }
   return `${lines.join("\r\n")}\r\n`;
-}
-
-export function downloadCsv(links) {
-  const url = URL.createObjectURL(new Blob([csvText(links)], { type: "text/csv" }));
-  el("a", { href: url, download: "pendularm.csv" }).click();
-  setTimeout(() => URL.revokeObjectURL(url), 10000);
 }

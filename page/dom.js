@@ -2,6 +2,7 @@
 // Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need.
 
 /** `el("p", { class: "note" }, "text", child)`; `on...` properties are listeners. */
+/** @returns {any} */
 export function el(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
   for (const [name, value] of Object.entries(attributes)) {
@@ -13,6 +14,7 @@ export function el(tag, attributes = {}, ...children) {
   return element;
 }
 
+/** @param {string} id @returns {any} the element, of whatever kind the document has it */
 export function byId(id) {
   return document.getElementById(id);
 }

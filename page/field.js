@@ -37,6 +37,7 @@ export function refusal(...describes) {
  * @param {boolean} [options.log] whether the slider goes by ratios; with `low` > 0, or `zero` at its left end
  * @param {boolean} [options.zero] whether the left end means 0
  * @param {(value: number) => Promise<{result: boolean, status: string}>} options.commit
+ * @param {string} [options.className] of the slider
  */
 export function numberField({ label, short = label, unit, low, high, log = false, zero = false, commit, className = "" }) {
   const id = `field-${nextId}`;
@@ -110,7 +111,10 @@ export function numberField({ label, short = label, unit, low, high, log = false
   };
 }
 
-/** A number that only a later request needs: nothing is sent when it changes. Empty: left out. */
+/**
+ * A number that only a later request needs: nothing is sent when it changes. Empty: left out.
+ * @param {{label: string, unit?: string, value?: string | number, placeholder?: string}} options
+ */
 export function option({ label, unit = "", value = "", placeholder = "" }) {
   const input = el("input", { type: "number", step: "any", inputmode: "decimal", autocomplete: "off", value, placeholder });
   return {

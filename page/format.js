@@ -1,8 +1,10 @@
+// @ts-check
 // Numbers as people read them: few digits, a true minus, powers of ten where a number is huge or tiny.
 // Invariant: a value that is not finite is shown as a dash, never as text of the language.
 
 const MINUS = "\u2212";
 
+/** @param {number} value @param {number} digits */
 export function fixed(value, digits) {
   if (!Number.isFinite(value)) return "–";
   if (Math.abs(value) >= 1e6) return significant(value, 3);
@@ -10,6 +12,7 @@ export function fixed(value, digits) {
   return text.startsWith("-") ? (Number(text) === 0 ? text.slice(1) : MINUS + text.slice(1)) : text;
 }
 
+/** @param {number} value @param {number} digits */
 export function significant(value, digits) {
   if (!Number.isFinite(value)) return "–";
   if (value === 0) return "0";
@@ -21,7 +24,7 @@ export function significant(value, digits) {
   return String(Number(value.toPrecision(digits))).replace("-", MINUS);
 }
 
-/** Seconds in the unit that suits them: 500 µs, 4.2 ms, 1 s. */
+/** Seconds in the unit that suits them: 500 µs, 4.2 ms, 1 s. @param {number} seconds */
 export function duration(seconds) {
   if (!Number.isFinite(seconds)) return "–";
   const size = Math.abs(seconds);
@@ -31,7 +34,20 @@ export function duration(seconds) {
   return `${significant(seconds * 1e9, 3)} ns`;
 }
 
-/** A number that an input can hold and a student can edit. */
+/** A number that an input can hold and a student can edit: four digits, its exponent whole. @param {number} value */
 export function plain(value) {
-  return Number.isFinite(value) ? String(Number(value.toPrecision(6))) : "";
+  return Number.isFinite(value) ? String(Number(value.toPrecision(4))) : "";
+}
+
+/** A number with all its digits, for links and files; empty where it is not finite. @param {number} value */
+export function exact(value) {
+  return Number.isFinite(value) ? String(value) : "";
+}
+
+/** Full names of the integrators, in the order of their keys. */
+export const METHODS = [["euler", "Euler"], ["midpoint", "Midpoint"], ["verlet", "Verlet"], ["rk4", "Runge–Kutta 4"]];
+
+/** @param {string | undefined} method */
+export function methodName(method) {
+  return METHODS.find(([name]) => name === method)?.[1] ?? method ?? "–";
 }

@@ -4,14 +4,14 @@
 import { byId, el, setText } from "./dom.js";
 import { option, refusal } from "./field.js";
 import { fixed } from "./format.js";
-import { cancelGoal, sendGoal } from "./runtime.js";
+import { DEFAULT_EPSILON, cancelGoal, sendGoal } from "./runtime.js";
 import { state, watch } from "./store.js";
 
 const fields = {
   x: option({ label: "x", unit: "m" }),
   y: option({ label: "y", unit: "m" }),
   phi: option({ label: "orientation", unit: "rad", placeholder: "any" }),
-  epsilon: option({ label: "tolerance", unit: "m", placeholder: "0.02" }),
+  epsilon: option({ label: "tolerance", unit: "m", placeholder: String(DEFAULT_EPSILON) }),
   success_hold: option({ label: "hold", unit: "s", placeholder: "0.5" }),
 };
 let said;

@@ -2,12 +2,15 @@
 // Invariant: no shortcut acts while somebody types, and all can be switched off.
 
 import { announce } from "./announce.js";
-import { METHODS, chooseJoint, nudgeSetpoint, push, switchServo } from "./controls.js";
+import { resetArm, takeBack } from "./actions.js";
+import { chooseJoint, nudgeSetpoint, push, switchServo } from "./controls.js";
 import { byId, el } from "./dom.js";
-import { togglePlots } from "./plots.js";
+import { METHODS } from "./format.js";
+import { stepBy } from "./playback.js";
+import { togglePlots, zoomPlots } from "./plots.js";
 import { cancelGoal, setIntegrator } from "./runtime.js";
 import { state } from "./store.js";
-import { resetArm, setPaused, singleStep, togglePause } from "./transport.js";
+import { setPaused, singleStep, togglePause } from "./transport.js";
 
 const NUDGE = 0.05; // rad, as on the classic page
 /** A held key repeats faster than a push is worth sending. */
@@ -31,12 +34,17 @@ const shortcuts = [
   ["j", "next joint", () => { chooseJoint(state.joint + 1); announce(`Joint ${state.joint + 1}.`); }],
   [" ", "pause or run", togglePause],
   [".", "single step", singleStep],
+  [",", "one recorded state back", () => stepBy(-1)],
   ["r", "reset", resetArm],
+  ["z", "undo the last change", takeBack],
   ["g", "cancel the goal", cancelGoal],
   ["p", "pause the plots", togglePlots],
+  ["+", "plots: less time (also Ctrl and the wheel)", () => zoomPlots(1)],
+  ["-", "plots: more time", () => zoomPlots(-1)],
   ["?", "this list", toggleHelp],
 ];
-const actions = new Map(shortcuts.map(([key, , act]) => [key, act]));
+/** @type {Map<string, () => void>} */
+const actions = new Map(shortcuts.map(([key, , act]) => /** @type {any} */ ([key, act])));
 
 /** After key 0, choosing an integrator sets the arm going again, as it did there. */
 async function useMethod(method, name) {
@@ -82,7 +90,7 @@ function pressed(event) {
   const act = actions.get(key.length === 1 ? key.toLowerCase() : key);
   if (!act) return;
   event.preventDefault();
-  if (event.repeat && !["a", "d", "q", "e", "."].includes(key.toLowerCase())) return;
+  if (event.repeat && !["a", "d", "q", "e", ".", ","].includes(key.toLowerCase())) return;
   act();
 }
 

@@ -1,28 +1,48 @@
-// Starts the page: every part takes its place, then the runtime is called, then frames are drawn.
-// Invariant: one loop draws everything, and a frame in which nothing changed costs next to nothing.
+// Starts the page: every part takes its place, then the runtime is called; frames are drawn when something has changed.
+// Invariant: while nothing changes nothing is drawn, and no timer does more than compare.
 
+import { remember, startActions } from "./actions.js";
 import { startAim } from "./aim.js";
-import { clearTrail, drawArm, extendTrail, startArmView } from "./arm_view.js";
+import { hasMoved, redrawTrail, startArmView } from "./arm_view.js";
 import { startCompare } from "./compare.js";
 import { startControls } from "./controls.js";
 import { byId } from "./dom.js";
+import { wake } from "./frames.js";
 import { startGoalPanel } from "./goal_panel.js";
+import { showHistory, startHistory } from "./history_panel.js";
 import { startKeyboard } from "./keyboard.js";
-import { drawPlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
+import { startLadder } from "./ladder_panel.js";
+import { startLessons } from "./lessons_panel.js";
+import { startMap } from "./map_view.js";
+import { startModes } from "./modes_view.js";
+import { follow, goLive } from "./playback.js";
+import { movePlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
 import { describeArm, showReadouts, startReadouts } from "./readouts.js";
 import { record, take } from "./recorder.js";
 import { start } from "./runtime.js";
+import { startSave } from "./save.js";
 import { startShare } from "./share.js";
 import { watch } from "./store.js";
+import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
 import { startTrialPanel } from "./trial_panel.js";
 
-/** Figures change this often [ms]; faster can't be read. */
-const FIGURES_MS = 125;
+/** Plots and the trail change this often [ms], all in one frame; the arm itself moves in every frame. */
+const BEAT_MS = 100;
+/** Figures change at every so many beats; faster can't be read. */
+const FIGURES = 2;
 const SENTENCE_MS = 1000;
 
+// The token is in a cookie now, out of a script's reach: it need not stay in the address, its history and what is copied of it.
+const address = new URL(location.href);
+if (address.searchParams.has("token")) {
+  address.searchParams.delete("token");
+  history.replaceState(history.state, "", address);
+}
+
 startTheme();
+startTabs();
 startArmView(byId("arm"));
 startPlots();
 startControls();
@@ -30,40 +50,47 @@ startTransport();
 startReadouts();
 startGoalPanel();
 startTrialPanel();
+startMap();
+startModes();
+startLadder();
 startCompare();
+startHistory();
+startLessons();
+startActions();
+startSave();
 startKeyboard();
 startShare();
 startAim(byId("arm"));
 
 // On a small screen what is not needed at once is folded away.
 if (matchMedia("(max-width: 779px)").matches) {
-  for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 2), #tasks > details:nth-of-type(n + 2), #compare > details")) one.open = false;
+  for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3)")) one.removeAttribute("open");
 }
 
 function forget() {
   record.clear();
-  clearTrail();
+  goLive();
   redrawPlots();
 }
 
 watch("version", () => {
   take();
-  extendTrail();
+  follow();
+  if (hasMoved()) wake();
 });
 watch("links", forget);
-start(forget);
+start(forget, remember);
 
+let beats = 0;
 setInterval(() => {
-  showReadouts();
-  showValues();
-}, FIGURES_MS);
+  if (document.hidden) return;
+  beats += 1;
+  if (beats % FIGURES === 0) {
+    showReadouts();
+    showValues();
+    showHistory();
+  }
+  movePlots();
+  redrawTrail();
+}, BEAT_MS);
 setInterval(describeArm, SENTENCE_MS);
-
-let frame = 0;
-function draw(now) {
-  frame += 1;
-  drawArm(now);
-  drawPlots(frame);
-  requestAnimationFrame(draw);
-}
-requestAnimationFrame(draw);

@@ -29,14 +29,13 @@ export function gravityLoad(n, q, arm, load, at = 0) {
   }
 }
 
-/** Kinetic and potential energy together [J]; 0 at rest in the starting pose. */
-export function energy(n, q, qd, arm) {
-  const { gravity, masses, lengths } = arm;
+/** Kinetic energy [J]. */
+export function kinetic(n, q, qd, arm) {
+  const { masses, lengths } = arm;
   let phi = 0;
   let omega = 0;
   let vx = 0; // velocity of the joint before the link
   let vy = 0;
-  let y = 0;
   let total = 0;
   for (let i = 0; i < n; i += 1) {
     phi += q[i];
@@ -46,10 +45,24 @@ export function energy(n, q, qd, arm) {
     const cx = vx - s * omega;
     const cy = vy + c * omega;
     const spin = (lengths[i] * lengths[i] * omega * omega) / 12;
-    total += masses[i] * ((cx * cx + cy * cy + spin) / 2 + gravity * (y + s));
+    total += (masses[i] * (cx * cx + cy * cy + spin)) / 2;
     vx -= 2 * s * omega;
     vy += 2 * c * omega;
-    y += 2 * s;
+  }
+  return total;
+}
+
+/** Potential energy [J]; 0 in the starting pose, stretched along x. */
+export function potential(n, q, arm) {
+  const { gravity, masses, lengths } = arm;
+  let phi = 0;
+  let y = 0;
+  let total = 0;
+  for (let i = 0; i < n; i += 1) {
+    phi += q[i];
+    const half = (lengths[i] * Math.sin(phi)) / 2;
+    total += masses[i] * gravity * (y + half);
+    y += 2 * half;
   }
   return total;
 }

@@ -1,8 +1,8 @@
 // The phase plot: velocity over position of each shown joint, through the last seconds; the present state is a dot.
-// Invariant: a frame allocates nothing.
+// Invariant: a frame allocates nothing. It draws on whatever context it is given.
 
 import { Axis } from "./axis.js";
-import { POSITION, VELOCITY, firstAfter, record } from "./recorder.js";
+import { POSITION, TIME, VELOCITY, firstAfter, record } from "./recorder.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 
@@ -12,35 +12,49 @@ const TOP = 8;
 const BOTTOM = 30;
 /** The path fades towards the past in this many pieces. */
 const PIECES = 5;
+/** Beyond it the scales are logarithmic [rad, rad/s]. */
+const SANE = 300;
+/** Samples nearer to each other are drawn as one piece of curve [px]. */
+const NEAR = 4;
+/** Samples further apart than this are joined by straight lines: there is no telling what was between [rad]. */
+const FAR = 1;
 
 export class PhasePlot {
   constructor(canvas) {
-    this.across = new Axis(4, 0.5);
-    this.up = new Axis(4, 0.5);
+    this.across = new Axis(4, 0.5, SANE);
+    this.up = new Axis(4, 0.5, SANE);
     this.surface = new Surface(canvas, () => {});
   }
 
-  draw(now, span, links, shown) {
+  draw(now, span, links, shown, cursor) {
     const { context, width, height } = this.surface;
     if (width < LEFT + RIGHT + 10) return;
-    context.clearRect(0, 0, width, height);
+    this.surface.clear();
+    this.drawOn(context, width, height, now, span, links, shown, cursor);
+  }
+
+  drawOn(context, width, height, now, span, links, shown, cursor) {
+    this.width = width;
+    this.height = height;
     const first = firstAfter(now - span);
-    this.fitAxes(first, links, shown);
-    this.drawFrame();
+    const last = Math.min(record.length, firstAfter(now) + 1);
+    this.fitAxes(first, last, links, shown);
+    this.drawFrame(context);
     context.save();
     context.beginPath();
     context.rect(LEFT, TOP, width - LEFT - RIGHT, height - TOP - BOTTOM);
     context.clip();
-    for (let joint = 0; joint < links; joint += 1) if (shown[joint]) this.drawPath(joint, first);
+    const at = Number.isFinite(cursor) ? Math.min(firstAfter(cursor), record.length - 1) : last - 1;
+    for (let joint = 0; joint < links; joint += 1) if (shown[joint]) this.drawPath(context, joint, first, last, at);
     context.restore();
   }
 
-  fitAxes(first, links, shown) {
+  fitAxes(first, last, links, shown) {
     const { across, up } = this;
     const { data } = record;
     across.begin();
     up.begin();
-    for (let i = first; i < record.length; i += 1) {
+    for (let i = first; i < last; i += 1) {
       const row = record.at(i);
       for (let joint = 0; joint < links; joint += 1) {
         if (!shown[joint]) continue;
@@ -53,17 +67,16 @@ export class PhasePlot {
   }
 
   x(value) {
-    return LEFT + this.across.place(value) * (this.surface.width - LEFT - RIGHT);
+    return LEFT + this.across.place(value) * (this.width - LEFT - RIGHT);
   }
 
   y(value) {
-    const { height } = this.surface;
+    const { height } = this;
     return height - BOTTOM - this.up.place(value) * (height - TOP - BOTTOM);
   }
 
-  drawFrame() {
-    const { context, width, height } = this.surface;
-    const { across, up } = this;
+  drawFrame(context) {
+    const { across, up, width, height } = this;
     context.lineWidth = 1;
     context.globalAlpha = 1;
     context.font = "11px system-ui, sans-serif";
@@ -93,10 +106,9 @@ export class PhasePlot {
     context.fillText("position [rad]", LEFT + (width - LEFT - RIGHT) / 2, height - 4);
   }
 
-  drawPath(joint, first) {
-    const { context } = this.surface;
+  drawPath(context, joint, first, last, at) {
     const { data } = record;
-    const rows = record.length - first;
+    const rows = last - first;
     if (rows < 1) return;
     context.strokeStyle = colors.joints[joint];
     context.fillStyle = colors.joints[joint];
@@ -104,21 +116,60 @@ export class PhasePlot {
     context.lineJoin = "round";
     for (let piece = 0; piece < PIECES; piece += 1) {
       const from = first + Math.floor((piece * rows) / PIECES);
-      const to = Math.min(record.length - 1, first + Math.floor(((piece + 1) * rows) / PIECES));
+      const to = Math.min(last - 1, first + Math.floor(((piece + 1) * rows) / PIECES));
       context.globalAlpha = (piece + 1) / PIECES;
       context.beginPath();
-      for (let i = from; i <= to; i += 1) {
-        const row = record.at(i);
-        const x = this.x(data[row + POSITION + joint]);
-        const y = this.y(data[row + VELOCITY + joint]);
-        if (i === from) context.moveTo(x, y);
-        else context.lineTo(x, y);
+      let before = from;
+      this.extend(context, joint, from, from, from);
+      for (let i = from + 1; i <= to; i += 1) {
+        if (i < to && this.distance(joint, before, i) < NEAR) continue;
+        this.extend(context, joint, i, before, from);
+        before = i;
       }
       context.stroke();
     }
-    const row = record.last();
+    const row = record.at(at);
     context.beginPath();
     context.arc(this.x(data[row + POSITION + joint]), this.y(data[row + VELOCITY + joint]), 4, 0, 2 * Math.PI);
     context.fill();
   }
+
+  /** Of two samples, on the screen [px]. */
+  distance(joint, a, b) {
+    const { data } = record;
+    const [from, to] = [record.at(a) + joint, record.at(b) + joint];
+    return Math.abs(this.x(data[to + POSITION]) - this.x(data[from + POSITION]))
+      + Math.abs(this.y(data[to + VELOCITY]) - this.y(data[from + VELOCITY]));
+  }
+
+  /** From sample `last` to sample `i`: a cubic with the true slope in position, and one through the samples in velocity. */
+  extend(context, joint, i, last, from) {
+    const { data } = record;
+    const row = record.at(i);
+    const [q, v] = [data[row + POSITION + joint], data[row + VELOCITY + joint]];
+    if (i === from) {
+      context.moveTo(this.x(q), this.y(v));
+      return;
+    }
+    const before = record.at(last);
+    const [q0, v0] = [data[before + POSITION + joint], data[before + VELOCITY + joint]];
+    if (this.across.log || this.up.log || Math.abs(q - q0) > FAR || !Number.isFinite(v)) {
+      context.lineTo(this.x(q), this.y(v));
+      return;
+    }
+    const third = (data[row + TIME] - data[before + TIME]) / 3;
+    context.bezierCurveTo(
+      this.x(q0 + third * v0), this.y(v0 + third * slope(joint, last, from)),
+      this.x(q - third * v), this.y(v - third * slope(joint, i, from)), this.x(q), this.y(v),
+    );
+  }
+}
+
+/** Acceleration of a joint at sample `k`, from the samples beside it [rad/s²]. */
+function slope(joint, k, from) {
+  const { data } = record;
+  const a = record.at(Math.max(from, k - 1));
+  const b = record.at(Math.min(record.length - 1, k + 1));
+  const h = data[b + TIME] - data[a + TIME];
+  return h > 0 ? (data[b + VELOCITY + joint] - data[a + VELOCITY + joint]) / h : 0;
 }

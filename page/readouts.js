@@ -1,15 +1,26 @@
 // Numbers in words and figures: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
 // Invariant: written a few times a second; only what changed touches the page.
 
-import { METHODS } from "./controls.js";
 import { byId, setText } from "./dom.js";
-import { duration, fixed, significant } from "./format.js";
+import { duration, fixed, methodName, significant } from "./format.js";
 import { tip } from "./arm_view.js";
+import { growthOf } from "./growth.js";
+import { shown } from "./playback.js";
+import { answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
+import { isStill } from "./runtime.js";
+import { Median } from "./smooth.js";
 import { state, watch } from "./store.js";
-import { exceedsLimit, limit } from "./transport.js";
 
 /** Fewer joint states than this, a second, are worth a look. */
 const LOW_RATE = 50;
+/** Below this real-time factor the runtime lags. */
+const LAGS = 0.95;
+/** Estimates that are shown as one: two seconds of them. */
+const ESTIMATES = 20;
+/** A local error below this is rounding, whatever its digits [rad/s]. */
+const ROUNDING = 1e-12;
+
+const estimates = new Median(ESTIMATES);
 
 export function startReadouts() {
   watch("connection", (now) => {
@@ -17,64 +28,75 @@ export function startReadouts() {
     pill.className = `pill ${now}`;
     setText(byId("connection-text"), { open: "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
   });
-  watch("stability", showLimit);
-  watch("stabilityMissing", showLimit);
-  watch("integrator", showLimit);
-  watch("estimate", showLimit);
-}
-
-export function methodName(method) {
-  return METHODS.find(([name]) => name === method)?.[1] ?? method ?? "–";
+  const causes = ["stability", "stabilityMissing", "integrator", "gains", "params", "setpoint", "enabled", "diagnostics"];
+  for (const key of causes) watch(key, showLimit);
+  watch("integrator", () => estimates.clear());
+  watch("estimate", (estimate) => {
+    if (!estimate) estimates.clear();
+    else estimates.add(estimate.error_per_second);
+    const { value } = estimates;
+    setText(byId("out-error"), value < ROUNDING ? "rounding" : Number.isFinite(value) ? `${significant(value, 2)} rad` : "–");
+  });
 }
 
 /** Called a few times a second. */
 export function showReadouts() {
   const { diagnostics } = state;
-  setText(byId("sim-time"), fixed(state.time, 2));
+  setText(byId("sim-time"), fixed(shown.time, 2));
   setText(byId("run-state"), runState());
-  byId("run-state").className = `state ${diagnostics?.state === "diverged" ? "diverged" : state.paused ? "paused" : "running"}`;
+  byId("run-state").className = `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`;
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
-  byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < 0.95);
+  byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < LAGS);
   setText(byId("out-method"), methodName(state.integrator?.method).replace("Runge–Kutta 4", "RK 4"));
   setText(byId("out-timestep"), duration(state.integrator?.timestep ?? NaN));
   setText(byId("out-servo"), state.enabled == null ? "–" : state.enabled ? "on" : "off");
   setText(byId("out-steps"), `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
   setText(byId("out-clients"), fixed(diagnostics?.clients ?? NaN, 0));
   setText(byId("out-rate"), `${fixed(state.rate, 0)} Hz`);
-  byId("out-rate").classList.toggle("warn", state.connection === "open" && state.rate > 0 && state.rate < LOW_RATE);
+  byId("out-rate").classList.toggle("warn", state.connection === "open" && !isStill() && state.rate > 0 && state.rate < LOW_RATE);
   setText(byId("out-drops"), fixed(diagnostics?.dropped ?? NaN, 0));
   byId("out-drops").classList.toggle("warn", diagnostics?.dropped > 0);
 }
 
 function runState() {
   if (state.connection !== "open") return "no connection";
+  if (!shown.live) return shown.playing && shown.speed !== 1 ? `recording, ${significant(1 / shown.speed, 2)} times slower` : "recording";
   if (state.diagnostics?.state === "diverged") return "diverged";
   return state.paused ? "paused" : "running";
 }
 
-/** The limit beside the timestep, and how much of it is used as a bar. */
+/** The verdict on the timestep: in a word on the arm, in a sentence under it, and beside the timestep as a bar. */
 function showLimit() {
-  const most = limit();
-  const known = Number.isFinite(most) && most > 0;
-  const text = known ? duration(most) : most === 0 ? "no timestep" : most === Infinity ? "any timestep" : state.stabilityMissing ? "not offered" : "–";
-  setText(byId("out-limit"), text);
-  byId("out-limit").title = state.stabilityMissing ? "This runtime has no /study/stability (no provider)." : "Largest stable timestep, predicted at the present setpoint with the control held over each step.";
-  byId("out-limit").classList.toggle("bad", exceedsLimit());
+  const said = verdict(state);
+  const { limit, everyPose } = limitInForce(state);
+  const pill = byId("verdict-pill");
+  pill.hidden = said.kind === "offline" || said.kind === "diverged"; // the other pill says so
+  pill.className = `state ${said.kind}`;
+  setText(pill, said.pill);
+  setText(byId("verdict"), said.kind === "never" ? `${said.sentence} ${growthOf(state)}` : said.sentence);
+  const bad = said.kind === "beyond" || said.kind === "never" || said.kind === "diverged";
+  setText(byId("out-limit"), state.stabilityMissing && Number.isNaN(limit) ? "not offered" : limitText(limit));
+  byId("out-limit").title = said.where;
+  byId("out-limit").classList.toggle("bad", bad);
+  setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
+  const answer = state.enabled ? answerInForce(state) : null;
+  setText(byId("worst-text"), worstText(answer));
+  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found by search");
+  byId("out-every").classList.toggle("warn", said.kind === "here");
+  const known = Number.isFinite(limit) && limit > 0;
   const bar = byId("limit-bar");
   bar.hidden = !known || state.integrator == null;
-  const used = state.integrator ? state.integrator.timestep / most : 0;
+  const used = state.integrator ? state.integrator.timestep / limit : 0;
   bar.style.setProperty("--used", `${Math.min(100, 100 * used)}%`);
-  bar.className = `limit-bar ${used > 1 ? "bad" : used > 0.7 ? "warn" : "good"}`;
+  bar.className = `limit-bar ${used > 1 ? "bad" : said.kind === "here" || used > 0.7 ? "warn" : "good"}`;
   bar.setAttribute("aria-label", `timestep is ${fixed(100 * used, 0)} percent of the stability limit`);
-  const { stability, estimate } = state;
+  const stability = answerInForce(state);
   const advice = [];
-  if (most === 0) advice.push("Grows at every timestep, by prediction.");
-  if (stability?.minimum_over_poses_held > 0) advice.push(`Over all poses: ${duration(stability.minimum_over_poses_held)}.`);
-  if (stability?.timestep_limit_continuous > 0) advice.push(`With control in every stage: ${duration(stability.timestep_limit_continuous)}.`);
+  if (stability && !Number.isNaN(limit)) advice.push(limit === 0 ? `No timestep is stable, ${said.where}.` : `Stable up to ${limitText(limit)}, ${said.where}.`);
+  if (stability?.timestep_limit_continuous > 0 && state.enabled) advice.push(`Control in every stage: ${duration(stability.timestep_limit_continuous)}.`);
   if (stability?.advised_timestep > 0) advice.push(`Advised: ${duration(stability.advised_timestep)}.`);
   setText(byId("limit-text"), advice.join(" "));
-  setText(byId("out-error"), estimate ? `${significant(estimate.error_per_second, 2)} rad/s` : "–");
 }
 
 /** The arm in a sentence, for those who can't see it; read when the view has the focus. */

@@ -13,9 +13,11 @@ export class Rosbridge {
     this.url = url;
     this.onState = onState;
     this.handlers = new Map(); // topic -> function
+    this.throttles = new Map(); // topic -> least time between messages [ms], where there is one
     this.calls = new Map(); // id -> { settle, timer }
     this.nextId = 1;
     this.retryMs = FIRST_RETRY_MS;
+    /** @type {(text: string) => void} */
     this.onStatus = () => {};
     this.connect();
   }
@@ -32,7 +34,7 @@ export class Rosbridge {
       this.retryMs = FIRST_RETRY_MS;
       // Errors about what we publish are worth showing; over WebSocket they come only when asked for.
       this.send({ op: "set_level", level: "error" });
-      for (const topic of this.handlers.keys()) this.send({ op: "subscribe", topic });
+      for (const topic of this.handlers.keys()) this.send(this.subscription(topic));
       this.onState("open");
     };
     socket.onmessage = (event) => this.receive(event.data);
@@ -78,7 +80,19 @@ export class Rosbridge {
 
   subscribe(topic, handler) {
     this.handlers.set(topic, handler);
-    this.send({ op: "subscribe", topic });
+    this.send(this.subscription(topic));
+  }
+
+  subscription(topic) {
+    return { op: "subscribe", topic, throttle_rate: this.throttles.get(topic) ?? 0 };
+  }
+
+  /** From now on at most one message of the topic every `ms`. */
+  throttle(topic, ms) {
+    if ((this.throttles.get(topic) ?? 0) === ms) return;
+    this.throttles.set(topic, ms);
+    this.send({ op: "unsubscribe", topic });
+    this.send(this.subscription(topic));
   }
 
   publish(topic, msg) {

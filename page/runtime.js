@@ -1,25 +1,44 @@
 // The runtime as the page sees it: topics into the store, commands out, settings asked for again now and then.
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 
-import { Rosbridge, nobodyProvides } from "./rosbridge.js";
-import { MOST_LINKS, set, state, tell } from "./store.js";
 import { announce, warn } from "./announce.js";
+import { latestOnly } from "./latest.js";
+import { motionHasChanged, question } from "./policy.js";
+import { Rosbridge, nobodyProvides } from "./rosbridge.js";
+import { MOST_LINKS, set, state, tell, watch } from "./store.js";
 
 /** Other clients change settings too, and no topic tells of it. */
 const POLL_MS = 1000;
 /** A service that nobody provides is asked for again, rarely: a provider may come. */
 const MISSING_POLLS = 15;
+/** A trajectory may be on its way to the arm while diagnostics from before it still arrive. */
+const TRAJECTORY_MS = 400;
+/** So long after our own reset the clock's jump is taken to be its. */
+const OWN_RESET_MS = 2000;
+/** A picture that stands still, or that nobody sees, needs few joint states [ms between two]. */
+const STILL_MS = 100;
+/** What is reckoned or searched may take its time. */
+const LONG_CALL_MS = 120000;
+/** A joint state is as old as this at most when it arrives. */
+const LATENESS_MS = 40;
+/** Setpoints may come many a second; the study is asked about the latest. */
+const STABILITY_MS = 200;
+/** Radius within which a goal counts as reached, unless it says otherwise [m]; the runtime's own default. */
 export const DEFAULT_EPSILON = 0.02;
 
 let bridge;
 let arrived = 0; // joint states since the last reckoning of the rate
 let counted = performance.now();
 let missingPolls = 0;
-let answeredQuestion = "";
+let lastTrajectory = -Infinity;
+let lastReset = -Infinity;
 let onReset = () => {};
+let beforeChange = () => {};
 
-export function start(whenReset) {
+/** `whenReset` is called at a reset of the arm, `whenChanging` before the page changes a setting. */
+export function start(whenReset, whenChanging) {
   onReset = whenReset;
+  beforeChange = whenChanging;
   const scheme = location.protocol === "https:" ? "wss" : "ws";
   bridge = new Rosbridge(`${scheme}://${location.host}/`, connection);
   bridge.onStatus = (text) => warn(text);
@@ -31,6 +50,22 @@ export function start(whenReset) {
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   bridge.subscribe("/arm_sim/error_estimate", (msg) => set("estimate", msg));
   setInterval(poll, POLL_MS);
+  for (const key of ["integrator", "gains", "params", "enabled", "setpoint", "links"]) {
+    watch(key, () => { if (!state.stabilityMissing) askStability(); });
+  }
+  for (const key of ["params", "enabled"]) watch(key, () => set("pushed", false));
+  watch("paused", pace);
+  document.addEventListener("visibilitychange", pace);
+}
+
+/** As many joint states as are drawn: all of a moving arm in sight, a few of one that is paused or hidden. */
+function pace() {
+  const ms = isStill() ? STILL_MS : 0;
+  for (const topic of ["/joint_states", "/arm_sim/error_estimate"]) bridge.throttle(topic, ms);
+}
+
+export function isStill() {
+  return state.paused === true || document.hidden;
 }
 
 function connection(now) {
@@ -38,12 +73,15 @@ function connection(now) {
   set("connection", now);
   if (now === "open") {
     missingPolls = 0;
-    answeredQuestion = "";
+    // It may be another runtime, or the same one started anew: nothing of the old one holds.
+    state.setpointKnown = false;
+    set("stability", null);
     set("stabilityMissing", false);
     set("goal", null);
     set("trial", null);
     set("estimate", null);
     poll();
+    isOffered("/study/gains").then((offered) => set("offersGains", offered));
     announce("Connected to the arm.");
   } else if (now === "lost" && before === "open") {
     warn("The connection is lost. The page reconnects by itself.");
@@ -56,14 +94,20 @@ function connection(now) {
 function jointStates(msg) {
   const n = Math.min(msg.position.length, MOST_LINKS);
   const time = msg.header.stamp.sec + msg.header.stamp.nanosec * 1e-9;
+  arrived += 1;
   if (n !== state.links) {
     state.setpointKnown = false;
     set("links", n);
+  } else if (time === state.time && same(msg, n)) {
+    return; // a paused arm says the same sixty times a second
   }
-  // The clock runs backwards only at a reset, which brings the setpoint back to the starting pose.
+  // The clock runs backwards only at a reset, which brings the setpoint back to the starting pose. A trajectory may have come
+  // since: after our own reset's answer, or, as far as the new clock tells, after somebody else's.
   if (time < state.time) {
-    state.setpoint.fill(0);
-    state.setpointKnown = true;
+    const now = performance.now();
+    const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
+    if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
+    state.pushed = false;
     set("goal", null);
     onReset();
   }
@@ -72,10 +116,17 @@ function jointStates(msg) {
     state.position[i] = msg.position[i];
     state.velocity[i] = msg.velocity[i];
     state.effort[i] = msg.effort[i];
+    if (state.enabled === false && msg.effort[i] !== 0) state.pushed = true;
   }
   state.version += 1;
-  arrived += 1;
   tell("version");
+}
+
+function same({ position, velocity, effort }, n) {
+  for (let i = 0; i < n; i += 1) {
+    if (position[i] !== state.position[i] || velocity[i] !== state.velocity[i] || effort[i] !== state.effort[i]) return false;
+  }
+  return true;
 }
 
 function trajectory(msg) {
@@ -84,11 +135,22 @@ function trajectory(msg) {
   const names = msg.joint_names;
   const named = Array.isArray(names) && names.length === last.length
     && new Set(names).size === names.length && names.every((name) => /^joint[123]$/.test(name));
-  for (let i = 0; i < last.length; i += 1) {
-    state.setpoint[named ? Number(names[i].slice(5)) - 1 : i] = last[i];
-  }
+  const positions = new Array(last.length);
+  for (let i = 0; i < last.length; i += 1) positions[named ? Number(names[i].slice(5)) - 1 : i] = last[i];
+  lastTrajectory = performance.now();
+  keepSetpoint(positions);
+}
+
+function keepSetpoint(positions) {
+  if (state.setpointKnown && positions.every((q, i) => q === state.setpoint[i])) return;
+  state.setpoint.set(positions);
   state.setpointKnown = true;
   tell("setpoint");
+}
+
+/** Rust's text of a number. */
+function told(text) {
+  return text === "inf" ? Infinity : Number(text);
 }
 
 function diagnostics(msg) {
@@ -96,7 +158,10 @@ function diagnostics(msg) {
   for (const status of msg.status) {
     const values = Object.fromEntries(status.values.map(({ key, value }) => [key, value]));
     if (status.name === "arm_sim") {
-      for (const key of Object.keys(values)) report[key] = key === "state" ? values[key] : Number(values[key]);
+      for (const key of Object.keys(values)) report[key] = key === "state" ? values[key] : told(values[key]);
+      const setpoint = values.setpoint ? JSON.parse(values.setpoint) : [];
+      const late = performance.now() - lastTrajectory > TRAJECTORY_MS;
+      if (late && setpoint.length === state.links && setpoint.every(Number.isFinite)) keepSetpoint(setpoint);
       report.level = status.level;
       report.message = status.message;
     } else if (status.name === "gateway") {
@@ -105,7 +170,9 @@ function diagnostics(msg) {
     }
   }
   const before = state.diagnostics?.state;
+  if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
+  if (motionHasChanged(state) && question(state)) askNow(question(state));
   if (before !== report.state && report.state === "diverged") warn(`The simulation has ${report.message}`);
 }
 
@@ -141,10 +208,11 @@ function poll() {
   setGains({});
   pause();
   enable();
-  askStability();
+  if (!state.stabilityMissing || (missingPolls += 1) % MISSING_POLLS === 0) askStability();
 }
 
 async function settings(service, args, keep) {
+  if (Object.keys(args).length > 0) beforeChange();
   const answer = await bridge.call(service, args);
   if (Object.keys(answer.values).length > 0) keep(answer.values);
   return answer;
@@ -160,7 +228,6 @@ export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args,
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
 export const pause = (data) => settings("/arm_sim/pause", data === undefined ? {} : { data }, (values) => keep("paused", values.data));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
-export const reset = () => bridge.call("/arm_sim/reset");
 export const step = (steps) => bridge.call("/arm_sim/step", { steps });
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
@@ -168,8 +235,25 @@ export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
 export const trialStart = (args) => bridge.call("/ik_trial/start", args);
 export const trialSkip = () => bridge.call("/ik_trial/skip");
 export const trialStop = () => bridge.call("/ik_trial/stop");
-/** Offline motion of the same arm; long ones take their time. */
-export const rollout = (args) => bridge.call("/study/rollout", args, 120000);
+/** Whether anybody provides a service. */
+async function isOffered(service) {
+  const answer = await bridge.call("/rosapi/services");
+  return answer.result && answer.values.services.includes(service);
+}
+
+/** Gains for the present arm, where the runtime offers to find some. */
+export const suggestGains = () => bridge.call("/study/gains", {}, LONG_CALL_MS);
+/** Offline motion of the same arm. */
+export const rollout = (args) => bridge.call("/study/rollout", args, LONG_CALL_MS);
+
+export async function reset() {
+  const answer = await bridge.call("/arm_sim/reset");
+  if (answer.result) {
+    lastReset = performance.now();
+    keepSetpoint(new Array(state.links).fill(0));
+  }
+  return answer;
+}
 
 export async function sendGoal(args) {
   const answer = await bridge.call("/ik_action/send_goal", args);
@@ -184,6 +268,7 @@ export async function sendGoal(args) {
 
 /** Sends `positions` [rad] as the setpoint; it comes back over the topic like anybody's. */
 export function sendSetpoint(positions) {
+  beforeChange();
   const names = Array.from({ length: state.links }, (_, i) => `joint${i + 1}`);
   bridge.publish("/joint_trajectory", {
     header: { stamp: { sec: 0, nanosec: 0 }, frame_id: "" },
@@ -192,19 +277,17 @@ export function sendSetpoint(positions) {
   });
 }
 
-/** What the limit depends on; the timestep is not among it. Reckoning it takes a while, so it is asked for only when this changes. */
-function stabilityQuestion() {
-  const { integrator, gains, params, enabled, setpoint, setpointKnown } = state;
-  return JSON.stringify([integrator?.method, gains, params, enabled, setpointKnown && Array.from(setpoint)]);
-}
-
-async function askStability() {
-  if (state.stabilityMissing && (missingPolls += 1) % MISSING_POLLS !== 0) return;
-  const question = stabilityQuestion();
-  if (question === answeredQuestion) return;
-  const answer = await bridge.call("/study/stability");
+/** Asks about the loop in force, unless its answer is there; reckoning takes a while, so only the newest question counts. */
+const askNow = latestOnly(async (asked) => {
+  const answer = await bridge.call("/study/stability", asked);
   const missing = nobodyProvides(answer);
-  if (answer.result) answeredQuestion = question;
   if (missing !== state.stabilityMissing) set("stabilityMissing", missing);
-  keep("stability", answer.result ? answer.values : null);
+  state.stabilityAsked = answer.result ? JSON.stringify(asked) : "";
+  set("stability", answer.result ? answer.values : null);
+}, STABILITY_MS);
+
+function askStability() {
+  const asked = question(state);
+  if (!asked || !bridge.open || (state.stability && state.stabilityAsked === JSON.stringify(asked))) return;
+  askNow(asked);
 }

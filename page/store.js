@@ -13,7 +13,7 @@ export const state = {
   velocity: new Float64Array(MOST_LINKS), // rad/s
   effort: new Float64Array(MOST_LINKS), // N m
   rate: 0, // joint states per second
-  // The setpoint is known once somebody has sent one, or after a reset.
+  // The setpoint is known from the trajectories that pass, from resets, and from the diagnostics.
   setpoint: new Float64Array(MOST_LINKS), // rad
   setpointKnown: false,
   params: null, // { gravity, masses, lengths }
@@ -23,11 +23,16 @@ export const state = {
   enabled: null, // is PID on
   diagnostics: null, // { level, message, state, ...numbers }
   stability: null, // values of /study/stability
+  stabilityAsked: "", // the question that they answer; see `policy.js`
   stabilityMissing: false,
+  offersGains: false, // whether /study/gains is served
   estimate: null, // message of /arm_sim/error_estimate
+  pushed: false, // whether an effort has acted with the servo off since energy is counted
   goal: null, // { id, target, epsilon, distance, elapsed, outcome }
   trial: null, // message of /ik_trial/status
+  tab: "plots", // the panel that is shown
   joint: 0, // the joint that keys and the phase plot are about
+  lesson: null, // the lesson that was chosen; see `lessons.js`
 };
 
 const watchers = new Map(); // key -> functions

@@ -1,11 +1,14 @@
 // A canvas as sharp as the screen: sized in device pixels, drawn in CSS pixels.
-// Invariant: its size is read when it changes, not at every frame.
+// Invariant: its size is read when it changes, not at every frame. It is opaque and has a pixel for each of the screen's that it
+// covers, so that a frame of it is copied to the screen, neither blended nor resampled.
+
+import { colors } from "./theme.js";
 
 export class Surface {
   /** @param {HTMLCanvasElement} canvas @param {() => void} onResize */
   constructor(canvas, onResize) {
     this.canvas = canvas;
-    this.context = canvas.getContext("2d");
+    this.context = canvas.getContext("2d", { alpha: false });
     this.onResize = onResize;
     this.width = 0; // CSS pixels
     this.height = 0;
@@ -21,13 +24,23 @@ export class Surface {
   }
 
   fit() {
-    const { clientWidth, clientHeight } = this.canvas;
     const density = devicePixelRatio || 1;
-    this.width = clientWidth;
-    this.height = clientHeight;
-    this.canvas.width = Math.max(1, Math.round(clientWidth * density));
-    this.canvas.height = Math.max(1, Math.round(clientHeight * density));
+    const { left, top, right, bottom } = this.canvas.getBoundingClientRect();
+    // A browser rounds where the edges are, so that a box's place has a say in how many pixels it covers.
+    const width = Math.round(right * density) - Math.round(left * density);
+    const height = Math.round(bottom * density) - Math.round(top * density);
+    this.width = width / density;
+    this.height = height / density;
+    this.canvas.width = Math.max(1, width);
+    this.canvas.height = Math.max(1, height);
     this.context.setTransform(density, 0, 0, density, 0, 0);
     this.onResize();
+  }
+
+  /** Paints all of it in the colour of what it stands on. */
+  clear() {
+    this.context.globalAlpha = 1;
+    this.context.fillStyle = colors.panel;
+    this.context.fillRect(0, 0, this.width, this.height);
   }
 }

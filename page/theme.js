@@ -4,12 +4,12 @@
 import { byId } from "./dom.js";
 
 const KEY = "pendularm-theme";
-const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "first", "second"];
+const NAMES = ["page", "panel", "ink", "muted", "line", "grid", "accent", "good", "warn", "bad", "target", "joint1", "joint2", "joint3", "kinetic", "potential", "stable", "unstable", "run1", "run2", "run3", "run4", "run5", "run6"];
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const listeners = [];
 
-/** Colours by name, always of the present theme; `joints` in joint order. */
-export const colors = { joints: [] };
+/** Colours by name, always of the present theme; `joints` in joint order, `runs` in that of a comparison. */
+export const colors = { joints: [], runs: [] };
 
 export function onTheme(react) {
   listeners.push(react);
@@ -19,6 +19,7 @@ function read() {
   const style = getComputedStyle(document.documentElement);
   for (const name of NAMES) colors[name] = style.getPropertyValue(`--${name}`).trim();
   colors.joints = [colors.joint1, colors.joint2, colors.joint3];
+  colors.runs = [colors.run1, colors.run2, colors.run3, colors.run4, colors.run5, colors.run6];
   for (const react of listeners) react();
 }
 

@@ -1,13 +1,15 @@
-// Pause, single step and reset, and what the view says over the arm: hints, warnings, divergence.
+// Pause, single step and reset, and what is said under the arm: the verdict on the timestep, warnings, divergence.
 // Invariant: a notice offers what can be done about it, and goes when its cause is gone.
 
+import { recover, resetArm } from "./actions.js";
 import { announce } from "./announce.js";
 import { byId, el, setText } from "./dom.js";
-import { switchServo } from "./controls.js";
+import { switchServo, takeSuggestion } from "./controls.js";
 import { refusal } from "./field.js";
-import { duration } from "./format.js";
+import { duration, fixed } from "./format.js";
+import { limitInForce, verdict } from "./policy.js";
 import { nobodyProvides } from "./rosbridge.js";
-import { pause, reset, setIntegrator, step } from "./runtime.js";
+import { pause, step } from "./runtime.js";
 import { state, watch } from "./store.js";
 
 /** Below this real-time factor a warning of the runtime is about its pace. */
@@ -21,13 +23,14 @@ export function startTransport() {
   byId("transport").after(said.element);
   byId("pause").addEventListener("click", togglePause);
   byId("step").addEventListener("click", singleStep);
-  byId("reset").addEventListener("click", resetArm);
+  byId("reset").addEventListener("click", () => report(resetArm()));
   watch("paused", (paused) => {
     setText(byId("pause-text"), paused ? "Run" : "Pause");
     byId("pause").classList.toggle("is-paused", paused === true);
     announce(paused ? "Paused." : "Running.");
   });
-  for (const key of ["diagnostics", "connection", "enabled", "goal", "integrator", "stability", "trial"]) watch(key, showNotice);
+  const causes = ["diagnostics", "connection", "enabled", "goal", "integrator", "gains", "params", "setpoint", "stability", "trial", "offersGains"];
+  for (const key of causes) watch(key, showNotice);
 }
 
 async function report(call) {
@@ -52,28 +55,12 @@ export async function singleStep() {
   said.show(nobodyProvides(answer) ? `This runtime can't be stepped: ${answer.status}` : answer.result ? "" : answer.status);
 }
 
-export async function resetArm() {
-  if ((await report(reset())).result) announce("Reset: the arm is in its starting pose.");
-}
-
 // Notices, the gravest first
-
-/**
- * The largest stable timestep [s] that is predicted for the present setting, control being held over each step; 0 where
- * no timestep is stable, infinite where every one is, NaN where nothing is known.
- */
-export function limit() {
-  if (state.stability) return state.stability.timestep_limit_held ?? Infinity;
-  return state.estimate?.predicted_limit ?? NaN;
-}
-
-export function exceedsLimit() {
-  return state.integrator != null && state.integrator.timestep > limit();
-}
 
 function showNotice() {
   const notice = choose();
-  const key = notice ? notice.key : "";
+  // A button is another one when its figure is.
+  const key = notice ? `${notice.key} ${notice.buttons.map(([text]) => text)}` : "";
   const box = byId("notice");
   if (key === shownNotice) {
     if (notice) setText(box.firstChild, notice.text);
@@ -82,28 +69,27 @@ function showNotice() {
   shownNotice = key;
   box.className = notice ? `notice ${notice.kind}` : "notice";
   box.hidden = !notice;
-  byId("stage").classList.toggle("diverged", key === "diverged");
+  byId("stage").classList.toggle("diverged", notice?.key === "diverged");
   if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", onclick: act }, text)));
 }
 
 function choose() {
-  const { diagnostics, goal, integrator } = state;
-  if (state.connection !== "open") {
+  const { diagnostics, goal } = state;
+  const { kind, sentence, advised } = verdict(state);
+  if (kind === "offline") {
     return state.links === 0
       ? { key: "connecting", kind: "calm", text: "Looking for the arm…", buttons: [] }
       : { key: "lost", kind: "bad", text: "Connection lost. Trying again…", buttons: [] };
   }
-  const advised = state.stability?.advised_timestep;
-  const calm = Number.isFinite(advised) && advised > 0 && advised < integrator?.timestep
-    ? [[`Use ${duration(advised)}`, () => report(setIntegrator({ timestep: advised }))]] : [];
-  if (diagnostics?.state === "diverged") {
-    const why = exceedsLimit() ? ` ${overLimit()}` : "";
-    return { key: "diverged", kind: "bad", text: `Diverged. ${sentence(diagnostics.message)}${why}`, buttons: [["Reset", resetArm], ...calm] };
+  const smaller = advised > 0 ? [[`Reset with ${duration(advised)}`, () => report(recover(advised))]] : [];
+  // No timestep helps where the gains are at fault.
+  const other = state.enabled && state.offersGains && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
+  if (kind === "diverged") {
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Reset", () => report(resetArm())]] };
   }
-  // A free arm under a method that feeds it energy at any timestep is no news at every moment; the figures say it.
-  if (exceedsLimit() && (limit() > 0 || state.enabled)) return { key: "limit", kind: "warn", text: overLimit(), buttons: calm };
+  if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && diagnostics.real_time_factor < SLOW) {
-    return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: calm };
+    return { key: "slow", kind: "warn", text: `The runtime can't keep up: ${diagnostics.real_time_factor.toFixed(2)} of real time.`, buttons: [] };
   }
   if (state.enabled === false && (goal?.outcome === "active" || state.trial?.running)) {
     return { key: "servo", kind: "calm", text: "The servo is off, so the arm swings freely and doesn't follow.", buttons: [["Turn the servo on", () => switchServo(true)]] };
@@ -111,17 +97,11 @@ function choose() {
   if (state.paused && goal?.outcome === "active") {
     return { key: "paused", kind: "calm", text: "Paused: the arm doesn't move.", buttons: [["Run", togglePause]] };
   }
-  return null;
+  return kind === "here" ? { key: "here", kind: "warn", text: sentence, buttons: [...smaller, ...other] } : null;
 }
 
-function overLimit() {
-  return limit() > 0
-    ? `Timestep ${duration(state.integrator.timestep)} is above the predicted stability limit ${duration(limit())}.`
-    : "No timestep is stable with this integrator and these gains, by prediction.";
-}
-
-/** "diverged: step 12 was ...; reset clears this" as a sentence of its own. */
-function sentence(message) {
-  const text = message.replace(/^diverged:\s*/, "").replace(/;.*$/, "").replace(/\d+\.\d{5,}/g, (digits) => String(Number(Number(digits).toPrecision(6))));
-  return `${text.charAt(0).toUpperCase()}${text.slice(1)}.`;
+/** The time in "diverged: step 12 from t = 0.6 s was not finite ..."; nothing if it names none. */
+function whenOf(message) {
+  const time = /t = ([\d.e-]+) s/.exec(message);
+  return time ? ` at t = ${fixed(Number(time[1]), 3)} s` : "";
 }

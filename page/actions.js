@@ -1,0 +1,101 @@
+// What the page does with all settings at once: applies them, undoes the last change, goes back to the defaults, starts a
+// lesson; and the reset that belongs to it.
+// Invariant: every change can be undone, and what the runtime refused is said.
+
+import { announce } from "./announce.js";
+import { byId } from "./dom.js";
+import { goLive } from "./playback.js";
+import { enable, pause, reset, sendSetpoint, setGains, setIntegrator, setParams } from "./runtime.js";
+import { DEFAULTS, Undo, presentSettings } from "./settings.js";
+import { set, state, watch } from "./store.js";
+import { openTab } from "./tabs.js";
+
+const undo = new Undo();
+let applying = false;
+
+/** Before any change that the page makes. */
+export function remember() {
+  if (applying) return;
+  undo.remember(presentSettings(state), performance.now());
+  byId("undo").disabled = undo.past.length === 0;
+}
+
+export function startActions() {
+  byId("undo").addEventListener("click", takeBack);
+  byId("defaults").addEventListener("click", async () => {
+    remember();
+    set("lesson", null);
+    await apply(DEFAULTS[state.links]);
+    announce("All settings are the defaults again.");
+  });
+  watch("links", () => {
+    undo.past.length = 0;
+    byId("undo").disabled = true;
+  });
+}
+
+export async function takeBack() {
+  const settings = undo.take();
+  if (!settings) return;
+  await apply(settings);
+  byId("undo").disabled = undo.past.length === 0;
+  announce("Undone.");
+}
+
+/** Applies what is given, and gives the refusals. The servo comes last, so that it never acts on half of the settings. */
+export async function apply({ integrator, params, gains, servo, setpoint }) {
+  applying = true;
+  const answers = [];
+  if (servo === false) answers.push(await enable(false));
+  if (params) answers.push(await setParams(params));
+  if (gains) answers.push(await setGains(gains));
+  if (integrator) answers.push(await setIntegrator(integrator));
+  if (setpoint) sendSetpoint(setpoint);
+  if (servo) answers.push(await enable(true));
+  applying = false;
+  return answers.filter((answer) => !answer.result).map((answer) => answer.status);
+}
+
+/** Sets the scene of a lesson, from the starting pose; done again, it begins anew. */
+export async function startLesson(lesson) {
+  remember();
+  set("lesson", lesson);
+  openTab(lesson.panel);
+  return begin(lesson);
+}
+
+async function begin(lesson) {
+  goLive();
+  const { servo, setpoint, ...rest } = lesson.settings(state.links);
+  await enable(false);
+  const refusals = await apply({ ...rest, servo: null, setpoint: null });
+  const answer = await reset();
+  // A reset takes the setpoint to the starting pose, so it is sent after it.
+  refusals.push(...await apply({ integrator: null, params: null, gains: null, servo, setpoint }));
+  if (state.paused) await pause(false);
+  announce(`${lesson.name}. ${lesson.text}`);
+  return answer.result ? refusals : [...refusals, answer.status];
+}
+
+/** Back to the starting pose; in a lesson, to how the lesson began. */
+export async function resetArm() {
+  goLive();
+  if (state.lesson) {
+    const refusals = await begin(state.lesson);
+    return { result: refusals.length === 0, status: refusals.join(" "), values: {} };
+  }
+  const answer = await reset();
+  if (answer.result) announce("Reset: the arm is in its starting pose.");
+  return answer;
+}
+
+/** The way out of a blow-up in one click: a smaller timestep, then the reset; everything else stays, the setpoint too. */
+export async function recover(timestep) {
+  goLive();
+  const setpoint = state.setpointKnown ? Array.from(state.setpoint.subarray(0, state.links)) : null;
+  const set = await setIntegrator({ timestep });
+  if (!set.result) return set;
+  const answer = await reset();
+  if (answer.result && setpoint) sendSetpoint(setpoint);
+  return answer;
+}

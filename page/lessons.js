@@ -1,0 +1,99 @@
+// @ts-check
+// The lessons: each sets the scene with one click and says in two sentences what to see and what to try.
+// Invariant: a lesson is data; whoever starts it applies its settings, resets the arm, and shows its panel.
+
+import { DEFAULTS } from "./settings.js";
+import { scaled } from "./loop.js";
+
+/** @typedef {import("./settings.js").Settings} Settings */
+/**
+ * @typedef {object} Lesson
+ * @property {string} id
+ * @property {string} name
+ * @property {string} text two sentences: see, try
+ * @property {"plots" | "stability" | "error" | "compare"} panel where to look
+ * @property {(links: number) => Settings} settings
+ * @property {[string, number][]} [runs] what to compare, and for how long [s]
+ * @property {number} [seconds]
+ */
+
+/** @param {number} links @param {Partial<Settings>} changed @returns {Settings} */
+function from(links, changed) {
+  return { ...structuredClone(DEFAULTS[links]), ...changed };
+}
+
+/** @param {number} links @param {number[]} values */
+function first(links, values) {
+  return values.slice(0, links);
+}
+
+/** Of the last link [kg]: as heavy as the usual gains still hold in every pose. @type {Record<number, number>} */
+const HEAVY = { 2: 5, 3: 3 };
+const FOLDED = [0.9, -1.3, 0.8];
+
+/** @type {Lesson[]} */
+export const LESSONS = [
+  {
+    id: "euler",
+    name: "Euler gains energy",
+    text: "Nothing drives this swing, so its energy should stay at 0 J, yet Euler at 5 ms adds some at every step. Choose Runge–Kutta 4 (key 4), reset, and the line stays flat.",
+    panel: "plots",
+    settings: (links) => from(links, { integrator: { method: "euler", timestep: 0.005 } }),
+  },
+  {
+    id: "limit",
+    name: "Beyond the limit",
+    text: "The servo steps at 5.5 ms, longer than the arm bears when stretched out: each step overcorrects the one before, so that the shaking grows by the same factor every time, until it throws the arm about and begins anew. Press the button that resets it with a smaller timestep, then drag the timestep up until it shakes again.",
+    panel: "plots",
+    settings: (links) => from(links, { integrator: { method: "rk4", timestep: 0.0055 }, servo: true }),
+  },
+  {
+    id: "held",
+    name: "Held or continuous",
+    text: "The controller holds each effort for a whole step, as a computer does; were it to act at every instant, this method would bear half as much again. In the map the solid line is the limit held, the dashed one the limit with control in every stage: choose Euler, and the two fall together.",
+    panel: "stability",
+    settings: (links) => from(links, { integrator: { method: "rk4", timestep: 0.003 }, servo: true, setpoint: first(links, FOLDED) }),
+  },
+  {
+    id: "stiff",
+    name: "Stiff gains",
+    text: "All gains are six times the usual ones, so the arm answers faster and bears a sixth of the timestep: 1 ms is now beyond the limit. Click in the map left of the line to make it stable, and see how far right a lower gain lets you go.",
+    panel: "stability",
+    settings: (links) => from(links, { gains: scaled(/** @type {any} */ (DEFAULTS[links].gains), 6), servo: true, integrator: { method: "rk4", timestep: 0.001 } }),
+  },
+  {
+    id: "heavy",
+    name: "The heavy tip",
+    text: "The last link is several times heavier, and the same gains are soft for it: the arm sways longer, yet bears a longer timestep. Make that link 0.1 kg instead, and the limit falls: the same gain moves less mass faster.",
+    panel: "plots",
+    settings: (links) => from(links, {
+      params: { gravity: 9.81, lengths: new Array(links).fill(1), masses: Array.from({ length: links }, (_, i) => (i === links - 1 ? HEAVY[links] : 1)) },
+      servo: true, setpoint: first(links, FOLDED),
+    }),
+  },
+  {
+    id: "chaos",
+    name: "Chaos and its horizon",
+    text: "The same free swing, by the same method at three timesteps: they agree for some seconds, then part for good, because every error grows tenfold about every second and a half. A smaller timestep buys a few seconds more, never the whole future.",
+    panel: "compare",
+    settings: (links) => from(links, {}),
+    runs: [["rk4", 0.01], ["rk4", 0.005], ["rk4", 0.0025]],
+    seconds: 20,
+  },
+  {
+    id: "sag",
+    name: "P sags, I holds",
+    text: "Without integral gain the arm rests below its setpoint, where the position error times the gain carries its weight. Raise the integral gain (300 will do): the error is summed up until nothing is left of it.",
+    panel: "plots",
+    settings: (links) => from(links, {
+      gains: { kp: first(links, [60, 30, 15]), ki: new Array(links).fill(0), kd: first(links, [25, 8, 2]) }, servo: true, setpoint: first(links, [0.6, -0.4, 0.2]),
+    }),
+  },
+  {
+    id: "own",
+    name: "Your own arm",
+    text: "Set masses and lengths of the arm that you have, then gains, and read under the arm which timestep they bear, and where. If no timestep is stable, or the arm is slow, take gains that are suggested, or lower the integral ones and raise the others.",
+    panel: "stability",
+    settings: (links) => from(links, { servo: true, setpoint: first(links, FOLDED) }),
+  },
+];

@@ -1,0 +1,189 @@
+// The stability map: gains against timestep, where the held servo is stable and where not, the present point in it.
+// A click goes there; so do the arrow keys.
+// Invariant: the boundary is that of the arm's own settings, drawn as far as it is known; a click sends what it shows.
+
+import { byId, setText } from "./dom.js";
+import { duration, methodName } from "./format.js";
+import { onFrame, wake } from "./frames.js";
+import { answerInForce } from "./policy.js";
+import { limitOf, loopAt, scaled } from "./loop.js";
+import { setGains, setIntegrator } from "./runtime.js";
+import { LogScale } from "./scale.js";
+import { state, watch } from "./store.js";
+import { Surface } from "./surface.js";
+import { colors, onTheme } from "./theme.js";
+
+const ROWS = 33; // gains whose limits are found, the present ones in the middle
+const LEFT = 46;
+const RIGHT = 10;
+const TOP = 8;
+const BOTTOM = 32;
+/** Present gains times this much, and this little. */
+const WIDEST = 16;
+const FINE = 1.1; // one arrow key
+
+const factors = new LogScale(1 / WIDEST, WIDEST);
+const timesteps = new LogScale(1e-4, 0.1);
+
+let surface;
+let asked = ""; // the settings that `rows` are about
+let rows = []; // { held, continuous } [s] for each factor, as far as they are known
+let loops = null;
+let stale = true;
+
+export function startMap() {
+  const canvas = byId("map");
+  surface = new Surface(canvas, redraw);
+  onTheme(redraw);
+  for (const key of ["integrator", "gains", "params", "setpoint", "stability", "enabled", "tab", "links"]) watch(key, redraw);
+  canvas.addEventListener("click", (event) => goTo(event.offsetX, event.offsetY));
+  canvas.addEventListener("keydown", arrows);
+  onFrame(draw);
+}
+
+function redraw() {
+  stale = true;
+  wake();
+}
+
+/** Settings that move the boundary; the timestep does not. */
+function settings() {
+  const { integrator, gains, params, setpoint, links } = state;
+  if (!integrator || !gains || !params || gains.kp.length !== links || params.masses.length !== links) return null;
+  const pose = (state.enabled && answerInForce(state)?.equilibrium) || Array.from(setpoint.subarray(0, links));
+  return { method: integrator.method, gains, params, pose };
+}
+
+/** One more row of limits at a time, so that no frame takes long; gives whether rows are missing. */
+function goOn() {
+  const present = settings();
+  if (!present) return false;
+  const key = JSON.stringify(present);
+  if (key !== asked) {
+    asked = key;
+    rows = [];
+    loops = present;
+  }
+  if (rows.length >= ROWS) return false;
+  const began = performance.now();
+  do {
+    const factor = factors.value(rows.length / (ROWS - 1));
+    const loop = loopAt(loops.params, scaled(loops.gains, factor), loops.pose);
+    rows.push({ factor, held: limitOf(loop, loops.method, true), continuous: limitOf(loop, loops.method, false) });
+  } while (rows.length < ROWS && performance.now() - began < 8);
+  stale = true;
+  return rows.length < ROWS;
+}
+
+function draw() {
+  if (!stale || state.tab !== "stability" || surface.width === 0) return false;
+  stale = false;
+  const more = goOn();
+  const { context, width, height } = surface;
+  surface.clear();
+  drawFrame(context, width, height);
+  if (rows.length > 1) drawBoundaries(context, width, height);
+  drawPoint(context);
+  describe();
+  stale = more;
+  return more;
+}
+
+function x(timestep) {
+  return LEFT + timesteps.place(timestep) * (surface.width - LEFT - RIGHT);
+}
+
+function y(factor) {
+  return surface.height - BOTTOM - factors.place(factor) * (surface.height - TOP - BOTTOM);
+}
+
+function within(timestep) {
+  return Math.min(timesteps.high, Math.max(timesteps.low, timestep));
+}
+
+function drawFrame(context, width, height) {
+  // Only as far up as the limits are known: what has not been judged is neither.
+  const known = rows.length > 0 ? y(rows.at(-1).factor) : height - BOTTOM;
+  context.fillStyle = colors.unstable;
+  context.fillRect(LEFT, known, width - LEFT - RIGHT, height - BOTTOM - known);
+  context.font = "11px system-ui, sans-serif";
+  context.fillStyle = colors.muted;
+  context.textAlign = "center";
+  for (const tick of [1e-4, 1e-3, 1e-2, 1e-1]) context.fillText(duration(tick), Math.min(x(tick), width - 22), height - 18);
+  context.fillText("timestep", LEFT + (width - LEFT - RIGHT) / 2, height - 4);
+  context.textAlign = "right";
+  context.textBaseline = "middle";
+  for (const factor of [1 / 16, 1 / 4, 1, 4, 16]) context.fillText(factor < 1 ? `1/${1 / factor}` : `${factor}×`, LEFT - 6, y(factor));
+  context.textBaseline = "alphabetic";
+}
+
+function drawBoundaries(context, width, height) {
+  context.fillStyle = colors.stable;
+  context.beginPath();
+  context.moveTo(LEFT, y(rows[0].factor));
+  for (const { factor, held } of rows) context.lineTo(x(within(held)), y(factor));
+  context.lineTo(LEFT, y(rows.at(-1).factor));
+  context.closePath();
+  context.fill();
+  for (const name of ["held", "continuous"]) {
+    context.strokeStyle = colors.ink;
+    context.lineWidth = name === "held" ? 2 : 1.25;
+    context.setLineDash(name === "held" ? [] : [5, 4]);
+    context.beginPath();
+    for (const row of rows) context.lineTo(x(within(row[name])), y(row.factor));
+    context.stroke();
+  }
+  context.setLineDash([]);
+  context.strokeStyle = colors.muted;
+  context.lineWidth = 1;
+  context.strokeRect(LEFT, TOP, width - LEFT - RIGHT, height - TOP - BOTTOM);
+  context.font = "600 12px system-ui, sans-serif";
+  context.fillStyle = colors.ink;
+  context.textAlign = "left";
+  context.fillText("stable", LEFT + 8, y(1) - 8); // the very low gains of the lower edge hold the arm at no timestep
+  context.textAlign = "right";
+  context.fillText("unstable", width - RIGHT - 8, TOP + 16);
+}
+
+function drawPoint(context) {
+  if (!state.integrator) return;
+  const { timestep } = state.integrator;
+  context.fillStyle = colors.accent;
+  context.strokeStyle = colors.panel;
+  context.lineWidth = 2;
+  context.beginPath();
+  context.arc(x(within(timestep)), y(1), 6, 0, 2 * Math.PI);
+  context.fill();
+  context.stroke();
+}
+
+function describe() {
+  const row = rows[(ROWS - 1) / 2];
+  if (!row || !state.integrator) return;
+  const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
+  setText(byId("map-value"), `${duration(state.integrator.timestep)}, gains as they are`);
+  setText(byId("map-text"), `With ${methodName(state.integrator.method)} at this setpoint the present gains bear ${words(row.held)} held over each step (solid line), `
+    + `${words(row.continuous)} with control in every stage (dashed); higher gains bear less, and too low ones hold the arm at no timestep. The dot is the arm${state.enabled ? "" : " once the servo is on"}; click to go elsewhere.`);
+}
+
+function goTo(left, top) {
+  if (!state.integrator || !state.gains) return;
+  const place = (left - LEFT) / (surface.width - LEFT - RIGHT);
+  const rise = (surface.height - BOTTOM - top) / (surface.height - TOP - BOTTOM);
+  if (place < 0 || place > 1 || rise < 0 || rise > 1) return;
+  move(timesteps.value(place), factors.value(rise));
+}
+
+function move(timestep, factor) {
+  const short = (value) => Number(value.toPrecision(3));
+  const gains = scaled(state.gains, factor);
+  if (Math.abs(Math.log(factor)) > 0.02) setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) });
+  if (timestep !== state.integrator.timestep) setIntegrator({ timestep: short(timestep) });
+}
+
+function arrows(event) {
+  const step = { ArrowLeft: [1 / FINE, 1], ArrowRight: [FINE, 1], ArrowUp: [1, FINE], ArrowDown: [1, 1 / FINE] }[event.key];
+  if (!step || !state.integrator || !state.gains) return;
+  event.preventDefault();
+  move(within(state.integrator.timestep * step[0]), step[1]);
+}

@@ -1,0 +1,143 @@
+// @ts-check
+// What is to be thought of the present timestep: the limit of the loop in force, where it holds, and the verdict in words.
+// Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
+
+import { duration, fixed, significant } from "./format.js";
+import { isFree, noGains } from "./loop.js";
+
+/** @typedef {import("./loop.js").Gains} Gains */
+/** @typedef {"offline" | "diverged" | "unknown" | "never" | "beyond" | "here" | "stable"} Kind */
+/**
+ * @typedef {object} Verdict
+ * @property {Kind} kind
+ * @property {string} pill a few words
+ * @property {string} sentence all of it
+ * @property {number} limit largest stable timestep [s]: 0 none, Infinity any, NaN not known
+ * @property {number} advised timestep to offer [s]; NaN where there is none
+ * @property {string} where what pose or speed the limit is about
+ */
+
+/** Share of a limit that is advised, as the runtime does. */
+const SHARE = 0.8;
+
+/** The question whose answer is about the loop in force: with the servo off that is the arm left to itself. */
+export function question(/** @type {any} */ { links, integrator, gains, params, enabled, setpoint, setpointKnown }) {
+  if (!integrator || !gains || !params || enabled == null || gains.kp.length !== links) return null;
+  return {
+    integrator: integrator.method,
+    params,
+    gains: enabled ? gains : noGains(links),
+    ...(setpointKnown ? { setpoint: Array.from(setpoint.subarray(0, links)) } : {}),
+  };
+}
+
+/** The study's answer, if it is about the loop in force; null while it is not. */
+export function answerInForce(/** @type {any} */ state) {
+  const asked = question(state);
+  return asked && state.stability && state.stabilityAsked === JSON.stringify(asked) ? state.stability : null;
+}
+
+/** Parts of a limit that are no news. */
+const NEWS = 0.05;
+
+/** Whether the motion bears another timestep than when the study was last asked: that limit changes as the arm moves. */
+export function motionHasChanged(/** @type {any} */ { stability, diagnostics }) {
+  const [then, now] = [stability?.timestep_limit_motion, diagnostics?.timestep_limit_motion];
+  if (then === undefined || !(now > 0)) return false;
+  return open(then) !== now && !(Math.abs(now / open(then) - 1) < NEWS);
+}
+
+/** A limit as it is served: nothing limits where it is null. @param {number | null | undefined} served */
+function open(served) {
+  return served ?? Infinity;
+}
+
+/** The limit of the loop in force [s], and what pose or speed it is about. */
+export function limitInForce(/** @type {any} */ state) {
+  const answer = answerInForce(state);
+  const free = state.enabled === false || (state.gains != null && isFree(state.gains));
+  const { links } = state;
+  if (!answer) {
+    // Without a study the arm's own word will do; it is about the loop in force too, but names no pose.
+    const told = state.stabilityMissing ? state.diagnostics?.timestep_limit ?? NaN : NaN;
+    return { limit: told, where: free ? "left to itself" : "at the setpoint", everyPose: NaN, advised: NaN };
+  }
+  const held = open(answer.timestep_limit_held);
+  const motion = open(answer.timestep_limit_motion);
+  const pose = answer.equilibrium ?? (free ? null : state.setpoint.subarray(0, links));
+  const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
+  const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: "hanging, small swings", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
+  const place = kinds[/** @type {keyof typeof kinds} */ (answer.equilibrium_kind)] ?? (free ? (state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns") : `at the setpoint ${named}`);
+  const moving = motion < held;
+  return {
+    limit: Math.min(held, motion),
+    where: moving ? `moving at ${significant(answer.motion_speed ?? NaN, 3)} rad/s` : place,
+    everyPose: free ? Math.min(held, motion) : Math.min(held, motion, open(answer.minimum_over_poses_held)),
+    advised: free ? answer.advised_timestep ?? NaN : afterReset(answer),
+  };
+}
+
+/** Which pose bears least, how surely that is known, and what shakes there first; empty where nothing limits. */
+export function worstText(/** @type {any} */ answer) {
+  const { minimum_over_poses_held: least, worst_pose: pose, critical, certified, minimum_over_poses_bound: bound } = answer ?? {};
+  if (!(least > 0) || !pose || !critical) return "";
+  const sure = certified ? "proven to 1 %"
+    : `the least that a search found${bound > 0 ? `; proven is ${duration(bound)}` : ", not proven"}`;
+  const way = critical.frequency > 0 ? `at ${significant(critical.frequency, 3)} Hz` : "without swinging";
+  return `The pose that bears least, ${duration(least)} (${sure}), is (${pose.map((/** @type {number} */ q) => fixed(q, 2)).join(", ")}) rad: 10 % beyond it joint ${critical.joint + 1} `
+    + `moves most, ${way}, ${significant(critical.growth_per_step, 3)} times further at every step.`;
+}
+
+/** @returns {Verdict} */
+export function verdict(/** @type {any} */ state) {
+  const { limit, where, everyPose, advised } = limitInForce(state);
+  const timestep = state.integrator?.timestep ?? NaN;
+  const offered = advised > 0 && advised < timestep ? advised : NaN;
+  const known = { limit, where, advised: offered };
+  const at = `${duration(timestep)}`;
+  if (state.connection !== "open") return { kind: "offline", pill: "no connection", sentence: "", ...known };
+  if (state.diagnostics?.state === "diverged") {
+    return { kind: "diverged", pill: "diverged", sentence: excess(timestep, limit, where), ...known };
+  }
+  if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit not known yet", sentence: "", ...known };
+  if (timestep > limit) {
+    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "grows at any timestep", sentence: excess(timestep, limit, where), ...known };
+  }
+  if (timestep > everyPose) {
+    const others = everyPose > 0 ? `other poses bear only ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is: there the gains themselves are at fault";
+    const sentence = `${at} is stable ${where}, but ${others}.`;
+    return { kind: "here", pill: "stable here only", sentence, ...known };
+  }
+  return { kind: "stable", pill: "stable", sentence: `${at} is within the limit ${limitText(limit)}, ${where}.`, ...known };
+}
+
+/** Why the timestep is too long; empty if it is not. @param {number} timestep @param {number} limit @param {string} where */
+function excess(timestep, limit, where) {
+  if (!(timestep > limit)) return "";
+  return limit > 0
+    ? `Timestep ${duration(timestep)} is above the predicted stability limit ${duration(limit)}, ${where}.`
+    : `No timestep is stable, ${where}.`;
+}
+
+/** @param {number} limit */
+export function limitText(limit) {
+  if (Number.isNaN(limit)) return "…";
+  return limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : duration(limit);
+}
+
+/** What to call the energy since the last reset: drift only if nothing puts any in or takes any out. */
+export function energyName(/** @type {{enabled: boolean | null, pushed: boolean}} */ { enabled, pushed }) {
+  if (enabled) return "work done";
+  return pushed ? "pushed in" : "drift";
+}
+
+/**
+ * What to begin anew with: the arm is at rest then, and how fast it has become does not count.
+ * @param {Object<string, any>} answer of `/study/stability`
+ * @returns {number} timestep [s]; NaN where there is none
+ */
+function afterReset(answer) {
+  const found = answer.minimum_over_poses_held;
+  const safe = answer.certified === false ? answer.minimum_over_poses_bound ?? found : found;
+  return safe > 0 ? SHARE * safe : NaN;
+}

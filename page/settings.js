@@ -1,0 +1,108 @@
+// @ts-check
+// All settings of the arm as one object: taken, compared, spelled in a link, read from one. And the way back: what was in
+// force before the latest changes.
+// Invariant: nothing here speaks to the runtime; whoever applies settings hears its refusals.
+
+import { exact } from "./format.js";
+
+/** @typedef {import("./loop.js").Gains} Gains */
+/** @typedef {import("./loop.js").Arm} Arm */
+/**
+ * @typedef {object} Settings
+ * @property {{method?: string, timestep?: number} | null} integrator
+ * @property {Partial<Arm> | null} params
+ * @property {Partial<Gains> | null} gains
+ * @property {boolean | null} servo
+ * @property {number[] | null} setpoint
+ */
+
+const METHOD = /^(euler|midpoint|verlet|rk4)$/;
+/** Changes that can be undone. */
+const MOST_STEPS = 100;
+/** Changes closer together than this are one: a slider is dragged through many values [ms]. */
+const ONE_CHANGE_MS = 1000;
+
+/** The runtime's own settings at its start, by links; a test compares them with it. @type {Record<number, Settings>} */
+export const DEFAULTS = {
+  2: {
+    integrator: { method: "rk4", timestep: 0.001 },
+    params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
+    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] },
+    servo: false,
+    setpoint: [0, 0],
+  },
+  3: {
+    integrator: { method: "rk4", timestep: 0.001 },
+    params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
+    gains: { kp: [1900, 240, 115], ki: [4800, 500, 340], kd: [185, 32, 5] },
+    servo: false,
+    setpoint: [0, 0, 0],
+  },
+};
+
+/** The settings in force; null until the runtime has said them all. @returns {Settings | null} */
+export function presentSettings(/** @type {any} */ { links, integrator, params, gains, enabled, setpoint, setpointKnown }) {
+  if (!integrator || !params || !gains || enabled == null) return null;
+  return {
+    integrator,
+    params,
+    gains,
+    servo: enabled,
+    setpoint: setpointKnown ? Array.from(setpoint.subarray(0, links)) : null,
+  };
+}
+
+/** @param {Settings} settings @param {number} links */
+export function toFragment({ integrator, params, gains, servo, setpoint }, links) {
+  const list = (/** @type {number[]} */ values) => values.map(exact).join(",");
+  const parts = [
+    ["links", links], ["method", integrator?.method], ["timestep", exact(integrator?.timestep ?? NaN)],
+    ["gravity", exact(params?.gravity ?? NaN)], ["masses", list(params?.masses ?? [])], ["lengths", list(params?.lengths ?? [])],
+    ["kp", list(gains?.kp ?? [])], ["ki", list(gains?.ki ?? [])], ["kd", list(gains?.kd ?? [])], ["servo", servo ? "on" : "off"],
+  ];
+  if (setpoint) parts.push(["setpoint", list(setpoint)]);
+  return parts.map(([name, value]) => `${name}=${value}`).join("&");
+}
+
+/** What a link's fragment holds; checked no further than its form, since the runtime checks it all. @returns {Settings} */
+export function fromFragment(/** @type {string} */ hash) {
+  const given = new URLSearchParams(hash.replace(/^#/, ""));
+  const numbers = (/** @type {string} */ name) => given.get(name)?.split(",").map(Number);
+  const pick = (/** @type {string[]} */ names, /** @type {(name: string) => any} */ read) => {
+    const found = names.map((name) => [name, read(name)]).filter(([, value]) => value !== undefined);
+    return found.length > 0 ? Object.fromEntries(found) : null;
+  };
+  const single = (/** @type {string} */ name) => (given.has(name) ? Number(given.get(name)) : undefined);
+  const method = given.get("method") ?? "";
+  return {
+    integrator: pick(["method", "timestep"], (name) => (name === "method" ? (METHOD.test(method) ? method : undefined) : single(name))),
+    params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
+    gains: pick(["kp", "ki", "kd"], numbers),
+    servo: given.has("servo") ? given.get("servo") === "on" : null,
+    setpoint: numbers("setpoint") ?? null,
+  };
+}
+
+/** Settings as they were before each change, newest last. */
+export class Undo {
+  constructor() {
+    /** @type {Settings[]} */
+    this.past = [];
+    this.lastTime = -Infinity;
+  }
+
+  /** Before a change at `now` [ms]: keeps what is in force, unless the change goes on with the one before. */
+  remember(/** @type {Settings | null} */ present, /** @type {number} */ now) {
+    const goesOn = now - this.lastTime < ONE_CHANGE_MS;
+    this.lastTime = now;
+    if (!present || goesOn) return;
+    this.past.push(structuredClone(present));
+    if (this.past.length > MOST_STEPS) this.past.shift();
+  }
+
+  /** What to go back to; undefined if there is nothing. */
+  take() {
+    this.lastTime = -Infinity;
+    return this.past.pop();
+  }
+}
