@@ -1,0 +1,356 @@
+//! Bytes to messages and back, without I/O: one JSON object per line, or one per WebSocket message.
+//!
+//! **Invariant:** a strict reader: what no server may send is an error, not something to be lenient with.
+
+use crate::Error;
+use crate::websocket::{ACCEPT, LAST, append, opcode};
+
+/// How frames are told from one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Framing {
+    /// One JSON object per line.
+    Lines,
+    /// One per WebSocket message.
+    WebSocket,
+}
+
+/// A message or control frame that has come.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A line without its end, or a text message.
+    Text(String),
+    /// A binary message.
+    Binary(Vec<u8>),
+    /// A ping, which has to be answered with its payload.
+    Ping(Vec<u8>),
+    /// A pong.
+    Pong(Vec<u8>),
+    /// The end of a WebSocket: its code, if it has one, and its reason.
+    Close(Option<u16>, String),
+}
+
+/// One end of a connection: what has come of it, and how frames are written on it.
+#[derive(Debug)]
+pub struct Codec {
+    framing: Framing,
+    bytes: Vec<u8>,
+    /// How many of `bytes` are read, and how many are known to have no line end.
+    start: usize,
+    scanned: usize,
+    is_open: bool,
+    is_closed: bool,
+    /// The kind of the message that has begun, and the part of it that came.
+    unfinished: Option<(u8, Vec<u8>)>,
+}
+
+impl Codec {
+    /// An end at which nothing has come. A WebSocket is open once its handshake is answered.
+    #[must_use]
+    pub fn new(framing: Framing) -> Self {
+        Self {
+            framing,
+            bytes: Vec::new(),
+            start: 0,
+            scanned: 0,
+            is_open: framing == Framing::Lines,
+            is_closed: false,
+            unfinished: None,
+        }
+    }
+
+    /// An end at which the handshake is over.
+    #[must_use]
+    pub fn opened(framing: Framing) -> Self {
+        Self {
+            is_open: true,
+            ..Self::new(framing)
+        }
+    }
+
+    /// How frames are told from one another here.
+    #[must_use]
+    pub fn framing(&self) -> Framing {
+        self.framing
+    }
+
+    /// Whether the runtime has agreed to speak.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// Whether all that came was whole.
+    #[must_use]
+    pub fn is_between_messages(&self) -> bool {
+        self.pending().is_empty() && self.unfinished.is_none()
+    }
+
+    /// The bytes that have come and are not read.
+    #[must_use]
+    pub fn pending(&self) -> &[u8] {
+        &self.bytes[self.start..]
+    }
+
+    /// Throws away what has come and is not read, and returns how many bytes that were.
+    pub fn discard(&mut self) -> usize {
+        let discarded = self.pending().len();
+        self.bytes = Vec::new();
+        (self.start, self.scanned) = (0, 0);
+        discarded
+    }
+
+    /// Adds bytes that have come.
+    pub fn push(&mut self, bytes: &[u8]) {
+        // Moving the rest to the front costs no more than reading what was before it did.
+        if self.start > self.bytes.len() / 2 {
+            self.bytes.drain(..self.start);
+            self.scanned -= self.start;
+            self.start = 0;
+        }
+        self.bytes.extend_from_slice(bytes);
+    }
+
+    /// Appends a frame as it goes out.
+    pub fn write(&self, frame: &str, out: &mut Vec<u8>) {
+        match self.framing {
+            Framing::Lines => {
+                out.extend_from_slice(frame.as_bytes());
+                out.push(b'\n');
+            }
+            Framing::WebSocket => {
+                // Any mask will do, as long as it is not always the same.
+                let mask = 0x5bd1_e995_u64.wrapping_mul((out.len() + frame.len()) as u64 | 1);
+                let [.., a, b, c, d] = mask.to_be_bytes();
+                append(out, LAST | opcode::TEXT, [a, b, c, d], frame.as_bytes());
+            }
+        }
+    }
+
+    /// The next whole message or control frame of what has come.
+    ///
+    /// # Errors
+    /// [`Error::Malformed`] for what no server may send.
+    pub fn next_event(&mut self) -> Result<Option<Event>, Error> {
+        if !self.is_open && !self.read_handshake()? {
+            return Ok(None);
+        }
+        match self.framing {
+            Framing::Lines => self.line(),
+            Framing::WebSocket => self.message(),
+        }
+    }
+
+    fn take(&mut self, length: usize) -> &[u8] {
+        let from = self.start;
+        self.start += length;
+        self.scanned = self.scanned.max(self.start);
+        &self.bytes[from..self.start]
+    }
+
+    fn line(&mut self) -> Result<Option<Event>, Error> {
+        let unscanned = &self.bytes[self.scanned..];
+        let Some(at) = unscanned.iter().position(|byte| *byte == b'\n') else {
+            self.scanned = self.bytes.len();
+            return Ok(None);
+        };
+        let length = self.scanned + at + 1 - self.start;
+        let line = self.take(length);
+        text(line[..length - 1].to_vec()).map(|text| Some(Event::Text(text)))
+    }
+
+    fn read_handshake(&mut self) -> Result<bool, Error> {
+        let end = self
+            .pending()
+            .windows(4)
+            .position(|four| four == b"\r\n\r\n");
+        let Some(end) = end else { return Ok(false) };
+        let head = text(self.take(end + 4).to_vec())?;
+        self.is_open = head.starts_with("HTTP/1.1 101 ") && head.contains(ACCEPT);
+        check(self.is_open, || {
+            format!("the handshake is answered {head:?}")
+        })?;
+        Ok(true)
+    }
+
+    fn message(&mut self) -> Result<Option<Event>, Error> {
+        while let Some((first, payload)) = self.frame()? {
+            check(!self.is_closed, || {
+                "a frame after the close frame".to_owned()
+            })?;
+            check(first & 0x70 == 0, || {
+                "an extension that was not agreed on".to_owned()
+            })?;
+            let is_last = first & LAST != 0;
+            let opcode = first & 0x0f;
+            if opcode >= opcode::CLOSE {
+                let whole = is_last && payload.len() < 126;
+                check(whole, || {
+                    "a control frame that is long or in fragments".to_owned()
+                })?;
+                return self.control(opcode, payload).map(Some);
+            }
+            let (kind, message) = match (self.unfinished.take(), opcode) {
+                (Some((kind, mut message)), opcode::CONTINUATION) => {
+                    message.extend_from_slice(&payload);
+                    (kind, message)
+                }
+                (None, opcode::TEXT | opcode::BINARY) => (opcode, payload),
+                (_, opcode) => {
+                    return Err(Error::Malformed(format!("opcode {opcode} out of place")));
+                }
+            };
+            if !is_last {
+                self.unfinished = Some((kind, message));
+                continue;
+            }
+            return match kind {
+                opcode::TEXT => text(message).map(|text| Some(Event::Text(text))),
+                _ => Ok(Some(Event::Binary(message))),
+            };
+        }
+        Ok(None)
+    }
+
+    fn control(&mut self, opcode: u8, payload: Vec<u8>) -> Result<Event, Error> {
+        match opcode {
+            opcode::PING => Ok(Event::Ping(payload)),
+            opcode::PONG => Ok(Event::Pong(payload)),
+            opcode::CLOSE => {
+                self.is_closed = true;
+                match payload.as_slice() {
+                    [] => Ok(Event::Close(None, String::new())),
+                    [_] => Err(Error::Malformed("half a close code".to_owned())),
+                    [high, low, reason @ ..] => {
+                        let code = u16::from_be_bytes([*high, *low]);
+                        Ok(Event::Close(Some(code), text(reason.to_vec())?))
+                    }
+                }
+            }
+            other => Err(Error::Malformed(format!("opcode {other}"))),
+        }
+    }
+
+    /// The first byte and the payload of the next whole frame.
+    fn frame(&mut self) -> Result<Option<(u8, Vec<u8>)>, Error> {
+        let &[first, second, ref rest @ ..] = self.pending() else {
+            return Ok(None);
+        };
+        check(second & 0x80 == 0, || {
+            "a masked frame of a server".to_owned()
+        })?;
+        let extended = match second {
+            126 => 2,
+            127 => 8,
+            _ => 0,
+        };
+        let Some(field) = rest.get(..extended) else {
+            return Ok(None);
+        };
+        let length = match extended {
+            0 => usize::from(second),
+            _ => field
+                .iter()
+                .fold(0, |length, byte| (length << 8) | usize::from(*byte)),
+        };
+        if rest.len() - extended < length {
+            return Ok(None);
+        }
+        self.take(2 + extended);
+        Ok(Some((first, self.take(length).to_vec())))
+    }
+}
+
+fn text(bytes: Vec<u8>) -> Result<String, Error> {
+    String::from_utf8(bytes).map_err(|error| Error::Malformed(format!("not UTF-8: {error}")))
+}
+
+fn check(holds: bool, what: impl FnOnce() -> String) -> Result<(), Error> {
+    if holds {
+        Ok(())
+    } else {
+        Err(Error::Malformed(what()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// All events of these bytes, which come in pieces of every length in turn.
+    fn events(framing: Framing, bytes: &[u8]) -> Vec<Event> {
+        let mut last = Vec::new();
+        for piece in 1..=bytes.len() {
+            let mut codec = Codec::opened(framing);
+            let mut events = Vec::new();
+            for part in bytes.chunks(piece) {
+                codec.push(part);
+                while let Some(event) = codec.next_event().unwrap() {
+                    events.push(event);
+                }
+            }
+            assert!(codec.is_between_messages());
+            assert!(piece == 1 || events == last, "in pieces of {piece}");
+            last = events;
+        }
+        last
+    }
+
+    fn message(text: &str) -> Event {
+        Event::Text(text.to_owned())
+    }
+
+    #[test]
+    fn lines_come_one_by_one_in_whatever_pieces() {
+        let expected = [message("{}"), message(""), message("{\"a\":1}")];
+        assert_eq!(events(Framing::Lines, b"{}\n\n{\"a\":1}\n"), expected);
+    }
+
+    #[test]
+    fn messages_come_whole_with_control_frames_between_their_fragments() {
+        let long = "x".repeat(300);
+        let mut bytes = b"\x01\x01{\x89\x02hi\x80\x01}\x82\x01\x07\x81\x7e\x01\x2c".to_vec();
+        bytes.extend_from_slice(long.as_bytes());
+        bytes.extend_from_slice(b"\x88\x02\x03\xe8");
+        let expected = [
+            Event::Ping(b"hi".to_vec()),
+            message("{}"),
+            Event::Binary(vec![7]),
+            message(&long),
+            Event::Close(Some(1000), String::new()),
+        ];
+        assert_eq!(events(Framing::WebSocket, &bytes), expected);
+    }
+
+    #[test]
+    fn what_no_server_may_send_is_an_error() {
+        for bytes in [
+            &b"\x81\x80\0\0\0\0"[..], // masked
+            b"\xc1\x00",              // a reserved bit
+            b"\x80\x00",              // goes on with nothing
+            b"\x01\x00\x01\x00",      // a message within a message
+            b"\x09\x00",              // a ping in fragments
+            b"\x83\x00",              // a reserved kind
+            b"\x88\x01\x03",          // half a code
+            b"\x81\x01\xff",          // not UTF-8
+            b"\x88\x00\x81\x00",      // something after the end
+        ] {
+            let mut codec = Codec::opened(Framing::WebSocket);
+            codec.push(bytes);
+            let malformed =
+                std::iter::from_fn(|| codec.next_event().transpose()).any(|event| event.is_err());
+            assert!(malformed, "{bytes:x?}");
+        }
+    }
+
+    #[test]
+    fn a_websocket_opens_with_the_right_answer_only() {
+        let answer =
+            |accept: &str| format!("HTTP/1.1 101 X\r\nSec-WebSocket-Accept: {accept}\r\n\r\n");
+        let mut codec = Codec::new(Framing::WebSocket);
+        codec.push(answer(ACCEPT).as_bytes());
+        assert!(!codec.is_open() && codec.next_event().unwrap().is_none() && codec.is_open());
+        let mut codec = Codec::new(Framing::WebSocket);
+        codec.push(answer("another").as_bytes());
+        assert!(codec.next_event().is_err());
+    }
+}

@@ -1,0 +1,87 @@
+//! A rosbridge client for programs that try the runtime: tests, fuzz targets, soak and measurements.
+//!
+//! It shares no code with the runtime and no library that reads its frames, so that a fault of the one is not a fault of
+//! the other.
+//!
+//! | module | what |
+//! | --- | --- |
+//! | [`codec`] | bytes to messages and back, by line or by WebSocket; no I/O, so that every program here reads frames with it |
+//! | [`websocket`] | frames as a client writes them, also in pieces and against the rules |
+//! | [`blocking`] | a client on a TCP socket |
+//! | [`pipe`] | a client on an asynchronous stream (feature `tokio`) |
+//!
+//! **Invariant:** every wait has a limit, and says what it waited for.
+
+pub mod blocking;
+pub mod codec;
+#[cfg(feature = "tokio")]
+pub mod pipe;
+pub mod websocket;
+
+use std::fmt;
+use std::io;
+
+use serde_json::{Value, json};
+
+/// Why a client has nothing to give.
+#[derive(Debug)]
+pub enum Error {
+    /// Nothing came before the deadline.
+    Late,
+    /// The stream has ended.
+    Ended,
+    /// The runtime sent something that no server may send.
+    Malformed(String),
+    /// The socket has failed.
+    Socket(io::Error),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Late => write!(out, "nothing came in time"),
+            Self::Ended => write!(out, "the stream ended"),
+            Self::Malformed(what) => write!(out, "malformed: {what}"),
+            Self::Socket(error) => write!(out, "the socket failed: {error}"),
+        }
+    }
+}
+
+impl std::error::Error for Error {}
+
+/// A call of a service.
+#[must_use]
+pub fn call(service: &str, args: &Value, id: &Value) -> Value {
+    json!({"op": "call_service", "service": service, "args": args, "id": id})
+}
+
+/// Whether `frame` is the response to the call with this id.
+#[must_use]
+pub fn is_response_to(frame: &Value, id: &Value) -> bool {
+    frame["op"] == "service_response" && frame["id"] == *id
+}
+
+/// The values of a response that must be a success.
+///
+/// # Panics
+/// If the service has refused.
+#[must_use]
+#[track_caller]
+pub fn values(mut response: Value) -> Value {
+    assert_eq!(response["result"], true, "{response}");
+    assert_eq!(response["status"], "", "{response}");
+    response["values"].take()
+}
+
+/// The reason in a response that must be a refusal.
+///
+/// # Panics
+/// If the service has not refused, or has given no reason.
+#[must_use]
+#[track_caller]
+pub fn reason(response: &Value) -> String {
+    assert_eq!(response["result"], false, "{response}");
+    let reason = response["status"].as_str().unwrap_or_default();
+    assert!(!reason.is_empty(), "a refusal without a reason: {response}");
+    reason.to_owned()
+}

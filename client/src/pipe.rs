@@ -1,0 +1,238 @@
+//! A client on an asynchronous stream, such as an in-memory pipe, for tests in virtual time.
+
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::time::timeout;
+
+use crate::codec::{Codec, Event, Framing};
+use crate::websocket::{LAST, append, append_close, handshake, opcode};
+use crate::{Error, call, is_response_to, reason, values};
+
+/// The mask of control frames.
+const MASK: [u8; 4] = [1, 2, 3, 4];
+
+/// A client.
+#[derive(Debug)]
+pub struct Client<S> {
+    stream: S,
+    codec: Codec,
+    patience: Duration,
+    chunk: Vec<u8>,
+    calls: u64,
+    /// Every frame that came, oldest first, if the client was told to remember.
+    pub heard: Vec<Value>,
+    remembers: bool,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Client<S> {
+    /// A client by line at this end of a pipe; everything may take `patience`.
+    #[must_use]
+    pub fn on(stream: S, patience: Duration) -> Self {
+        Self::with(Framing::Lines, stream, patience)
+    }
+
+    /// The same by WebSocket, at `target` of `host`.
+    ///
+    /// # Panics
+    /// As all that follows: if what is asked for does not happen in time.
+    pub async fn web_on(stream: S, patience: Duration, host: &str, target: &str) -> Self {
+        let mut client = Self::with(Framing::WebSocket, stream, patience);
+        let request = handshake(host, target, "");
+        client.send_bytes(request.as_bytes()).await;
+        while !client.codec.is_open() {
+            // Nothing comes before the client has asked for it.
+            let next = client.codec.next_event();
+            assert!(matches!(next, Ok(None)), "{next:?}");
+            if !client.codec.is_open() {
+                client.read().await.expect("an answer to the handshake");
+            }
+        }
+        client
+    }
+
+    fn with(framing: Framing, stream: S, patience: Duration) -> Self {
+        Self {
+            stream,
+            codec: Codec::new(framing),
+            patience,
+            chunk: vec![0; 8192],
+            calls: 0,
+            heard: Vec::new(),
+            remembers: false,
+        }
+    }
+
+    /// The same, remembering every frame in [`Client::heard`].
+    #[must_use]
+    pub fn remembering(self) -> Self {
+        Self {
+            remembers: true,
+            ..self
+        }
+    }
+
+    /// The stream, for what is done against the rules. What was read of it and not asked for is not in it any more.
+    pub fn stream(&mut self) -> &mut S {
+        &mut self.stream
+    }
+
+    /// The stream alone.
+    #[must_use]
+    pub fn into_stream(self) -> S {
+        self.stream
+    }
+
+    /// Sends a frame.
+    pub async fn send(&mut self, frame: &Value) {
+        let mut bytes = Vec::new();
+        self.codec.write(&frame.to_string(), &mut bytes);
+        self.send_bytes(&bytes).await;
+    }
+
+    /// Says that the WebSocket is to end.
+    pub async fn close(&mut self, code: u16, reason: &str) {
+        let mut bytes = Vec::new();
+        append_close(&mut bytes, MASK, code, reason);
+        self.send_bytes(&bytes).await;
+    }
+
+    /// Sends bytes as they are.
+    pub async fn send_bytes(&mut self, bytes: &[u8]) {
+        self.stream.write_all(bytes).await.expect("an open pipe");
+    }
+
+    /// Stops sending; what is owed still comes.
+    pub async fn finish(&mut self) {
+        self.stream.shutdown().await.expect("an open pipe");
+    }
+
+    async fn read(&mut self) -> Result<(), Error> {
+        let reading = timeout(self.patience, self.stream.read(&mut self.chunk));
+        match reading.await.map_err(|_| Error::Late)? {
+            Ok(0) => Err(Error::Ended),
+            Ok(read) => {
+                self.codec.push(&self.chunk[..read]);
+                Ok(())
+            }
+            Err(error) => Err(Error::Socket(error)),
+        }
+    }
+
+    /// The next message or control frame; pings are answered. The end of the stream is an error.
+    ///
+    /// # Errors
+    /// If none comes, or something that no server may send.
+    pub async fn next_event(&mut self) -> Result<Event, Error> {
+        loop {
+            if let Some(event) = self.codec.next_event()? {
+                if let Event::Ping(payload) = &event {
+                    let mut pong = Vec::new();
+                    append(&mut pong, LAST | opcode::PONG, MASK, payload);
+                    self.stream.write_all(&pong).await.map_err(Error::Socket)?;
+                }
+                return Ok(event);
+            }
+            self.read().await?;
+        }
+    }
+
+    /// The next frame; pings and pongs are none.
+    ///
+    /// # Errors
+    /// If none comes, or something that is no frame.
+    pub async fn next_frame(&mut self) -> Result<Value, Error> {
+        loop {
+            let text = match self.next_event().await? {
+                Event::Text(text) => text,
+                Event::Ping(_) | Event::Pong(_) => continue,
+                Event::Close(..) => return Err(Error::Ended),
+                event => return Err(Error::Malformed(format!("{event:?} instead of a frame"))),
+            };
+            let frame: Value = serde_json::from_str(&text)
+                .map_err(|error| Error::Malformed(format!("{error} in {text:?}")))?;
+            if self.remembers {
+                self.heard.push(frame.clone());
+            }
+            return Ok(frame);
+        }
+    }
+
+    /// The next frame.
+    pub async fn receive(&mut self) -> Value {
+        match self.next_frame().await {
+            Ok(frame) => frame,
+            Err(error) => panic!("a frame is awaited: {error}"),
+        }
+    }
+
+    /// The next frame for which `wanted` holds.
+    pub async fn receive_where(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        loop {
+            let frame = self.receive().await;
+            if wanted(&frame) {
+                return frame;
+            }
+        }
+    }
+
+    /// All frames up to the end of the stream.
+    pub async fn rest(&mut self) -> Vec<Value> {
+        let mut frames = Vec::new();
+        loop {
+            match self.next_frame().await {
+                Ok(frame) => frames.push(frame),
+                Err(Error::Ended) if self.codec.is_between_messages() => return frames,
+                Err(error) => panic!("an orderly end is awaited: {error}"),
+            }
+        }
+    }
+
+    /// True if nothing comes, not even the end, for so long.
+    pub async fn hears_nothing_for(&mut self, time: Duration) -> bool {
+        if !self.codec.pending().is_empty() {
+            return false;
+        }
+        let Ok(read) = timeout(time, self.stream.read(&mut self.chunk)).await else {
+            return true;
+        };
+        self.codec.push(&self.chunk[..read.unwrap_or(0)]);
+        false
+    }
+
+    /// The next message on `topic`.
+    pub async fn message(&mut self, topic: &str) -> Value {
+        self.receive_where(|frame| frame["topic"] == topic).await["msg"].take()
+    }
+
+    /// Calls a service and returns the whole response.
+    pub async fn call(&mut self, service: &str, args: Value) -> Value {
+        self.calls += 1;
+        let id = json!(self.calls);
+        self.send(&call(service, &args, &id)).await;
+        self.receive_where(|frame| is_response_to(frame, &id)).await
+    }
+
+    /// Calls a service that must succeed and returns its values.
+    pub async fn ask(&mut self, service: &str, args: Value) -> Value {
+        values(self.call(service, args).await)
+    }
+
+    /// Calls a service that must refuse and returns the reason.
+    pub async fn refusal(&mut self, service: &str, args: Value) -> String {
+        reason(&self.call(service, args).await)
+    }
+
+    /// Subscribes and waits for the confirmation.
+    pub async fn subscribe(&mut self, topic: &str) {
+        self.send(&json!({"op": "subscribe", "topic": topic})).await;
+        let status = self.receive_where(|frame| frame["op"] == "status").await;
+        assert_eq!(status["level"], "info", "{status}");
+    }
+
+    /// Waits until the runtime has handled all that was sent: a call is answered in order.
+    pub async fn settle(&mut self) {
+        self.ask("/arm_sim/set_params", json!({})).await;
+    }
+}
