@@ -1,16 +1,44 @@
 //! pendularm: a real-time planar robot arm that any rosbridge client can drive.
 //!
-//! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), [`protocol`] (pure: bytes
-//! and JSON) and [`actors`] (joins the two, one actor per node). `math` and `protocol` do not know each other.
+//! Three layers, arrows one way: [`math`] (pure: the arm, the integrators, the control law), `protocol` (pure: bytes
+//! and JSON) and `actors` (joins the two, one actor per node). `math` and `protocol` do not know each other.
 //!
-//! Beside them [`study`] (pure: `math` measured against theory) and [`report`] (clock, files and drawings around the study),
-//! and `web`, the door for browsers, in builds that have the feature of that name.
+//! Beside them [`study`] (pure: `math` measured against theory), `report` (clock, files and drawings around the study)
+//! and `web`, the door for browsers.
+//!
+//! | feature | default | adds |
+//! | --- | --- | --- |
+//! | `runtime` | yes | `actors`, `protocol`, `options`, `logging`, `plan`, and the program |
+//! | `web` | yes | `web`: HTTP, the WebSocket and the page |
+//! | `report` | yes | `report`, with its experiments |
+//!
+//! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs
+//! no more, and compiles `glam` and `thiserror` beside it.
+//!
+//! ```
+//! use pendularm::math::{arm::Arm, pid::Gains, simulation::Simulation};
+//!
+//! let arm = Arm::new([1.0, 1.0], [1.0, 1.0], 9.81)?;
+//! let mut simulation = Simulation::new(arm, Gains { kp: [1000.0, 250.0], ki: [3000.0, 750.0], kd: [110.0, 22.0] });
+//! for _ in 0..1000 {
+//!     simulation.step();
+//! }
+//! assert!(simulation.state().position[0] < 0.0, "it has begun to fall");
+//! # Ok::<(), pendularm::math::arm::ArmError>(())
+//! ```
 
+#[cfg(feature = "runtime")]
 pub mod actors;
+#[cfg(feature = "runtime")]
 pub mod logging;
 pub mod math;
+#[cfg(feature = "runtime")]
 pub mod options;
+#[cfg(feature = "runtime")]
+pub mod plan;
+#[cfg(feature = "runtime")]
 pub mod protocol;
+#[cfg(feature = "report")]
 pub mod report;
 pub mod study;
 #[cfg(feature = "web")]

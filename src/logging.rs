@@ -3,7 +3,8 @@
 //! A parent that never reads the pipe it gave us must not stop the arm once that pipe is full. So a thread of its own
 //! writes the lines, a bounded queue feeds it, and what does not fit is dropped and counted.
 //!
-//! **Invariant:** logging never blocks, a broken standard error never fails anything, and an event is one line, whatever its text.
+//! **Invariant:** logging never blocks, a broken standard error never fails anything, and an event is one line,
+//! whatever its text.
 
 use std::fmt::{self, Write as _};
 use std::io::{self, Write};
@@ -20,7 +21,7 @@ use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::Layer;
 use tracing_subscriber::layer::{Context, SubscriberExt};
 
-use crate::protocol::text::push_plain;
+use crate::protocol::wire::text::push_plain;
 
 /// Lines that may wait for the writer: more than any burst of connections logs at the default level.
 const QUEUE_LINES: usize = 1024;
@@ -54,7 +55,7 @@ pub fn start(level: LevelFilter) -> io::Result<Log> {
     let printed = tracing_subscriber::fmt::layer()
         .with_writer(move || lines.clone())
         .with_filter(level);
-    let subscriber = tracing_subscriber::registry().with(printed).with(Told);
+    let subscriber = tracing_subscriber::registry().with(printed).with(Warnings);
     tracing::subscriber::set_global_default(subscriber).map_err(io::Error::other)?;
     Ok(log)
 }
@@ -66,7 +67,7 @@ pub struct Warning {
     pub level: u8,
     /// The node that it comes from.
     pub node: &'static str,
-    /// What happened.
+    /// The event, in words.
     pub text: String,
     /// The source file.
     pub file: &'static str,
@@ -84,9 +85,9 @@ pub fn hear_warnings(listener: Option<Sender<Warning>>) {
 }
 
 /// Hands warnings to the listener.
-struct Told;
+struct Warnings;
 
-impl<S: Subscriber> Layer<S> for Told {
+impl<S: Subscriber> Layer<S> for Warnings {
     fn max_level_hint(&self) -> Option<LevelFilter> {
         Some(LevelFilter::WARN)
     }
@@ -113,10 +114,18 @@ impl<S: Subscriber> Layer<S> for Told {
     }
 }
 
-/// The actor in whose module something was reported.
+/// The folders in which the actors stand; a node has none of their names.
+const FOLDERS: [&str; 4] = ["gateway", "arm", "compute", "ros"];
+
+/// The actor in whose module something was reported: `registry` of `pendularm::actors::gateway::registry::ops`.
 fn node_of(target: &'static str) -> &'static str {
-    let mut parts = target.split("::").skip_while(|part| *part != "actors");
-    parts.nth(1).unwrap_or("pendularm")
+    let parts = target.split("::").skip_while(|part| *part != "actors");
+    let mut modules = parts.skip(1).skip_while(|part| FOLDERS.contains(part));
+    match modules.next() {
+        Some("sim") => "arm_sim",
+        Some(module) => module,
+        None => "pendularm",
+    }
 }
 
 /// An event as one line: the message, then the fields.
@@ -152,7 +161,7 @@ impl Log {
     /// Puts a line into the log, whatever its level is.
     pub fn say(&self, line: &str) {
         let line = format!("{line}\n");
-        // What does not fit is lost, as any line.
+        // A line that does not fit is lost, as any line.
         let _ = self.clone().write_all(line.as_bytes());
     }
 
@@ -180,8 +189,8 @@ impl Write for Log {
     }
 }
 
-/// What is kept of an event's text: one line, of bounded length, on which nothing acts on a terminal. It may repeat what a
-/// client has sent, and a client must not be able to write lines of its own.
+/// The text that is kept of an event: one line, of bounded length, on which nothing acts on a terminal. It may repeat
+/// what a client has sent, and a client must not be able to write lines of its own.
 fn plain(line: &[u8]) -> Vec<u8> {
     let text = String::from_utf8_lossy(line);
     let text = text.strip_suffix('\n').unwrap_or(&text);
@@ -225,6 +234,21 @@ mod tests {
     use std::sync::{Condvar, Mutex};
 
     use super::*;
+
+    #[test]
+    fn a_warning_names_the_actor_and_not_the_folder_in_which_it_stands() {
+        for (target, node) in [
+            ("pendularm::actors::arm::sim::telemetry", "arm_sim"),
+            ("pendularm::actors::arm::ik_action", "ik_action"),
+            ("pendularm::actors::gateway::registry::ops", "registry"),
+            ("pendularm::actors::gateway::connection", "connection"),
+            ("pendularm::actors::compute::workers", "workers"),
+            ("pendularm::actors::runtime", "runtime"),
+            ("pendularm::logging", "pendularm"),
+        ] {
+            assert_eq!(node_of(target), node, "{target}");
+        }
+    }
 
     /// A sink that can be held shut, and tells each write.
     #[derive(Clone)]
@@ -290,10 +314,12 @@ mod tests {
         gate.open();
         drop((log, gate));
         let text: String = seen.iter().collect();
-        let told = text
+        let reported = text
             .lines()
             .filter_map(|line| line.split_once(" log lines were"));
-        let lost: usize = told.map(|(count, _)| count.parse::<usize>().unwrap()).sum();
+        let lost: usize = reported
+            .map(|(count, _)| count.parse::<usize>().unwrap())
+            .sum();
         assert!((9..=10).contains(&lost), "lost {lost}");
         assert_eq!(
             text.lines().filter(|line| *line == "line").count(),

@@ -9,7 +9,14 @@ use std::process::ExitCode;
 use pendularm::actors::{panics, runtime};
 use pendularm::logging;
 use pendularm::options::{Options, Parsed};
+use pendularm::plan;
+#[cfg(feature = "report")]
 use pendularm::report;
+
+/// Memory that was freed goes back to the system within ten seconds, by a thread that nobody waits for. The C library's allocator
+/// keeps it for ever where the last of it lies behind something small, which after a burst of small messages is the rule.
+#[global_allocator]
+static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 
 /// Exit status for whatever else fails.
 const FAILED: u8 = 1;
@@ -19,6 +26,7 @@ const BAD_USAGE: u8 = 2;
 fn main() -> ExitCode {
     match Options::parse(std::env::args_os(), |variable| std::env::var_os(variable)) {
         Ok(Parsed::Serve(options)) => serve(&options),
+        #[cfg(feature = "report")]
         Ok(Parsed::Report(options)) => match report::run(&options) {
             Ok(_) => ExitCode::SUCCESS,
             Err(error) => {
@@ -26,16 +34,26 @@ fn main() -> ExitCode {
                 ExitCode::FAILURE
             }
         },
-        Ok(Parsed::Show(text)) => {
-            // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
-            let _ = io::stdout().write_all(text.as_bytes());
-            ExitCode::SUCCESS
-        }
+        Ok(Parsed::Plan(options)) => match plan::run(&options) {
+            Ok(text) => show(&text),
+            Err(error) => {
+                complain(&error);
+                ExitCode::FAILURE
+            }
+        },
+        Ok(Parsed::Show(text)) => show(&text),
         Err(error) => {
             complain(&error);
             ExitCode::from(BAD_USAGE)
         }
     }
+}
+
+/// Writes to standard output.
+fn show(text: &str) -> ExitCode {
+    // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
+    let _ = io::stdout().write_all(text.as_bytes());
+    ExitCode::SUCCESS
 }
 
 fn serve(options: &Options) -> ExitCode {
@@ -52,7 +70,12 @@ fn serve(options: &Options) -> ExitCode {
         lines.finish();
         std::process::exit(i32::from(FAILED));
     });
-    let outcome = runtime::run(options);
+    let lines = log.clone();
+    let outcome = runtime::run(options, move || {
+        lines.say("pendularm: a thread is busy and does not end in time: ending without it");
+        lines.finish();
+        std::process::exit(0);
+    });
     log.finish();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,62 +1,244 @@
-//! What the registry and every node speak to one another: calls with their reply, topic messages, interest.
+//! The language of the nodes: questions with their one answer, messages on topics, interest.
 //!
-//! **Invariant:** every [`ServiceCall`] is answered exactly once, whatever happens to the node that has it: a [`Reply`]
-//! that is dropped unanswered says so itself.
+//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. Who asks, a client
+//! or another node, is behind the [`Reply`]: the node does not know.
+//!
+//! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that is
+//! dropped unanswered says so itself.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::{Duration, Instant};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use serde::Serialize;
-use serde_json::value::RawValue;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use super::budget::{Budget, Claim, NoRoom, Promise};
-use super::registry::Respond;
+use crate::actors::gateway::budget::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages;
-use crate::protocol::op::Arguments;
+use crate::protocol::messages::Level;
 
-/// Bytes of an answer for which there is always room, beside twice the caller's `id`: more than any answer has but those that list or
-/// compute something.
-pub const SMALL_ANSWER: usize = 16 * 1024;
-/// How long a computation waits for room that is taken by answers which wait for their clients, before it is refused.
-pub const ROOM_TIME: Duration = Duration::from_secs(2);
+// ---- questions ------------------------------------------------------------------------------------------------------
 
-/// A call of one of the runtime's own services. From the registry; answered through `reply`.
+/// A question that a node answers.
+pub trait Ask: Send + 'static {
+    /// The answer. A question that may be refused has a `Result` here.
+    type Answer: Send + 'static;
+}
+
+/// A question on its way to the node that serves it, answered through `reply`.
+///
+/// actix's own answers come back by a way of their own. A client's answer has to stay behind the messages that the node
+/// has published before it, so it takes the way that they take, to the registry.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct ServiceCall {
-    /// Which service.
-    pub service: Service,
-    /// The caller's arguments, unread.
-    pub arguments: Arguments,
-    /// The way back to the caller.
-    pub reply: Reply,
+pub struct Call<A: Ask> {
+    /// The question.
+    pub ask: A,
+    /// The way back.
+    pub reply: Reply<A::Answer>,
 }
 
-/// A message on a topic that the runtime subscribes to. From the registry; bad ones are answered by an error status.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct TopicMessage {
-    /// The message as it came.
-    pub msg: Box<RawValue>,
-    /// Who sent it; `None` for one of the runtime's own nodes.
-    pub sender: Option<Sender>,
+/// Why a question has no answer; nothing of what it asked for has been done, or is done any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Unserved {
+    /// The node dropped it.
+    #[error("the node that serves this ended before it answered")]
+    Ended,
+    /// Another node, which that one had to ask, is gone.
+    #[error("{0} does not answer")]
+    NoAnswer(
+        /// Its name.
+        &'static str,
+    ),
+    /// Nobody waits for the answer.
+    #[error("the caller is gone")]
+    CallerGone,
+    /// There is no room for the answer.
+    #[error(transparent)]
+    NoRoom(#[from] NoRoom),
+    /// No question is taken, or not so many.
+    #[error("{0}")]
+    Refused(
+        /// Why.
+        &'static str,
+    ),
 }
 
-/// The client that sent a [`TopicMessage`], and what its error status must carry.
-pub struct Sender {
-    /// The connection.
-    pub connection: ConnectionId,
-    /// The frame's `id`, if it had one.
-    pub id: Option<Box<RawValue>>,
-    /// Dropped when the message has taken effect: the connection reads its next frame then.
-    pub done: oneshot::Sender<()>,
+/// Dropped at the end of a call, when all its effects have been had: the client's next frame is read then.
+pub type Done = oneshot::Sender<()>;
+
+/// An answer of megabytes, which is written piece by piece.
+pub trait Pieces: Send {
+    /// Writes a piece; true once that was the last and the answer is on its way.
+    fn advance(&mut self) -> bool;
+
+    /// Says that there is no answer after all.
+    fn refuse(&mut self, why: Unserved);
+
+    /// True once nobody waits for the answer any more.
+    fn is_gone(&self) -> bool;
 }
+
+/// An answer that needs no writing: it has been given.
+struct Given;
+
+impl Pieces for Given {
+    fn advance(&mut self) -> bool {
+        true
+    }
+
+    fn refuse(&mut self, _: Unserved) {}
+
+    fn is_gone(&self) -> bool {
+        false
+    }
+}
+
+/// Who asked.
+pub trait Asker<T>: Send {
+    /// Takes the one answer. The news of the call's end, where it is there, travels with it.
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, done: Option<Done>);
+
+    /// Takes an answer of megabytes, which is written by whoever has it.
+    fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
+        self.answer(Ok(answer), None);
+        Box::new(Given)
+    }
+
+    /// The client that asked; none if it was a node.
+    fn client(&self) -> Option<ConnectionId> {
+        None
+    }
+
+    /// True once nobody waits for the answer any more.
+    fn is_gone(&self) -> bool {
+        false
+    }
+
+    /// Takes room for an answer of at most so many bytes before it is computed.
+    ///
+    /// # Errors
+    /// If there is none.
+    fn reserve(&mut self, _bytes: usize) -> Result<(), NoRoom> {
+        Ok(())
+    }
+}
+
+/// The way back to whoever asked: one answer, then the end of the call.
+///
+/// A client that called is read no further until this value is dropped, so that a call that has effects after its answer
+/// (a goal's setpoint) has had them before the client's next request is looked at.
+pub struct Reply<T> {
+    /// None once the answer has been given.
+    asker: Option<Box<dyn Asker<T>>>,
+    done: Option<Done>,
+}
+
+impl<T> Reply<T> {
+    /// A reply to `asker`; `done` is dropped with it.
+    #[must_use]
+    pub fn new(asker: impl Asker<T> + 'static, done: Option<Done>) -> Self {
+        Self {
+            asker: Some(Box::new(asker)),
+            done,
+        }
+    }
+
+    /// The client that asked; none if it was a node.
+    #[must_use]
+    pub fn client(&self) -> Option<ConnectionId> {
+        self.asker.as_ref().and_then(|asker| asker.client())
+    }
+
+    /// True once nobody waits for the answer any more.
+    #[must_use]
+    pub fn caller_is_gone(&self) -> bool {
+        self.asker.as_ref().is_some_and(|asker| asker.is_gone())
+    }
+
+    /// Takes room for an answer of at most so many bytes before it is computed. Small ones need none to be taken.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
+        match &mut self.asker {
+            Some(asker) => asker.reserve(bytes),
+            None => Ok(()),
+        }
+    }
+
+    /// Answers and ends the call: all its effects have been had. One message carries both.
+    pub fn conclude(mut self, answer: T) {
+        let done = self.done.take();
+        self.send(Ok(answer), done);
+    }
+
+    /// Answers; the call ends when this is dropped.
+    pub fn answer(&mut self, answer: T) {
+        self.send(Ok(answer), None);
+    }
+
+    /// Answers with something long, which is given once the caller of this has written its pieces.
+    #[must_use]
+    pub fn answer_in_pieces(&mut self, answer: T) -> Box<dyn Pieces> {
+        match self.take() {
+            Some(asker) => asker.answer_in_pieces(answer),
+            None => Box::new(Given),
+        }
+    }
+
+    /// Says that there is no answer.
+    pub fn refuse(&mut self, why: Unserved) {
+        self.send(Err(why), None);
+    }
+
+    fn send(&mut self, answer: Result<T, Unserved>, done: Option<Done>) {
+        if let Some(asker) = self.take() {
+            asker.answer(answer, done);
+        }
+    }
+
+    fn take(&mut self) -> Option<Box<dyn Asker<T>>> {
+        let asker = self.asker.take();
+        debug_assert!(asker.is_some(), "a call was answered twice");
+        asker
+    }
+}
+
+impl<T> Drop for Reply<T> {
+    fn drop(&mut self) {
+        if self.asker.is_some() {
+            self.refuse(Unserved::Ended);
+        }
+    }
+}
+
+impl<T: Send> Asker<T> for oneshot::Sender<Result<T, Unserved>> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+        // Nobody may be waiting any more.
+        let _ = self.send(answer);
+    }
+
+    fn is_gone(&self) -> bool {
+        self.is_closed()
+    }
+}
+
+/// Asks another node.
+///
+/// # Errors
+/// If it does not answer.
+pub fn ask<A: Ask>(
+    node: &Recipient<Call<A>>,
+    ask: A,
+) -> impl Future<Output = Result<A::Answer, Unserved>> + Send + use<A> {
+    let (answered, answer) = oneshot::channel();
+    let reply = Reply::new(answered, None);
+    node.do_send(Call { ask, reply });
+    async move { answer.await.unwrap_or(Err(Unserved::Ended)) }
+}
+
+// ---- between the registry and the nodes -----------------------------------------------------------------------------
 
 /// Whether anybody subscribes to a topic that the node publishes. From the registry, at every change.
 #[derive(Message, Debug, Clone, Copy)]
@@ -68,191 +250,71 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// The way back to the caller of a service: one answer, then the end of the call.
-///
-/// The connection that called reads no further frame until this value is dropped, so that a call that has effects
-/// after its answer (a goal's trajectory) has had them before the client's next request is looked at.
-pub struct Reply {
-    registry: Recipient<Respond>,
-    connection: ConnectionId,
-    service: Service,
-    name: Box<str>,
-    id: Option<Box<RawValue>>,
-    gone: Arc<AtomicBool>,
-    answered: bool,
-    done: Option<oneshot::Sender<()>>,
-    /// The total that answers count in.
-    budget: Option<Budget>,
-    /// What was taken for an answer of megabytes.
-    promise: Option<Promise>,
-    /// Since when answers that wait have left no room for that.
-    asked_for_room: Option<Instant>,
+/// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has not.
+pub enum Frame {
+    /// As it goes out.
+    Written(Bytes),
+    /// Writes it.
+    Unwritten(Box<dyn FnOnce() -> Bytes + Send>),
 }
 
-impl Reply {
-    /// A reply to `connection` for its call of `service`, spelled `name`; the receiver ends when the reply is dropped.
+impl Frame {
+    /// A frame that the registry writes.
     #[must_use]
-    pub fn new(
-        registry: Recipient<Respond>,
-        connection: ConnectionId,
-        service: Service,
-        name: Box<str>,
-        id: Option<Box<RawValue>>,
-        gone: Arc<AtomicBool>,
-    ) -> (Self, oneshot::Receiver<()>) {
-        let (done, ended) = oneshot::channel();
-        (
-            Self {
-                registry,
-                connection,
-                service,
-                name,
-                id,
-                gone,
-                answered: false,
-                done: Some(done),
-                budget: None,
-                promise: None,
-                asked_for_room: None,
-            },
-            ended,
-        )
+    pub fn unwritten(write: impl FnOnce() -> Bytes + Send + 'static) -> Self {
+        Self::Unwritten(Box::new(write))
     }
 
-    /// The answer counts in this total until it has been written.
+    /// The frame as it goes out.
     #[must_use]
-    pub fn within(mut self, budget: Budget) -> Self {
-        self.budget = Some(budget);
-        self
-    }
-
-    /// Takes room for an answer of at most so many bytes, beside the echo of the caller's `id`, before it is computed. Small ones need
-    /// none to be taken.
-    ///
-    /// # Errors
-    /// If there is none.
-    pub fn reserve(&mut self, bytes: usize) -> Result<(), NoRoom> {
-        let Some(budget) = self.budget.as_ref().filter(|_| bytes > SMALL_ANSWER) else {
-            return Ok(());
-        };
-        match budget.promise(bytes.saturating_add(self.small_answer())) {
-            Ok(promise) => {
-                self.promise = Some(promise);
-                Ok(())
-            }
-            Err(NoRoom::Now) => {
-                // Answers are on their way to clients that read them: those make room in a moment.
-                let since = self.asked_for_room.get_or_insert_with(Instant::now);
-                let is_patient = since.elapsed() < ROOM_TIME;
-                Err(if is_patient { NoRoom::Yet } else { NoRoom::Now })
-            }
-            Err(yet) => Err(yet),
+    pub fn write(self) -> Bytes {
+        match self {
+            Self::Written(frame) => frame,
+            Self::Unwritten(write) => write(),
         }
-    }
-
-    /// The connection that called.
-    #[must_use]
-    pub fn connection(&self) -> ConnectionId {
-        self.connection
-    }
-
-    /// True once the caller has disconnected: nobody waits for the answer any more.
-    #[must_use]
-    pub fn caller_is_gone(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
-    }
-
-    /// The service's name as the caller spelled it, and the caller's `id`: what an answer must echo.
-    #[must_use]
-    pub fn address(&self) -> (&str, Option<&RawValue>) {
-        (&self.name, self.id.as_deref())
-    }
-
-    /// Answers as [`Reply::answer`] does and ends the call: all its effects have been had.
-    ///
-    /// The news of the end travels with the answer: one thread is woken once, not twice.
-    pub fn conclude(mut self, values: &impl Serialize, status: &str) {
-        let done = self.done.take();
-        let frame = self.encode(values, status);
-        self.send(frame, done);
-    }
-
-    /// Answers with `values`; `result` is true if `status` is empty.
-    pub fn answer(&mut self, values: &impl Serialize, status: &str) {
-        let frame = self.encode(values, status);
-        self.answer_with(frame);
-    }
-
-    /// Answers `result: true`.
-    pub fn succeed(&mut self, values: &impl Serialize) {
-        self.answer(values, "");
-    }
-
-    /// Answers `result: false` with empty values, for the reason `why`.
-    pub fn refuse(&mut self, why: &str) {
-        self.answer_with(messages::failure(&self.name, self.id.as_deref(), why));
-    }
-
-    /// Answers with a whole `service_response` frame that the caller has encoded itself.
-    pub fn answer_with(&mut self, frame: Bytes) {
-        self.send(frame, None);
-    }
-
-    fn encode(&self, values: &impl Serialize, status: &str) -> Bytes {
-        messages::response(
-            &self.name,
-            self.id.as_deref(),
-            values,
-            status.is_empty(),
-            status,
-        )
-    }
-
-    fn send(&mut self, frame: Bytes, done: Option<oneshot::Sender<()>>) {
-        if self.answered {
-            debug_assert!(false, "{} was answered twice", self.name);
-            return;
-        }
-        self.answered = true;
-        let frame = self.counted(frame);
-        self.registry.do_send(Respond {
-            connection: self.connection,
-            frame,
-            service: Some(self.service),
-            status: None,
-            done,
-        });
-    }
-
-    /// The answer, counted in the total; a failure instead where a long one finds no room.
-    fn counted(&mut self, frame: Bytes) -> Bytes {
-        if let Some(promise) = self.promise.take() {
-            return promise.cover(frame);
-        }
-        let Some(budget) = &self.budget else {
-            return frame;
-        };
-        if frame.len() <= self.small_answer() {
-            return budget.count(frame);
-        }
-        match budget.take(frame.len(), Claim::Ordinary) {
-            Some(share) => share.cover(frame),
-            None => {
-                let why = NoRoom::Now.to_string();
-                budget.count(messages::failure(&self.name, self.id.as_deref(), &why))
-            }
-        }
-    }
-
-    fn small_answer(&self) -> usize {
-        SMALL_ANSWER + 2 * self.id.as_deref().map_or(0, |id| id.get().len())
     }
 }
 
-impl Drop for Reply {
-    fn drop(&mut self) {
-        if !self.answered {
-            self.refuse("the node that serves this ended before it answered");
-        }
+impl From<Bytes> for Frame {
+    fn from(frame: Bytes) -> Self {
+        Self::Written(frame)
     }
+}
+
+/// A message on a topic. From the node that owns it.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Publish {
+    /// The topic.
+    pub topic: Topic,
+    /// The whole `publish` frame, encoded once.
+    pub frame: Frame,
+}
+
+/// A frame for one client: an answer or a status. From a node.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Respond {
+    /// The client.
+    pub connection: ConnectionId,
+    /// The whole frame.
+    pub frame: Frame,
+    /// The service that it answers, if it is the runtime's own.
+    pub service: Option<Service>,
+    /// The level, if it is a status: sent only if the client wants such.
+    pub status: Option<Level>,
+    /// Dropped once the frame is on its way, where that is also the end of the call.
+    pub done: Option<Done>,
+}
+
+/// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the goal.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Feedback {
+    /// The client.
+    pub connection: ConnectionId,
+    /// The action, as the client spells it.
+    pub action: Arc<str>,
+    /// The whole frame.
+    pub frame: Bytes,
 }

@@ -1,7 +1,7 @@
 //! Starts every node in order, chooses their threads, and ends everything within a second.
 //!
 //! Threads: this one for the gateway (listeners, connections, registry) and the small nodes; one for the arm; a few
-//! workers for heavy requests. The only place that knows threads, and the only one that looks at the number of links.
+//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that looks at the number of links.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 
@@ -13,23 +13,25 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::net::TcpListener;
 use tokio::runtime::Builder;
-use tokio::signal::unix::{Signal, SignalKind, signal};
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep, timeout};
 
-use super::arm_sim::{ArmSim, Consult, joint_names};
-use super::connection::gate::Gate;
-use super::files;
-use super::gauges::Gauges;
-use super::ik::Ik;
-use super::ik_action::{GoalTracker, IkAction};
-use super::ik_trial::{GoalClient, IkTrial};
-use super::integration::Integration;
-use super::listener::{Listener, StopListening};
-use super::registry::{Attach, FinishAll, Nodes, RefuseCalls, Registry};
-use super::rosapi::Rosapi;
-use super::rosout::Rosout;
-use super::study::Study;
-use super::workers::WorkerPool;
+use super::signals::Signals;
+use crate::actors::arm::ik::Ik;
+use crate::actors::arm::ik_action::{GoalTracker, IkAction};
+use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
+use crate::actors::arm::sim::{ArmSim, Consult, RefuseSteps};
+use crate::actors::compute::integration::Integration;
+use crate::actors::compute::study::Study;
+use crate::actors::compute::workers::WorkerPool;
+use crate::actors::gateway::connection::gate::{Admission, Gate};
+use crate::actors::gateway::files;
+use crate::actors::gateway::gauges::Gauges;
+use crate::actors::gateway::listener::{Listener, StopListening};
+use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
+use crate::actors::gateway::registry::{Attach, Registry};
+use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
+use crate::actors::ros::rosout::Rosout;
+use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::{Links, Options};
@@ -39,7 +41,7 @@ use crate::{
     web::{Door, access::Access, authority::Host},
 };
 
-/// What waiting calls are told when the runtime ends.
+/// The answer to waiting calls when the runtime ends.
 const SHUTTING_DOWN: &str = "shutting down";
 /// How long computations may take to answer that they were refused, and outboxes to empty, when the runtime ends:
 /// together well within the second that a signal is given.
@@ -62,17 +64,18 @@ pub enum RunError {
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until SIGINT or SIGTERM.
+/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on another
+/// thread; it should not return.
 ///
 /// # Errors
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
-pub fn run(options: &Options) -> Result<(), RunError> {
-    System::new().block_on(serve(options))
+pub fn run(options: &Options, last_resort: impl FnOnce() + Send + 'static) -> Result<(), RunError> {
+    let mut signals = Signals::hear(last_resort)?;
+    // What clients were owed is dropped here: that, too, is part of the end.
+    System::new().block_on(serve(options, &mut signals))
 }
 
-async fn serve(options: &Options) -> Result<(), RunError> {
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    let mut terminate = signal(SignalKind::terminate())?;
+async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError> {
     let sockets = bind(options).await?;
     let address = sockets
         .first()
@@ -80,8 +83,9 @@ async fn serve(options: &Options) -> Result<(), RunError> {
         .unwrap_or(options.bind);
 
     let gauges = Arc::new(Gauges::default());
+    let room = files::make_room(options.token.is_some());
     let registry = Registry::new(Arc::clone(&gauges))
-        .serving_at_most(files::make_room())
+        .serving_at_most(room.clients)
         .start();
     let workers = WorkerPool::start(WorkerPool::default_threads())?;
     // The arm has no sockets: without them its thread sleeps on a lock instead of a poll, and wakes sooner.
@@ -95,13 +99,13 @@ async fn serve(options: &Options) -> Result<(), RunError> {
         Links::Two => start_nodes::<2>,
         Links::Three => start_nodes::<3>,
     };
-    start(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes);
+    let steps = start(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes);
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function: it can't be gone.
     let _ = registry.send(Attach(nodes)).await;
 
-    let gate = Arc::new(gate(options));
+    let gate = Arc::new(gate(options, room.unauthenticated));
     let listeners: Vec<Addr<Listener>> = sockets
         .into_iter()
         .map(|socket| {
@@ -112,18 +116,18 @@ async fn serve(options: &Options) -> Result<(), RunError> {
     announce(address);
     #[cfg(feature = "web")]
     announce_page(address, options.token.is_some());
-    wait_for_signal(&mut interrupt, &mut terminate).await;
+    let _ = (&mut signals.came).await;
 
     for listener in listeners {
         listener.do_send(StopListening);
     }
-    shut_down(&registry, &workers, &gauges).await;
+    shut_down(&registry, &steps, &workers, &gauges).await;
     arm_thread.stop();
     Ok(())
 }
 
 /// What is asked of clients, and what they find behind it.
-fn gate(options: &Options) -> Gate {
+fn gate(options: &Options, unauthenticated: usize) -> Gate {
     Gate {
         token: options.token.clone(),
         #[cfg(feature = "web")]
@@ -143,10 +147,11 @@ fn gate(options: &Options) -> Gate {
             };
             Door::new(access, report)
         },
+        admission: Admission::of(unauthenticated),
     }
 }
 
-/// The arm and the nodes that know its number of links.
+/// The arm and the nodes that know its number of links; gives the way to refuse the steps that are still to be taken.
 fn start_nodes<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
@@ -154,22 +159,19 @@ fn start_nodes<const N: usize>(
     workers: &WorkerPool,
     rng: fastrand::Rng,
     nodes: &mut Nodes,
-) where
+) -> Recipient<RefuseSteps>
+where
     Gains<N>: Default,
 {
-    let (publish, respond) = (registry.clone().recipient(), registry.clone().recipient());
+    let publish = registry.clone().recipient();
     let gauges = Arc::clone(gauges);
     let arm = ArmSim::<N>::start_in_arbiter(&arm_thread.handle(), move |_| {
-        ArmSim::new(Arm::default(), Gains::default(), publish, respond, gauges)
+        ArmSim::new(Arm::default(), Gains::default(), publish, gauges)
     });
     ArmSim::attach(&arm, nodes);
-    let introspection = Rosapi::new(
-        registry.clone().recipient(),
-        arm.clone().recipient(),
-        arm.clone().recipient(),
-        &joint_names::<N>(),
-    );
-    Rosapi::attach(&introspection.start(), nodes);
+    let parameters = ArmParameters::of(&arm);
+    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
+    Rosapi::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
 
@@ -182,6 +184,7 @@ fn start_nodes<const N: usize>(
     Ik::attach(&ik, nodes);
     let tracker = GoalTracker {
         track: arm.clone().recipient(),
+        command: arm.clone().recipient(),
         end: arm.clone().recipient(),
     };
     let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
@@ -191,8 +194,9 @@ fn start_nodes<const N: usize>(
         cancel: action.clone().recipient(),
         settle: action.recipient(),
     };
-    let trial = IkTrial::<N>::new(arm.recipient(), goals, publish, rng).start();
+    let trial = IkTrial::<N>::new(arm.clone().recipient(), goals, publish, rng).start();
     IkTrial::attach(&trial, nodes);
+    arm.recipient()
 }
 
 /// The address asked for; for the default one also its IPv6 twin, where that is to be had.
@@ -237,25 +241,25 @@ fn announce_page(address: SocketAddr, asks_token: bool) {
     }
 }
 
-async fn wait_for_signal(interrupt: &mut Signal, terminate: &mut Signal) {
-    tokio::select! {
-        _ = interrupt.recv() => tracing::info!("SIGINT: shutting down"),
-        _ = terminate.recv() => tracing::info!("SIGTERM: shutting down"),
-    }
-}
-
 /// Refuses what waits, lets every connection send what it owes, for a bounded time.
-async fn shut_down(registry: &Addr<Registry>, workers: &WorkerPool, gauges: &Gauges) {
+async fn shut_down(
+    registry: &Addr<Registry>,
+    steps: &Recipient<RefuseSteps>,
+    workers: &WorkerPool,
+    gauges: &Gauges,
+) {
     let _ = registry.send(RefuseCalls(SHUTTING_DOWN)).await;
     workers.close(SHUTTING_DOWN);
-    until(ANSWER_TIME, || workers.is_idle()).await;
+    let answered = Instant::now() + ANSWER_TIME;
+    let _ = timeout(ANSWER_TIME, steps.send(RefuseSteps(SHUTTING_DOWN))).await;
+    until(answered, || workers.is_idle()).await;
     let _ = registry.send(FinishAll).await;
-    until(FLUSH_TIME, || gauges.connections() == 0).await;
+    let flushed = Instant::now() + FLUSH_TIME;
+    until(flushed, || gauges.connections() == 0).await;
 }
 
-/// Waits for `done`, but no longer than `limit`.
-async fn until(limit: Duration, done: impl Fn() -> bool) {
-    let deadline = Instant::now() + limit;
+/// Waits for `done`, but not beyond the deadline.
+async fn until(deadline: Instant, done: impl Fn() -> bool) {
     while !done() && Instant::now() < deadline {
         sleep(Duration::from_millis(2)).await;
     }

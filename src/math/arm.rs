@@ -1,10 +1,11 @@
 //! The arm as physics sees it: a planar chain of uniform rods on revolute joints, and its state.
 //!
-//! Link `i` is a thin uniform rod: centre of mass at `l_i / 2`, inertia `m_i l_i² / 12` about it. Joint angles are relative to the
-//! previous link (the first to +x), counter-clockwise, and gravity pulls along -y. Uses nothing but floating point.
+//! Link `i` is a thin uniform rod: centre of mass at `l_i / 2`, inertia `m_i l_i² / 12` about it. Joint angles are
+//! relative to the previous link (the first to +x), counter-clockwise, and gravity pulls along -y. Uses nothing but
+//! floating point.
 //!
-//! **Invariant:** an [`Arm`] that exists is valid: lengths and masses finite and positive, gravity finite and not negative.
-//! Whatever depends on parameters alone is computed here, once.
+//! **Invariant:** an [`Arm`] that exists is valid: lengths and masses finite and positive, gravity finite and not
+//! negative. Constants that depend on parameters alone are computed here, once.
 
 use thiserror::Error;
 
@@ -17,7 +18,7 @@ pub struct Arm<const N: usize> {
     pub(super) rods: [Rod; N],
 }
 
-/// What the dynamics need to know of one link.
+/// The constants of one link that the dynamics need.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Rod {
     /// Length \[m\].
@@ -42,7 +43,7 @@ pub enum ArmError {
         field: &'static str,
         /// Link, from 0.
         index: usize,
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// A length or a mass is zero or negative.
@@ -52,19 +53,19 @@ pub enum ArmError {
         field: &'static str,
         /// Link, from 0.
         index: usize,
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// Gravity is NaN or infinite.
     #[error("gravity must be finite, got {value}")]
     GravityNotFinite {
-        /// What was given \[m/s²\].
+        /// The value given \[m/s²\].
         value: f64,
     },
     /// Gravity is negative.
     #[error("gravity must be at least 0, got {value}")]
     GravityNegative {
-        /// What was given \[m/s²\].
+        /// The value given \[m/s²\].
         value: f64,
     },
 }
@@ -132,7 +133,7 @@ impl<const N: usize> Arm<N> {
         self.gravity
     }
 
-    /// Distance from the base to the tip of the stretched arm \[m\].
+    /// Distance from the base to the end effector of the stretched arm \[m\].
     #[must_use]
     pub fn reach(&self) -> f64 {
         self.lengths.iter().sum()
@@ -182,6 +183,28 @@ impl<const N: usize> State<N> {
         Self {
             position: [0.0; N],
             velocity: [0.0; N],
+        }
+    }
+
+    /// At rest in a pose \[rad\].
+    #[must_use]
+    pub const fn at_rest(position: [f64; N]) -> Self {
+        Self {
+            position,
+            velocity: [0.0; N],
+        }
+    }
+
+    /// The state that the increments of a step lead to.
+    #[must_use]
+    #[allow(
+        clippy::indexing_slicing,
+        reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+    )]
+    pub fn plus(&self, (dq, dv): &([f64; N], [f64; N])) -> Self {
+        Self {
+            position: std::array::from_fn(|i| self.position[i] + dq[i]),
+            velocity: std::array::from_fn(|i| self.velocity[i] + dv[i]),
         }
     }
 

@@ -1,10 +1,11 @@
-//! A goal over time: whether the hand has come near enough and stayed, and when its progress is due to be reported.
+//! A goal over time: whether the end effector has come near enough and stayed, and when its progress is due to be
+//! reported.
 //!
-//! Both values are told the simulation time and the hand's position; whoever steps the arm tells them after every step,
-//! and only while a goal is active.
+//! Both values are told the simulation time and the end effector's position; whoever steps the arm tells them after
+//! every step, and only while a goal is active.
 //!
-//! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the hand farther than
-//! `epsilon` from the target.
+//! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the end effector farther
+//! than `epsilon` from the target.
 
 use std::fmt;
 
@@ -19,7 +20,7 @@ pub const SUCCESS_HOLD: f64 = 0.5;
 /// Feedback messages per second of simulation progress.
 pub const FEEDBACK_RATE: f64 = 60.0;
 
-/// What a difference of two times \[s\] near `time` may be rounded by.
+/// Returns the largest rounding error of a difference of two times \[s\] near `time`.
 ///
 /// A time is `base + k h`: half a unit in the last place for the product, half for the sum, at both ends, and as much
 /// again because `h` is only the double nearest to, say, 1 ms. All that is less than four times `2⁻⁵² time` (3e-12 s
@@ -31,9 +32,10 @@ pub(super) fn rounding(time: f64) -> f64 {
 /// When a goal counts as reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criteria {
-    /// Greatest distance between hand and target that counts as there \[m\], greater than 0.
+    /// Greatest distance between end effector and target that counts as there \[m\], greater than 0.
     pub epsilon: f64,
-    /// Simulation time that the hand must stay there without interruption \[s\]; 0 is content with the first entry.
+    /// Simulation time that the end effector must stay there without interruption \[s\]; 0 is content with the first
+    /// entry.
     pub success_hold: f64,
 }
 
@@ -49,7 +51,7 @@ impl Default for Criteria {
 /// How a goal ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
-    /// The hand stayed within `epsilon` for `success_hold`.
+    /// The end effector stayed within `epsilon` for `success_hold`.
     Reached,
     /// Cancelled, replaced by another goal, or its setpoint taken away by a reset.
     Preempted,
@@ -83,7 +85,7 @@ pub struct Goal {
 }
 
 impl Goal {
-    /// A goal for the hand to be at `target` \[m\], that starts at simulation time `now` \[s\].
+    /// A goal for the end effector to be at `target` \[m\], that starts at simulation time `now` \[s\].
     #[must_use]
     pub const fn new(target: DVec2, criteria: Criteria, now: f64) -> Self {
         Self {
@@ -94,13 +96,14 @@ impl Goal {
         }
     }
 
-    /// Tells the goal where the hand is \[m\] after the step that ended at `time` \[s\]; `true` once it is reached.
+    /// Tells the goal where the end effector is \[m\] after the step that ended at `time` \[s\]; `true` once it is
+    /// reached.
     ///
     /// Leaving epsilon, even for one step, starts the stay over. So does a clock that runs backwards, and a position
     /// that is not a number counts as outside.
-    pub fn judge(&mut self, time: f64, hand: DVec2) -> bool {
+    pub fn judge(&mut self, time: f64, end_effector: DVec2) -> bool {
         // NaN is not near anything.
-        if self.distance(hand) <= self.criteria.epsilon {
+        if self.distance(end_effector) <= self.criteria.epsilon {
             let entered = self
                 .entered
                 .filter(|&entered| entered <= time)
@@ -113,7 +116,7 @@ impl Goal {
         }
     }
 
-    /// Where the hand should be \[m\].
+    /// The place for the end effector \[m\].
     #[must_use]
     pub const fn target(&self) -> DVec2 {
         self.target
@@ -125,11 +128,11 @@ impl Goal {
         self.criteria
     }
 
-    /// The hand's distance from the target \[m\]; orientation has no part in it.
+    /// The end effector's distance from the target \[m\]; orientation has no part in it.
     #[must_use]
-    pub fn distance(&self, hand: DVec2) -> f64 {
-        let off = hand - self.target;
-        // `DVec2::length` would overflow for a hand that a diverging arm has thrown beyond 1e154 m.
+    pub fn distance(&self, end_effector: DVec2) -> f64 {
+        let off = end_effector - self.target;
+        // `DVec2::length` would overflow for an end effector that a diverging arm has thrown beyond 1e154 m.
         off.x.hypot(off.y)
     }
 
@@ -142,19 +145,19 @@ impl Goal {
 
 /// When something that happens at a fixed rate of simulation time is due.
 ///
-/// The first question is answered with yes and starts the count, so that even a goal that is over after one step reports
-/// once. After that there is one yes in each period in which the clock moved, never two for one question: steps longer
-/// than a period give one each, and what was missed is not made up. A clock that runs backwards starts afresh.
+/// The first question is answered with yes and starts the count, so that even a goal that is over after one step
+/// reports once. After that there is one yes in each period in which the clock moved, never two for one question: steps
+/// longer than a period give one each, and what was missed is not made up. A clock that runs backwards starts afresh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cadence {
     /// Per second.
     rate: f64,
-    count: Option<Count>,
+    count: Option<Feedbacks>,
 }
 
 /// Periods are counted from `origin`; the running `period` has been answered for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Count {
+struct Feedbacks {
     origin: f64,
     latest: f64,
     period: f64,
@@ -178,7 +181,7 @@ impl Cadence {
                 due
             }
             _ => {
-                self.count = Some(Count {
+                self.count = Some(Feedbacks {
                     origin: time,
                     latest: time,
                     period: 0.0,

@@ -10,8 +10,8 @@
 //! Positions and velocities are an array each, one entry per joint; a particle on a line has one. The live arm and
 //! `/arm_sim/integration_step` are stepped by [`increment`] and nothing else. Uses nothing but floating point.
 //!
-//! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.1; for Verlet, Swope et
-//! al., *J. Chem. Phys.* 76 (1982), with the velocity predicted by `v + h a₁` for the second evaluation.
+//! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.1; for Verlet, Swope
+//! et al., *J. Chem. Phys.* 76 (1982), with the velocity predicted by `v + h a₁` for the second evaluation.
 //!
 //! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
 
@@ -31,10 +31,11 @@ pub enum Method {
     /// Explicit midpoint, order 2. Weakness: an undamped swing still grows, though only by `(ω h)⁴ / 8` a step.
     Midpoint,
     /// Velocity Verlet that predicts the velocity and corrects it once, order 2. Weakness: the forces of an arm depend
-    /// on velocity, so it keeps no energy as its textbook form does; stiff damping makes it diverge without oscillating.
+    /// on velocity, so it keeps no energy as its textbook form does; stiff damping makes it diverge without
+    /// oscillating.
     Verlet,
-    /// Classical Runge-Kutta, order 4. Weakness: four evaluations a step, and no larger a stable timestep than the other
-    /// two of order above 1 when the effort is held over the step.
+    /// Classical Runge-Kutta, order 4. Weakness: four evaluations a step, and no larger a stable timestep than the
+    /// other two of order above 1 when the effort is held over the step.
     Rk4,
 }
 
@@ -96,7 +97,7 @@ impl FromStr for Method {
     }
 }
 
-/// What one step adds to position and velocity: `(Δq, Δv)`.
+/// The increments of position and velocity in one step: `(Δq, Δv)`.
 pub type Increment<const N: usize> = ([f64; N], [f64; N]);
 
 /// The increment of one step of length `h` \[s\] from `(q, v)` at time `t` \[s\].

@@ -3,6 +3,7 @@
 //! **Invariant:** no clock, no I/O, no JSON, no threads, no actors in here.
 
 pub mod arm;
+pub mod count;
 pub mod dynamics;
 pub mod expression;
 pub mod goal;

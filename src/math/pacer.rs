@@ -23,8 +23,8 @@ const NANOSECONDS: f64 = 1e9;
 
 /// Relative slack of the division, without which 60 steps of 1/60 s might take a nanosecond more than a second.
 ///
-/// Three roundings can lower the quotient, by 2^-53 each: the one of the timestep itself, the one to nanoseconds, and the
-/// division's. Four are granted; that brings a step forward by less than a nanosecond for the first ten days.
+/// Three roundings can lower the quotient, by 2^-53 each: the one of the timestep itself, the one to nanoseconds, and
+/// the division's. Four are granted; that brings a step forward by less than a nanosecond for the first ten days.
 const SLACK: f64 = 1.0 + 2.0 * f64::EPSILON;
 
 /// Counts whole steps against a clock that it is told.
@@ -49,8 +49,8 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Counts steps of `timestep` \[s\] from `now`, a time since any fixed epoch. A timestep that is not positive is not
-    /// meant here; it does no harm.
+    /// Counts steps of `timestep` \[s\] from `now`, a time since any fixed epoch. A timestep that is not positive is
+    /// not meant here; it does no harm.
     #[must_use]
     pub fn new(now: Duration, timestep: f64) -> Self {
         Self {

@@ -1,9 +1,9 @@
 //! A particle of unit mass on a line, pushed by a force that depends on time alone: `ẍ = f(t)`, from `t = 0`.
 //!
-//! This is what `/arm_sim/integration_step` computes. It takes the same [`increment`] as the live arm and shares nothing
-//! else with it. Sample `k` is at the time `k dt`, a product and not a running sum, and so are the steps' start times.
-//! Position and velocity are summed with compensation (Kahan 1965, Knuth's branch-free two-sum), so that a million steps
-//! lose no more digits than one.
+//! This is what `/arm_sim/integration_step` computes. It takes the same [`increment`] as the live arm and shares
+//! nothing else with it. Sample `k` is at the time `k dt`, a product and not a running sum, and so are the steps' start
+//! times. Position and velocity are summed with compensation (Kahan 1965, Knuth's branch-free two-sum), so that a
+//! million steps lose no more digits than one.
 //!
 //! **Invariant:** steps and work are bounded when a particle is made, and a computation cut into slices gives the same
 //! bits as one made at once.
@@ -25,13 +25,13 @@ pub enum ParticleError {
     NotFinite {
         /// `x0`, `xdot0` or `dt`.
         field: &'static str,
-        /// What was given.
+        /// The value given.
         value: f64,
     },
     /// A timestep that is zero or negative.
     #[error("dt must be greater than 0, got {dt}")]
     Timestep {
-        /// What was given \[s\].
+        /// The value given \[s\].
         dt: f64,
     },
     /// Nothing to do.
@@ -40,7 +40,7 @@ pub enum ParticleError {
     /// More steps than [`MAX_STEPS`].
     #[error("steps must be at most {MAX_STEPS}, got {steps}")]
     TooManySteps {
-        /// What was given.
+        /// The value given.
         steps: u64,
     },
     /// More work than [`MAX_WORK`].
@@ -226,7 +226,7 @@ impl Particle {
 #[derive(Debug, Clone, Copy)]
 struct CompensatedSum {
     value: f64,
-    /// What the value is short of, and the next addition makes good.
+    /// The rounding error of the value, which the next addition makes good.
     lost: f64,
 }
 

@@ -4,7 +4,7 @@
 //!
 //! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero; a disturbance that
 //!    has not ended ([`Disturbance`]) is added to it;
-//! 2. that effort is held while [`increment`] evaluates [`forward_dynamics`] at the method's stages;
+//! 2. that effort is held while [`increment`] evaluates [`forward_dynamics`] at the method's stages ([`step_under`]);
 //! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
 //!
 //! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
@@ -22,7 +22,7 @@ use std::ops::ControlFlow;
 
 use super::arm::{Arm, State};
 use super::dynamics::forward_dynamics;
-use super::integrator::{Method, increment, two_sum};
+use super::integrator::{Increment, Method, increment, two_sum};
 use super::pid::{Control, Gains, Pid, Setpoint};
 
 /// Timestep until another is set \[s\]. A third of what the default gains are stable to.
@@ -47,8 +47,8 @@ pub struct Disturbance<const N: usize> {
 }
 
 impl<const N: usize> Disturbance<N> {
-    /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration / timestep`
-    /// steps, rounded up, so that at least one has it.
+    /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration /
+    /// timestep` steps, rounded up, so that at least one has it.
     ///
     /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, far
     /// less than a timestep: 1.1 s in steps of 0.1 s are eleven steps, not twelve.
@@ -81,11 +81,11 @@ pub struct Simulation<const N: usize> {
     /// Length of a step \[s\].
     timestep: f64,
     state: State<N>,
-    /// What rounding left out of `state` so far: position \[rad\], velocity \[rad/s\].
+    /// The rounding error of `state` so far: position \[rad\], velocity \[rad/s\].
     carry: State<N>,
     /// Effort of the latest step \[N m\].
     effort: [f64; N],
-    /// What is added to the effort of the next step.
+    /// The disturbance that is added to the effort of the next step.
     disturbance: Option<Disturbance<N>>,
     /// Simulation time when this timestep came into force \[s\].
     base: f64,
@@ -167,15 +167,8 @@ impl<const N: usize> Simulation<N> {
             self.add_disturbance(&mut control.effort);
         }
         let State { position, velocity } = &self.state;
-        // The motion does not depend on the time, so none is reckoned for the stages.
-        let (dq, dv) = increment(
-            self.method,
-            |_, q, v| forward_dynamics(&self.arm, q, v, &control.effort),
-            0.0,
-            position,
-            velocity,
-            self.timestep,
-        );
+        let effort = &control.effort;
+        let (dq, dv) = step_under(&self.arm, self.method, &self.state, effort, self.timestep);
         let (position, position_carry) = add(position, &self.carry.position, &dq);
         let (velocity, velocity_carry) = add(velocity, &self.carry.velocity, &dv);
         let next = State { position, velocity };
@@ -221,8 +214,8 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// Adds `effort` \[N m\] to that of every step that begins within `duration` \[s\], greater than 0, of simulation time
-    /// from now; one that still runs ends here. With the controller off, this is all the effort there is.
+    /// Adds `effort` \[N m\] to that of every step that begins within `duration` \[s\], greater than 0, of simulation
+    /// time from now; one that still runs ends here. With the controller off, this is all the effort there is.
     pub fn disturb(&mut self, effort: [f64; N], duration: f64) {
         self.disturbance = Some(Disturbance::new(effort, self.time(), duration));
     }
@@ -343,6 +336,22 @@ impl<const N: usize> Simulation<N> {
     pub fn divergence(&self) -> Option<Divergence> {
         self.divergence
     }
+}
+
+/// What a step of `h` \[s\] under the constant `effort` \[N m\] adds to positions and velocities.
+#[inline(always)]
+#[must_use]
+pub fn step_under<const N: usize>(
+    arm: &Arm<N>,
+    method: Method,
+    state: &State<N>,
+    effort: &[f64; N],
+    h: f64,
+) -> Increment<N> {
+    let State { position, velocity } = state;
+    // The motion does not depend on the time, so none is reckoned for the stages.
+    let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
+    increment(method, acceleration, 0.0, position, velocity, h)
 }
 
 /// `value + carry + increment`, and the carry that rounding leaves for the next step.

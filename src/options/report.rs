@@ -47,7 +47,7 @@ pub(super) fn command() -> Command {
         )
 }
 
-/// What it was given.
+/// Reads its arguments.
 pub(super) fn read(matches: &ArgMatches) -> ReportOptions {
     ReportOptions {
         out: matches

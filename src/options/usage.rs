@@ -6,7 +6,7 @@ use std::fmt;
 
 use clap::error::ErrorKind;
 
-use crate::protocol::token::TokenError;
+use crate::protocol::op::token::TokenError;
 
 /// Where a value came from, as a refusal names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,13 +52,13 @@ pub enum UsageError {
     UnexpectedValue {
         /// The option.
         option: String,
-        /// What was given to it.
+        /// The value given to it.
         value: String,
     },
     /// Anything else that is wrong with the arguments' form.
     #[error("the arguments cannot be read ({kind:?}); --help shows them")]
     Arguments {
-        /// What the reader of the arguments calls it.
+        /// The name that the reader of the arguments has for it.
         kind: ErrorKind,
     },
     /// A number of links other than 2 and 3.
@@ -88,6 +88,16 @@ pub enum UsageError {
         /// The value.
         value: String,
     },
+    /// A value that cannot be planned with.
+    #[error("--{option} must be {needs}, got {value:?}")]
+    Plan {
+        /// The option.
+        option: &'static str,
+        /// What it takes.
+        needs: &'static str,
+        /// The value.
+        value: String,
+    },
     /// No seed.
     #[error(
         "{origin} must be a whole number from 0 to {}, got {value:?}",
@@ -112,7 +122,7 @@ pub enum UsageError {
     Token {
         /// Whose value it is.
         origin: Origin,
-        /// What is wrong with it.
+        /// The fault.
         why: TokenError,
     },
     /// No list of hosts.

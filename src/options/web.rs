@@ -4,12 +4,12 @@
 
 use std::path::PathBuf;
 
+use super::setting::{Given, LaunchOption};
 use super::usage::UsageError;
-use super::{Given, Setting};
 use crate::web::DEFAULT_REPORT;
 use crate::web::authority::Authority;
 
-pub(super) const ALLOW_HOST: Setting = Setting {
+pub(super) const ALLOW_HOST: LaunchOption = LaunchOption {
     option: "allow-host",
     variable: "ARM_SIM_ALLOW_HOST",
     value: "HOSTS",
@@ -18,7 +18,7 @@ pub(super) const ALLOW_HOST: Setting = Setting {
     is_switch: false,
 };
 
-pub(super) const ALLOW_ORIGIN: Setting = Setting {
+pub(super) const ALLOW_ORIGIN: LaunchOption = LaunchOption {
     option: "allow-origin",
     variable: "ARM_SIM_ALLOW_ORIGIN",
     value: "ORIGINS",
@@ -27,16 +27,16 @@ pub(super) const ALLOW_ORIGIN: Setting = Setting {
     is_switch: false,
 };
 
-pub(super) const STRICT_ORIGIN: Setting = Setting {
+pub(super) const STRICT_ORIGIN: LaunchOption = LaunchOption {
     option: "strict-origin",
     variable: "ARM_SIM_STRICT_ORIGIN",
     value: "SWITCH",
-    about: "Of pages, lets only this runtime's own and those of --allow-origin open a WebSocket",
+    about: "Of pages, lets only this runtime's own and those of --allow-origin open a WebSocket; a token does that too",
     default: "false",
     is_switch: true,
 };
 
-pub(super) const REPORT: Setting = Setting {
+pub(super) const REPORT: LaunchOption = LaunchOption {
     option: "report",
     variable: "ARM_SIM_REPORT",
     value: "FOLDER",
@@ -45,14 +45,14 @@ pub(super) const REPORT: Setting = Setting {
     is_switch: false,
 };
 
-/// What is chosen at launch about the web door.
+/// The options of the web door, as chosen at launch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WebOptions {
     /// Names that a browser may find the runtime under, besides loopback's and the address bound.
     pub hosts: Vec<Authority>,
     /// Pages that may open a WebSocket, besides those of this machine; in lower case.
     pub origins: Vec<Box<str>>,
-    /// Other pages of this machine may not.
+    /// Other pages of this machine may not; with a token they may not anyway.
     pub strict_origin: bool,
     /// Folder of the report.
     pub report: PathBuf,
@@ -70,7 +70,7 @@ impl Default for WebOptions {
 }
 
 impl WebOptions {
-    pub(super) fn read(given: impl Fn(&Setting) -> Option<Given>) -> Result<Self, UsageError> {
+    pub(super) fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Result<Self, UsageError> {
         let standard = Self::default();
         Ok(Self {
             hosts: given(&ALLOW_HOST)

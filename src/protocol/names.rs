@@ -16,7 +16,8 @@ pub fn absolute(name: &str) -> Cow<'_, str> {
     }
 }
 
-/// The name without its leading slash, as some clients spell it; as it is where that would be the name of another thing.
+/// The name without its leading slash, as some clients spell it; as it is where that would be the name of another
+/// thing.
 #[must_use]
 pub fn relative(name: &str) -> &str {
     name.strip_prefix('/')

@@ -1,4 +1,4 @@
-//! What the numbers were made on: processor, load, flags, commit.
+//! The machine that the numbers were made on: processor, load, flags, commit.
 //!
 //! **Invariant:** what cannot be found out is called unknown, never guessed.
 

@@ -2,14 +2,16 @@
 //!
 //! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one `.csv` and
 //! `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their files. What is
-//! measured is `math` and `study`; this is where the clock, the files and the drawing are.
+//! measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the drawing are.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 
 mod csv;
+pub mod experiments;
 mod figures;
 mod html;
 mod machine;
+mod making;
 mod progress;
 mod section;
 mod svg;
@@ -20,14 +22,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use csv::Csv;
 use figures::SECTIONS;
 use machine::Machine;
+use making::Making;
 use progress::Progress;
 use section::{Block, Section, Table};
 use serde_json::{Value, json};
 
-/// What to make, and where.
+/// The report to be made, and where.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ReportOptions {
     /// Directory for the results; made if it is not there.
@@ -52,7 +54,7 @@ pub enum ReportError {
     Write {
         /// Which.
         path: PathBuf,
-        /// What the system says.
+        /// The system's word for it.
         error: io::Error,
     },
 }
@@ -127,14 +129,14 @@ fn make(
     progress: &mut Progress,
 ) -> Result<Section, ReportError> {
     let started = Instant::now();
-    let mut desk = Desk {
+    let mut making = Making {
         quick: options.quick,
         out: &options.out,
         progress,
         tables: Vec::new(),
     };
-    let mut section = (maker.make)(&mut desk);
-    for (stem, csv) in desk.tables {
+    let mut section = (maker.make)(&mut making);
+    for (stem, csv) in making.tables {
         write(&options.out.join(format!("{stem}.csv")), &csv.into_text())?;
     }
     for block in &section.blocks {
@@ -149,36 +151,6 @@ fn make(
     section.quick = options.quick;
     section.seconds = started.elapsed().as_secs_f64();
     Ok(section)
-}
-
-/// What a section has at hand while it is made.
-#[derive(Debug)]
-pub(crate) struct Desk<'a> {
-    quick: bool,
-    /// Where the report is written, and counts from outside are looked for.
-    out: &'a Path,
-    progress: &'a mut Progress,
-    /// Stems and contents of `.csv` files.
-    tables: Vec<(String, Csv)>,
-}
-
-impl Desk<'_> {
-    /// One of two values: for the report, and for a quick look.
-    fn choose<T>(&self, full: T, quick: T) -> T {
-        if self.quick { quick } else { full }
-    }
-
-    fn at(&mut self, done: usize, of: usize) {
-        #[allow(
-            clippy::cast_precision_loss,
-            reason = "counts of runs are far below 2^53"
-        )]
-        self.progress.at(done as f64 / of as f64);
-    }
-
-    fn keep(&mut self, stem: &str, csv: Csv) {
-        self.tables.push((stem.to_owned(), csv));
-    }
 }
 
 /// Everything but the drawings.

@@ -1,4 +1,4 @@
-//! What a section of the report is: findings, verdicts, figures and tables, as values.
+//! A section of the report: findings, verdicts, figures and tables, as values.
 //!
 //! A section is kept in a file of its own as JSON, so that `--only` can recompute one and keep the others.
 //!
@@ -31,9 +31,9 @@ pub(crate) struct Section {
 /// Something that the section was to show, and whether it did.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Verdict {
-    /// What should hold.
+    /// The claim that should hold.
     pub(crate) claim: String,
-    /// What was seen, in numbers.
+    /// The numbers that were seen.
     pub(crate) seen: String,
     pub(crate) holds: bool,
 }

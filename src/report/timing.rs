@@ -1,6 +1,6 @@
 //! The only clock of the study: how long a computation takes, as the minimum of repeats with their spread.
 //!
-//! Whatever else the machine does can only make a run longer, so the minimum is the best estimate of the computation itself;
+//! Other work of the machine can only make a run longer, so the minimum is the best estimate of the computation itself;
 //! the quartiles say how noisy the machine was. Source: Chen and Revels, *Robust benchmarking in noisy environments*
 //! (2016), arXiv:1608.04295.
 //!

@@ -35,9 +35,23 @@ pub struct Follower<const N: usize> {
     state: State<N>,
     carry: State<N>,
     evaluations: u64,
+    ahead: Ahead,
 }
 
-/// What a span adds to positions and velocities.
+/// The rest of a span: parts still ahead, each a power of two of it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Ahead {
+    /// The whole span \[s\].
+    span: f64,
+    /// How often it is halved for the next part.
+    halvings: u32,
+    /// How many parts of that size remain.
+    remaining: u64,
+    /// Evaluations after which it is given up.
+    bound: u64,
+}
+
+/// The change of positions and velocities over a span.
 type Change<const N: usize> = ([f64; N], [f64; N]);
 
 impl<const N: usize> Follower<N> {
@@ -48,6 +62,7 @@ impl<const N: usize> Follower<N> {
             state,
             carry: State::rest(),
             evaluations: 0,
+            ahead: Ahead::default(),
         }
     }
 
@@ -66,30 +81,60 @@ impl<const N: usize> Follower<N> {
     /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere on
     /// the way.
     pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {
-        let bound = self.evaluations.saturating_add(MAX_EVALUATIONS);
-        // Parts still ahead, each a power of two of the span: the next one, and how many of its size remain.
-        let (mut halvings, mut remaining) = (0_u32, 1_u64);
-        while remaining > 0 {
-            if self.evaluations > bound {
-                return false;
+        self.begin(span);
+        self.go_on(arm, effort, u64::MAX).unwrap_or(false)
+    }
+
+    /// A span \[s\] lies ahead, to be followed by [`Follower::go_on`].
+    pub(super) fn begin(&mut self, span: f64) {
+        self.ahead = Ahead {
+            span,
+            halvings: 0,
+            remaining: 1,
+            bound: self.evaluations.saturating_add(MAX_EVALUATIONS),
+        };
+    }
+
+    /// Goes on with the span until there have been so many `evaluations` in all, or some more; none while it is not over, `false` if it
+    /// could not be followed.
+    pub(super) fn go_on(
+        &mut self,
+        arm: &Arm<N>,
+        effort: &[f64; N],
+        evaluations: u64,
+    ) -> Option<bool> {
+        while self.ahead.remaining > 0 {
+            if self.evaluations > self.ahead.bound {
+                return Some(false);
             }
-            let part = span * 0.5_f64.powi(i32::try_from(halvings).unwrap_or(i32::MAX));
-            if let Some(change) = self.extrapolate(arm, effort, part) {
-                self.add(&change);
-                remaining -= 1;
-                // Longer parts again where they fit.
-                while halvings > 0 && remaining % 2 == 0 && remaining > 0 {
-                    halvings -= 1;
-                    remaining /= 2;
+            if self.evaluations >= evaluations {
+                return None;
+            }
+            let halvings = i32::try_from(self.ahead.halvings).unwrap_or(i32::MAX);
+            let part = self.ahead.span * 0.5_f64.powi(halvings);
+            let change = self.extrapolate(arm, effort, part);
+            let ahead = &mut self.ahead;
+            match change {
+                Some(change) => {
+                    ahead.remaining -= 1;
+                    // Longer parts again where they fit.
+                    while ahead.halvings > 0
+                        && ahead.remaining.is_multiple_of(2)
+                        && ahead.remaining > 0
+                    {
+                        ahead.halvings -= 1;
+                        ahead.remaining /= 2;
+                    }
+                    self.add(&change);
                 }
-            } else if halvings == MAX_HALVINGS {
-                return false;
-            } else {
-                halvings += 1;
-                remaining *= 2;
+                None if ahead.halvings == MAX_HALVINGS => return Some(false),
+                None => {
+                    ahead.halvings += 1;
+                    ahead.remaining *= 2;
+                }
             }
         }
-        self.state.is_finite()
+        Some(self.state.is_finite())
     }
 
     fn add(&mut self, (dq, dv): &Change<N>) {

@@ -1,45 +1,104 @@
-//! All limits of a control loop: at its setpoint, and the smallest over all poses.
+//! All limits of a control loop: at its setpoint, and the smallest over all poses, proven where it can be.
 //!
 //! **Invariant:** a search cut into slices finds the same bits as one made at once.
 
-use super::linear::Linear;
+use super::control_loop::ControlLoop;
+use super::critical::{Critical, critical};
+use super::linear::{Linear, equilibrium};
 use super::poses::PoseSearch;
-use super::stability::{Sampling, largest_timestep};
-use crate::math::arm::Arm;
-use crate::math::integrator::Method;
-use crate::math::pid::{Gains, Setpoint};
+use super::proof::{Proof, Proven};
+use super::stability::{Modes, Sampling, largest_timestep};
 
 /// Part of the smallest limit over all poses that is advised: what linearisation leaves out (a start of 0.3 rad off
 /// costs up to a third of a stiff limit, poses on the way have limits of their own) stays within it.
 pub const ADVISED_PART: f64 = 0.8;
 
-/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep found unstable, as for a
-/// free arm without gravity, which linear methods carry at any pace.
+/// How near to the proven bound the smallest limit found must be to count as proven.
+const AGREEMENT: f64 = 0.01;
+
+/// The part of the smallest limit found below which a proven bound is no advice any more.
+const USEFUL: f64 = 0.5;
+
+/// Boxes that a proof cuts in one piece: half a millisecond (optimised build).
+const BOXES: u32 = 200;
+
+/// How far from the setpoint an arm may rest that is said to be at it \[rad\].
+const AT_SETPOINT: f64 = 1e-6;
+
+/// How a loop rests in the pose that its limits belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Rest {
+    /// At the setpoint.
+    Setpoint,
+    /// Elsewhere: the springs give under the load.
+    Sagging,
+    /// Left to itself.
+    Hanging,
+    /// The setpoint is an exact balance, from which the arm falls to either side; the pose is that of one of them.
+    Saddle,
+    /// Not at all: even in continuous time the loop runs away from the pose.
+    Unstable,
+}
+
+impl Rest {
+    /// The name in lower case.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Setpoint => "setpoint",
+            Self::Sagging => "sagging",
+            Self::Hanging => "hanging",
+            Self::Saddle => "saddle",
+            Self::Unstable => "unstable",
+        }
+    }
+}
+
+/// Largest stable timesteps \[s\]. `Some(0.0)`: unstable at every timestep. `None`: no timestep found unstable, as for
+/// a free arm without gravity, which linear methods carry at any pace.
 ///
 /// Gains that are all zero mean an arm left to itself, and its hanging pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct Limits<const N: usize> {
+    /// The pose that `held` and `continuous` belong to \[rad\].
+    pub equilibrium: [f64; N],
+    /// How the loop rests there.
+    pub rest: Rest,
     /// At the setpoint's equilibrium, effort held over the step.
     pub held: Option<f64>,
     /// At the setpoint's equilibrium, control in every stage.
     pub continuous: Option<f64>,
-    /// The smallest over a grid of poses, effort held over the step.
+    /// The smallest over all poses, effort held over the step.
     pub minimum_held: Option<f64>,
-    /// The smallest over a grid of poses, control in every stage.
+    /// The smallest over all poses, control in every stage: found by a search.
     pub minimum_continuous: Option<f64>,
-    /// [`ADVISED_PART`] of the smaller of `held` and `minimum_held`, the live arm's way.
+    /// A timestep up to which every pose is proven to be stable, effort held over the step; `None` where nothing useful
+    /// is.
+    pub bound: Option<f64>,
+    /// Whether `minimum_held` and `bound` agree to 1 %.
+    pub certified: bool,
+    /// The pose of `minimum_held` \[rad\]; `None` where nothing limits.
+    pub worst_pose: Option<[f64; N]>,
+    /// The motion that grows there first.
+    pub critical: Option<Critical>,
+    /// [`ADVISED_PART`] of the smallest over all poses, the live arm's way: of `minimum_held` where that is proven, of
+    /// the bound where that is less and still of use.
     pub advised: Option<f64>,
 }
 
-/// All limits of a loop. Some 5 ms of one core for two links, 0.1 s for three (optimised build).
+impl<const N: usize> Limits<N> {
+    /// The smallest over all poses that can be relied on, effort held over the step \[s\]: `minimum_held` where it is
+    /// proven or nothing is, else the bound.
+    #[must_use]
+    pub fn trusted(&self) -> Option<f64> {
+        self.bound.filter(|_| !self.certified).or(self.minimum_held)
+    }
+}
+
+/// All limits of a loop. Some 15 ms of one core for two links, 0.3 s for three (optimised build).
 #[must_use]
-pub fn limits<const N: usize>(
-    arm: &Arm<N>,
-    gains: &Gains<N>,
-    setpoint: &Setpoint<N>,
-    method: Method,
-) -> Limits {
-    let mut search = LimitSearch::new(arm, gains, setpoint, method);
+pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
+    let mut search = LimitSearch::new(control);
     loop {
         if let Some(limits) = search.advance() {
             return limits;
@@ -50,91 +109,177 @@ pub fn limits<const N: usize>(
 /// [`limits`], to be paused: no advance takes longer than a millisecond or so of one core (optimised build).
 #[derive(Debug, Clone)]
 pub struct LimitSearch<const N: usize> {
-    arm: Arm<N>,
-    gains: Gains<N>,
-    method: Method,
+    control: ControlLoop<N>,
+    limits: Limits<N>,
     stage: Stage<N>,
 }
 
 #[derive(Debug, Clone)]
 enum Stage<const N: usize> {
-    Setpoint(Setpoint<N>),
+    Setpoint,
     Held(Linear),
-    Continuous(Linear, Option<f64>),
-    /// At the setpoint with held and with continuous control, then over the poses, one after the other.
-    Poses([Option<f64>; 2], [PoseSearch<N>; 2]),
-    Done(Limits),
+    Continuous(Linear),
+    Proving(Option<Box<Proof<N>>>),
+    /// The pose that the proof found to be the worst.
+    Proven(Option<Proven<N>>),
+    Poses(Sampling, PoseSearch<N>),
+    Done,
 }
 
 impl<const N: usize> LimitSearch<N> {
+    /// The most memory that a search takes, in bytes.
+    pub const MOST_BYTES: usize = size_of::<Self>() + Proof::<N>::MOST_BYTES;
+
     /// A search that has not begun.
     #[must_use]
-    pub fn new(arm: &Arm<N>, gains: &Gains<N>, setpoint: &Setpoint<N>, method: Method) -> Self {
+    pub fn new(control: &ControlLoop<N>) -> Self {
         Self {
-            arm: *arm,
-            gains: *gains,
-            method,
-            stage: Stage::Setpoint(*setpoint),
+            control: *control,
+            limits: Limits {
+                equilibrium: control.setpoint.position,
+                rest: Rest::Setpoint,
+                held: None,
+                continuous: None,
+                minimum_held: None,
+                minimum_continuous: None,
+                bound: None,
+                certified: false,
+                worst_pose: None,
+                critical: None,
+                advised: None,
+            },
+            stage: Stage::Setpoint,
         }
     }
 
     /// Goes on by one piece; the limits, once they are all found.
-    pub fn advance(&mut self) -> Option<Limits> {
-        let (arm, gains, method) = (&self.arm, &self.gains, self.method);
-        let next = match &mut self.stage {
-            Stage::Setpoint(setpoint) => Stage::Held(Linear::at_setpoint(arm, gains, setpoint)),
+    pub fn advance(&mut self) -> Option<Limits<N>> {
+        let method = self.control.method;
+        let limits = &mut self.limits;
+        self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
+            Stage::Setpoint => Stage::Held(self.settle()),
             Stage::Held(linear) => {
-                let held = largest_timestep(linear, method, Sampling::Held);
-                Stage::Continuous(linear.clone(), held)
+                limits.held = largest_timestep(&linear, method, Sampling::Held);
+                Stage::Continuous(linear)
             }
-            Stage::Continuous(linear, held) => {
-                let continuous = largest_timestep(linear, method, Sampling::Continuous);
-                let over_poses =
-                    |sampling, bound| PoseSearch::new(arm, gains, method, sampling, bound);
-                Stage::Poses(
-                    [*held, continuous],
-                    [
-                        over_poses(Sampling::Held, *held),
-                        over_poses(Sampling::Continuous, continuous),
-                    ],
-                )
+            Stage::Continuous(linear) => {
+                limits.continuous = largest_timestep(&linear, method, Sampling::Continuous);
+                Stage::Proving(Proof::new(&self.control).map(Box::new))
             }
-            Stage::Poses([held, continuous], searches) => {
-                if searches.iter_mut().any(PoseSearch::advance) {
-                    return None;
+            Stage::Proving(None) => Stage::Proven(None),
+            Stage::Proving(Some(mut proof)) => match proof.advance(BOXES) {
+                None => Stage::Proving(Some(proof)),
+                proven => Stage::Proven(proven),
+            },
+            Stage::Proven(proven) => self.compare(proven),
+            Stage::Poses(sampling, mut search) => {
+                if search.advance() {
+                    Stage::Poses(sampling, search)
+                } else {
+                    self.conclude(sampling, search.smallest())
                 }
-                let [minimum_held, minimum_continuous] = searches;
-                let minimum_held = minimum_held.smallest();
-                Stage::Done(Limits {
-                    held: *held,
-                    continuous: *continuous,
-                    minimum_held,
-                    minimum_continuous: minimum_continuous.smallest(),
-                    advised: minimum_held.map(|limit| ADVISED_PART * limit),
-                })
             }
-            Stage::Done(limits) => return Some(*limits),
+            Stage::Done => return Some(self.limits),
         };
-        self.stage = next;
-        match &self.stage {
-            Stage::Done(limits) => Some(*limits),
-            _ => None,
+        matches!(self.stage, Stage::Done).then_some(self.limits)
+    }
+
+    /// The loop where it rests.
+    fn settle(&mut self) -> Linear {
+        let control = &self.control;
+        let rest = equilibrium(control);
+        let linear = Linear::at(control, &rest.position, &rest.integrating);
+        let mut off = rest.position.iter().zip(&control.setpoint.position);
+        self.limits.equilibrium = rest.position;
+        self.limits.rest = if Modes::of(&linear).run_away() {
+            Rest::Unstable
+        } else if rest.balanced {
+            Rest::Saddle
+        } else if control.is_free() {
+            Rest::Hanging
+        } else if off.all(|(rest, setpoint)| (rest - setpoint).abs() <= AT_SETPOINT) {
+            Rest::Setpoint
+        } else {
+            Rest::Sagging
+        };
+        linear
+    }
+
+    /// Compares what is proven with the limit in the worst pose of the proof; where they agree there is nothing to
+    /// search.
+    fn compare(&mut self, proven: Option<Proven<N>>) -> Stage<N> {
+        let control = &self.control;
+        let mut found = (self.limits.held, self.limits.equilibrium);
+        let search = |sampling, found| {
+            let search = PoseSearch::new(control, sampling, found);
+            Stage::Poses(sampling, search)
+        };
+        let Some(Proven { timestep, pose }) = proven else {
+            return search(Sampling::Held, found);
+        };
+        let linear = Linear::at_pose(control, &pose);
+        let there = largest_timestep(&linear, control.method, Sampling::Held);
+        if let Some(limit) = there
+            && limit > 0.0
+            && found.0.is_none_or(|least| limit < least)
+        {
+            found = (there, pose);
         }
+        self.limits.bound = Some(timestep);
+        if self.limits.held == Some(0.0) {
+            // Beside rates a trillion times their own, slow modes seem to grow by rounding alone. A proof does not
+            // round.
+            self.limits.held = Some(timestep);
+            found.0 = self.limits.held;
+        }
+        if found.0.is_some_and(|least| agree(timestep, least)) {
+            return self.conclude(Sampling::Held, found);
+        }
+        search(Sampling::Held, found)
+    }
+
+    /// Takes in the smallest limit over all poses, and goes on with the next search, if there is one.
+    fn conclude(&mut self, sampling: Sampling, (least, pose): (Option<f64>, [f64; N])) -> Stage<N> {
+        let control = &self.control;
+        let limits = &mut self.limits;
+        if sampling == Sampling::Continuous {
+            limits.minimum_continuous = least;
+            return Stage::Done;
+        }
+        limits.minimum_held = least;
+        limits.bound = limits
+            .bound
+            .filter(|bound| least.is_some_and(|least| *bound >= USEFUL * least));
+        limits.certified =
+            matches!((limits.bound, least), (Some(bound), Some(least)) if agree(bound, least));
+        limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
+        if let Some(limit) = least {
+            limits.worst_pose = Some(pose);
+            let linear = Linear::at_pose(control, &pose);
+            limits.critical = critical(&linear, control.method, limit);
+        }
+        let known = (limits.continuous, limits.equilibrium);
+        let search = PoseSearch::new(control, Sampling::Continuous, known);
+        Stage::Poses(Sampling::Continuous, search)
     }
 }
 
-/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Half a millisecond of one core for two
-/// links, one for three (optimised build).
+/// Whether a proven bound and the smallest limit found are one. A limit may fall short of the bound by what the growth
+/// that counts makes of it.
+fn agree(bound: f64, least: f64) -> bool {
+    (least / bound - 1.0).abs() <= AGREEMENT
+}
+
+/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Half a millisecond of one core for
+/// two links, one for three (optimised build).
 #[must_use]
-pub fn limit_held<const N: usize>(
-    arm: &Arm<N>,
-    gains: &Gains<N>,
-    setpoint: &Setpoint<N>,
-    method: Method,
-) -> Option<f64> {
-    largest_timestep(
-        &Linear::at_setpoint(arm, gains, setpoint),
-        method,
-        Sampling::Held,
-    )
+pub fn limit_held<const N: usize>(control: &ControlLoop<N>) -> Option<f64> {
+    let linear = Linear::at_setpoint(control);
+    match largest_timestep(&linear, control.method, Sampling::Held) {
+        // As in the search for all limits.
+        Some(0.0) => Proof::new(control)
+            .and_then(|mut proof| proof.advance(BOXES))
+            .map_or(Some(0.0), |proven| Some(proven.timestep)),
+        limit => limit,
+    }
 }

@@ -21,223 +21,13 @@
     reason = "indices run over 0..N of arrays that have N elements, or over the joints of a matrix of their number"
 )]
 
-use std::f64::consts::FRAC_PI_2;
-
+use super::control_loop::ControlLoop;
+pub use super::control_loop::{is_free, no_control};
+pub(crate) use super::equilibrium::gravity_gradient;
+pub use super::equilibrium::{Equilibrium, equilibrium};
 use super::matrix::Matrix;
 use crate::math::arm::Arm;
-use crate::math::dynamics::{forward_dynamics, gravity_load, potential_energy};
-use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
-
-/// Newton steps before an equilibrium is given up. From a setpoint nearby five do.
-const MAX_NEWTON: usize = 200;
-
-/// Where an arm rests under control.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Equilibrium<const N: usize> {
-    /// Joint positions \[rad\].
-    pub position: [f64; N],
-    /// Integral of the position error \[rad s\]; zero where there is no integral gain.
-    pub integral: [f64; N],
-    /// Joints whose integral still moves: an integral gain, and a load that the integral can carry within its limit.
-    pub integrating: [bool; N],
-    /// Largest effort that is left unbalanced \[N m\]: some units of rounding, or more where no equilibrium exists.
-    pub residual: f64,
-}
-
-/// Gains that are all zero: an arm left to itself.
-#[must_use]
-pub const fn no_control<const N: usize>() -> Gains<N> {
-    Gains {
-        kp: [0.0; N],
-        ki: [0.0; N],
-        kd: [0.0; N],
-    }
-}
-
-/// Whether the gains are all zero, so that on or off is the same.
-#[must_use]
-#[allow(
-    clippy::float_cmp,
-    reason = "a gain that is exactly zero is a gain that is not there"
-)]
-pub fn is_free<const N: usize>(gains: &Gains<N>) -> bool {
-    let Gains { kp, ki, kd } = gains;
-    kp.iter().chain(ki).chain(kd).all(|&gain| gain == 0.0)
-}
-
-/// The equilibrium that the arm settles at from the setpoint: the setpoint itself where every joint has an integral, the
-/// sagging pose otherwise, the hanging one for an arm left to itself.
-///
-/// Joints that integrate stay at the setpoint; the others go downhill on the potential `V = U + ½ kp (q - q*)² - c q` by
-/// Newton steps, so that what is found is a pose that the arm would rest in. An integral that would have to exceed its
-/// limit is taken as a constant effort at the limit.
-#[must_use]
-pub fn equilibrium<const N: usize>(
-    arm: &Arm<N>,
-    gains: &Gains<N>,
-    setpoint: &Setpoint<N>,
-) -> Equilibrium<N> {
-    if is_free(gains) {
-        let mut position = [0.0; N];
-        if let Some(first) = position.first_mut().filter(|_| arm.gravity() > 0.0) {
-            *first = -FRAC_PI_2;
-        } else {
-            position = setpoint.position;
-        }
-        return Equilibrium {
-            position,
-            integral: [0.0; N],
-            integrating: [false; N],
-            residual: 0.0,
-        };
-    }
-    let mut descent = Descent {
-        arm,
-        gains,
-        setpoint,
-        integrating: gains.ki.map(|ki| ki > 0.0),
-        push: std::array::from_fn(|i| gains.kd[i] * setpoint.velocity[i]),
-    };
-    let mut integral = [0.0; N];
-    // Every pass but the last takes an integral that saturates out of the joints that still integrate.
-    for _ in 0..=N {
-        let sag = descent.settle();
-        let load = descent.gradient(&sag);
-        let mut saturated = false;
-        for i in 0..N {
-            if !descent.integrating[i] {
-                continue;
-            }
-            integral[i] = load[i] / gains.ki[i];
-            if integral[i].abs() > INTEGRAL_LIMIT {
-                saturated = true;
-                integral[i] = INTEGRAL_LIMIT.copysign(integral[i]);
-                descent.integrating[i] = false;
-                descent.push[i] += gains.ki[i] * integral[i];
-            }
-        }
-        if !saturated {
-            let left = (0..N).filter(|&i| !descent.integrating[i]);
-            return Equilibrium {
-                position: std::array::from_fn(|i| setpoint.position[i] + sag[i]),
-                integral,
-                integrating: descent.integrating,
-                residual: left.fold(0.0, |max, i| max.max(load[i].abs())),
-            };
-        }
-    }
-    Equilibrium {
-        position: setpoint.position,
-        integral,
-        integrating: [false; N],
-        residual: f64::INFINITY,
-    }
-}
-
-/// The potential that an arm goes downhill on, in the sag `y = q - q*` of its joints.
-struct Descent<'a, const N: usize> {
-    arm: &'a Arm<N>,
-    gains: &'a Gains<N>,
-    setpoint: &'a Setpoint<N>,
-    integrating: [bool; N],
-    /// Constant effort `kd q̇*`, and that of integrals at their limit \[N m\].
-    push: [f64; N],
-}
-
-impl<const N: usize> Descent<'_, N> {
-    fn position(&self, sag: &[f64; N]) -> [f64; N] {
-        std::array::from_fn(|i| self.setpoint.position[i] + sag[i])
-    }
-
-    /// `∂V/∂y`, joints that integrate included \[N m\].
-    fn gradient(&self, sag: &[f64; N]) -> [f64; N] {
-        let load = gravity_load(self.arm, &self.position(sag));
-        std::array::from_fn(|i| load[i] + self.gains.kp[i] * sag[i] - self.push[i])
-    }
-
-    fn potential(&self, sag: &[f64; N]) -> f64 {
-        let spring: f64 = (0..N)
-            .map(|i| (0.5 * self.gains.kp[i] * sag[i] - self.push[i]) * sag[i])
-            .sum();
-        potential_energy(self.arm, &self.position(sag)) + spring
-    }
-
-    /// Size of the gradient over the joints that move.
-    fn slope(&self, sag: &[f64; N]) -> f64 {
-        let gradient = self.gradient(sag);
-        (0..N)
-            .filter(|&i| !self.integrating[i])
-            .fold(0.0, |max: f64, i| max.max(gradient[i].abs()))
-    }
-
-    /// Downhill from no sag to where the slope ends: Newton steps, shortened by a diagonal term as long as they would
-    /// not lead down.
-    fn settle(&self) -> [f64; N] {
-        let mut sag = [0.0; N];
-        let mut damping = 0.0;
-        for _ in 0..MAX_NEWTON {
-            let slope = self.slope(&sag);
-            if slope == 0.0 {
-                break;
-            }
-            let stiffness = self.stiffness(&sag);
-            let largest = (0..N).fold(0.0, |max: f64, i| max.max(stiffness[(i, i)].abs()));
-            let next = self.newton(&sag, stiffness, damping * largest);
-            let height = self.potential(&sag);
-            // Near the bottom the potential is flat to rounding, and the slope alone shows progress.
-            let rounding = 1e-13 * (height.abs() + largest);
-            let better = next.filter(|next| {
-                let drop = height - self.potential(next);
-                drop > rounding || (drop >= -rounding && self.slope(next) < slope)
-            });
-            match better {
-                Some(next) => {
-                    sag = next;
-                    damping = if damping < 1e-3 { 0.0 } else { 0.1 * damping };
-                }
-                // As near as rounding lets it come, or nowhere to rest at all.
-                None if damping > 1e12 => break,
-                None => damping = if damping == 0.0 { 1e-3 } else { 10.0 * damping },
-            }
-        }
-        sag
-    }
-
-    /// `∂²V/∂y²` \[N m/rad\].
-    fn stiffness(&self, sag: &[f64; N]) -> Matrix {
-        let gradient = gravity_gradient(self.arm, &self.position(sag));
-        Matrix::from_fn(N, |i, j| {
-            gradient[i.max(j)] + if i == j { self.gains.kp[i] } else { 0.0 }
-        })
-    }
-
-    fn newton(&self, sag: &[f64; N], mut stiffness: Matrix, damping: f64) -> Option<[f64; N]> {
-        let mut downhill = self.gradient(sag).map(|slope| -slope);
-        for i in 0..N {
-            stiffness[(i, i)] += damping;
-        }
-        for i in (0..N).filter(|&i| self.integrating[i]) {
-            downhill[i] = 0.0;
-            for j in 0..N {
-                stiffness[(i, j)] = 0.0;
-                stiffness[(j, i)] = 0.0;
-            }
-            stiffness[(i, i)] = 1.0;
-        }
-        let step = stiffness.solve(&downhill)?;
-        Some(std::array::from_fn(|i| sag[i] + step[i]))
-    }
-}
-
-/// `∂G_k/∂q_j` is entry `max(k, j)` of this \[N m/rad\]: turning any joint up to `k` turns all links beyond `k` alike,
-/// and turning the whole arm by a quarter makes that derivative out of the load itself.
-pub(super) fn gravity_gradient<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
-    let mut turned = *q;
-    if let Some(first) = turned.first_mut() {
-        *first += FRAC_PI_2;
-    }
-    gravity_load(arm, &turned)
-}
+use crate::math::dynamics::forward_dynamics;
 
 /// The arm and its control law, linear in the deviation from a pose.
 #[derive(Debug, Clone, PartialEq)]
@@ -258,11 +48,11 @@ impl Linear {
     /// The loop at `position`, as if it were an equilibrium in which `integrating` says whose integral moves.
     #[must_use]
     pub fn at<const N: usize>(
-        arm: &Arm<N>,
-        gains: &Gains<N>,
+        control: &ControlLoop<N>,
         position: &[f64; N],
         integrating: &[bool; N],
     ) -> Self {
+        let ControlLoop { arm, gains, .. } = control;
         let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
         let solve = |effort: [f64; N]| forward_dynamics(&weightless, position, &[0.0; N], &effort);
         let gradient = gravity_gradient(arm, position);
@@ -290,13 +80,15 @@ impl Linear {
 
     /// The loop at the equilibrium that belongs to a setpoint.
     #[must_use]
-    pub fn at_setpoint<const N: usize>(
-        arm: &Arm<N>,
-        gains: &Gains<N>,
-        setpoint: &Setpoint<N>,
-    ) -> Self {
-        let rest = equilibrium(arm, gains, setpoint);
-        Self::at(arm, gains, &rest.position, &rest.integrating)
+    pub fn at_setpoint<const N: usize>(control: &ControlLoop<N>) -> Self {
+        let rest = equilibrium(control);
+        Self::at(control, &rest.position, &rest.integrating)
+    }
+
+    /// The loop at any pose, every integral moving.
+    #[must_use]
+    pub fn at_pose<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Self {
+        Self::at(control, position, &control.integrating())
     }
 
     /// One joint of unit inertia: `v̇ = -stiffness x + u`, `u = -kp x - kd v + ki s`.

@@ -2,15 +2,12 @@
 //!
 //! | module | answers |
 //! | --- | --- |
-//! | [`stability`] | the largest stable timestep, predicted from the linearised loop ([`linear`], [`matrix`]) |
-//! | [`measure`] | the same, measured on the arm itself |
-//! | [`growth`] | growth per control period, measured |
-//! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
-//! | [`reference`](mod@reference) | the true motion, with twice the digits and a bound on its own error |
-//! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
-//! | [`conditioning`] | digits lost in the accelerations of arms with uneven masses |
-//! | [`budget`] | truncation, rounding and control hold, apart |
-//! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
+//! | [`stability`] | the largest stable timestep, predicted from the linearised loop ([`linear`], [`matrix`]); over all poses, proven |
+//! | [`motion`] | the largest timestep that a motion bears |
+//! | [`control_loop`] | the loop that all of these speak of, and how it is stepped |
+//! | [`continuous`] | the same loop with its law in every stage |
+//! | [`gains`] | gains for an arm and a timestep, stable in every pose, that settle in time |
+//! | [`planner`] | the cheapest method and timestep for an allowed error at the end effector |
 //! | [`rollout`] | an offline run with its error against a reference ([`extrapolation`]) |
 //! | [`error_estimate`] | the local error of the step about to be taken |
 //!
@@ -18,19 +15,21 @@
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
-pub mod budget;
-pub mod chaos;
-pub mod conditioning;
-pub mod error;
+pub mod continuous;
+pub mod control_loop;
+mod critical;
+mod equilibrium;
 pub mod error_estimate;
 pub mod extrapolation;
-pub mod growth;
+pub mod gains;
 mod limits;
 pub mod linear;
 pub mod matrix;
-pub mod measure;
+pub mod motion;
+pub mod planner;
 mod poses;
-pub mod reference;
+mod proof;
 pub mod rollout;
-pub mod scenarios;
 pub mod stability;
+mod symmetric;
+mod track;

@@ -1,27 +1,25 @@
 //! The smallest stable timestep over all poses: how far a limit at one setpoint can be trusted on the way to another.
 //!
-//! Inertia depends on every joint but the first, the pull of gravity on all of them. At every pose of a grid over the outer
-//! joints the loop is judged without gravity, and, where there is gravity, at a ring of first joints with it. Poses that
-//! gravity makes run away even in continuous time say nothing about timesteps and are left out; without gravity they
-//! count, since then it is the gains that run away.
+//! Inertia depends on every joint but the first, the pull of gravity on all of them. At every pose of a grid over the
+//! outer joints the loop is judged without gravity, and, where there is gravity, at a ring of first joints with it.
+//! Then the poses between are looked for: from every cell of the grid that stands out among its neighbours, uphill on
+//! the growth at the smallest limit so far. Wherever something grows, that pose has a smaller limit. Poses that gravity
+//! makes run away even in continuous time say nothing about timesteps and are left out; without gravity they count,
+//! since then it is the gains that run away.
 //!
-//! **Invariant:** the work is bounded: [`GRID`] poses a joint, and beyond three links fewer.
+//! **Invariant:** the work is bounded: [`cells`] poses, and one climb from each at most.
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "digits are taken modulo the grid's own length"
+    reason = "digits are taken modulo the grid's own length, cells below their number"
 )]
 
+use crate::math::count::length_in_f64;
 use std::f64::consts::{PI, TAU};
 
+use super::control_loop::ControlLoop;
 use super::linear::Linear;
-use super::stability::{Modes, Sampling, Stepping};
-use crate::math::arm::Arm;
-use crate::math::integrator::Method;
-use crate::math::pid::Gains;
-
-/// Poses around the circle of each outer joint; even, so that stretched and folded are among them.
-const GRID: usize = 16;
+use super::stability::{Modes, NEUTRAL, Sampling, Stepping};
 
 /// Directions of the first joint for the pull of gravity; among them hanging and upright.
 const DIRECTIONS: usize = 8;
@@ -32,76 +30,143 @@ const MAX_POSES: usize = 1024;
 /// Parts of the smallest limit so far at which a pose must be stable to pass without a search of its own.
 const PROBES: [f64; 3] = [1.0, 0.6, 0.2];
 
+/// Where a climb ends \[rad\]: near its top a limit then changes by a millionth.
+const SMALLEST_STRIDE: f64 = 1e-3;
+
+/// Moves of one climb at most.
+const MAX_MOVES: u32 = 400;
+
+/// Poses around the circle of each outer joint; even, so that stretched and folded are among them.
+const fn grid<const N: usize>() -> usize {
+    if N > 2 { 16 } else { 64 }
+}
+
+/// A pose to be judged, with gravity or without.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Judged<const N: usize> {
+    pose: [f64; N],
+    weighs: bool,
+}
+
+/// Uphill on the growth, one look a move.
+#[derive(Debug, Clone, Copy)]
+struct Climb<const N: usize> {
+    at: Judged<N>,
+    growth: f64,
+    stride: f64,
+    /// Which of the directions is tried next, and how many have failed in turn.
+    direction: usize,
+    failed: usize,
+    moves: u32,
+}
+
+#[derive(Debug, Clone)]
+enum Stage<const N: usize> {
+    Grid(usize),
+    /// The growth of every cell at the smallest limit, where it is largest.
+    Rating(usize, Vec<(Judged<N>, f64)>),
+    Climbing(Vec<Judged<N>>, Option<Climb<N>>),
+    Done,
+}
+
 /// The smallest of a bound and the limits of all poses, looked for pose by pose, so that it can be paused.
 #[derive(Debug, Clone)]
 pub(super) struct PoseSearch<const N: usize> {
-    arm: Arm<N>,
-    gains: Gains<N>,
-    method: Method,
+    control: ControlLoop<N>,
     sampling: Sampling,
     /// The smallest so far \[s\]; `None` while nothing limits.
     smallest: Option<f64>,
-    /// Judgements made.
-    judged: usize,
+    /// Where that is.
+    worst: [f64; N],
+    stage: Stage<N>,
 }
 
 impl<const N: usize> PoseSearch<N> {
-    /// A search that begins with `bound` \[s\], the limit at some other pose.
+    /// A search that begins with `bound` \[s\], the limit at the pose `worst`.
     pub(super) fn new(
-        arm: &Arm<N>,
-        gains: &Gains<N>,
-        method: Method,
+        control: &ControlLoop<N>,
         sampling: Sampling,
-        bound: Option<f64>,
+        (bound, worst): (Option<f64>, [f64; N]),
     ) -> Self {
         Self {
-            arm: *arm,
-            gains: *gains,
-            method,
+            control: *control,
             sampling,
             smallest: bound,
-            judged: 0,
+            worst,
+            stage: Stage::Grid(0),
         }
     }
 
     /// Judges the loop at one more pose; false once there is none left.
     pub(super) fn advance(&mut self) -> bool {
-        let directions = if self.arm.gravity() == 0.0 {
-            0
-        } else {
-            DIRECTIONS
+        self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
+            Stage::Grid(index) => match self.judged(index) {
+                Some(judged) => {
+                    self.judge(&judged);
+                    Stage::Grid(index + 1)
+                }
+                None if self.smallest.is_none_or(|limit| limit == 0.0) => Stage::Done,
+                None => Stage::Rating(0, Vec::new()),
+            },
+            Stage::Rating(index, mut cells) => match self.judged(index) {
+                Some(judged) => {
+                    self.rate(index, judged, &mut cells);
+                    Stage::Rating(index + 1, cells)
+                }
+                None => Stage::Climbing(summits::<N>(&cells), None),
+            },
+            Stage::Climbing(starts, Some(climb)) => Stage::Climbing(starts, self.climb(climb)),
+            Stage::Climbing(mut starts, None) => match starts.pop() {
+                Some(start) => {
+                    let climb = self.begin(start);
+                    Stage::Climbing(starts, Some(climb))
+                }
+                None => Stage::Done,
+            },
+            Stage::Done => return false,
         };
-        // Without gravity the direction of the first joint makes no difference: one judgement, then one for each.
-        let (index, turn) = (
-            self.judged / (directions + 1),
-            self.judged % (directions + 1),
-        );
-        let Some(mut pose) = outer_pose::<N>(index) else {
-            return false;
-        };
-        self.judged += 1;
+        true
+    }
+
+    /// The smallest so far \[s\], `None` if nothing limits, and its pose.
+    pub(super) fn smallest(&self) -> (Option<f64>, [f64; N]) {
+        (self.smallest, self.worst)
+    }
+
+    /// One of the poses of the grid: first without gravity, then, if there is any, with it in every direction.
+    fn judged(&self, index: usize) -> Option<Judged<N>> {
+        let turns = self.turns();
+        let mut pose = outer_pose::<N>(index / turns)?;
+        let turn = index % turns;
         if turn > 0
             && let Some(first) = pose.first_mut()
         {
             *first = part_of_turn(turn - 1, DIRECTIONS);
         }
-        let integrating = self.gains.ki.map(|ki| ki > 0.0);
-        let linear = Linear::at(&self.arm, &self.gains, &pose, &integrating);
-        if turn > 0 {
-            self.judge(&linear, true);
+        Some(Judged {
+            pose,
+            weighs: turn > 0,
+        })
+    }
+
+    /// Judgements at one pose of the outer joints. Without gravity the direction of the first joint makes no
+    /// difference.
+    fn turns(&self) -> usize {
+        if self.control.arm.gravity() == 0.0 {
+            1
         } else {
-            self.judge(&linear.weightless(), false);
+            DIRECTIONS + 1
         }
-        true
     }
 
-    /// The smallest so far \[s\]; `None` if nothing limits.
-    pub(super) fn smallest(&self) -> Option<f64> {
-        self.smallest
+    fn linear(&self, Judged { pose, weighs }: &Judged<N>) -> Linear {
+        let linear = Linear::at_pose(&self.control, pose);
+        if *weighs { linear } else { linear.weightless() }
     }
 
-    fn judge(&mut self, linear: &Linear, gravity: bool) {
-        let stepping = Stepping::new(linear, self.method, self.sampling);
+    fn judge(&mut self, judged: &Judged<N>) {
+        let linear = self.linear(judged);
+        let stepping = Stepping::new(&linear, self.control.method, self.sampling);
         let passes = self.smallest.is_some_and(|limit| {
             PROBES
                 .iter()
@@ -110,27 +175,129 @@ impl<const N: usize> PoseSearch<N> {
         if passes {
             return;
         }
-        let modes = Modes::of(linear);
-        if gravity && modes.run_away() {
+        let modes = Modes::of(&linear);
+        if judged.weighs && modes.run_away() {
             return;
         }
-        if let Some(limit) = stepping.search(&modes) {
-            self.smallest = Some(self.smallest.map_or(limit, |smallest| smallest.min(limit)));
+        if let Some(limit) = stepping.search(&modes)
+            && self.smallest.is_none_or(|smallest| limit < smallest)
+        {
+            self.smallest = Some(limit);
+            self.worst = judged.pose;
         }
+    }
+
+    /// Growth at the smallest limit so far.
+    fn growth(&self, judged: &Judged<N>) -> f64 {
+        let linear = self.linear(judged);
+        let growth = Stepping::new(&linear, self.control.method, self.sampling)
+            .growth(self.smallest.unwrap_or(0.0));
+        if growth > NEUTRAL && judged.weighs && Modes::of(&linear).run_away() {
+            f64::NEG_INFINITY
+        } else {
+            growth
+        }
+    }
+
+    fn rate(&self, index: usize, judged: Judged<N>, cells: &mut Vec<(Judged<N>, f64)>) {
+        let growth = self.growth(&judged);
+        match cells.get_mut(index / self.turns()) {
+            Some(cell) if growth > cell.1 => *cell = (judged, growth),
+            Some(_) => {}
+            None => cells.push((judged, growth)),
+        }
+    }
+
+    fn begin(&self, at: Judged<N>) -> Climb<N> {
+        Climb {
+            at,
+            growth: self.growth(&at),
+            stride: 0.5 * TAU / ratio(grid::<N>(), 1),
+            direction: 0,
+            failed: 0,
+            moves: 0,
+        }
+    }
+
+    /// One move of a climb; none once it is at its top.
+    fn climb(&mut self, mut climb: Climb<N>) -> Option<Climb<N>> {
+        // The first joint counts only where something weighs.
+        let first = usize::from(!climb.at.weighs);
+        let directions = 2 * N.saturating_sub(first);
+        if climb.stride < SMALLEST_STRIDE || climb.moves >= MAX_MOVES || directions == 0 {
+            return None;
+        }
+        climb.moves += 1;
+        let mut next = climb.at;
+        let sign = if climb.direction.is_multiple_of(2) {
+            1.0
+        } else {
+            -1.0
+        };
+        next.pose[first + climb.direction / 2] += sign * climb.stride;
+        let growth = self.growth(&next);
+        if growth > climb.growth {
+            (climb.at, climb.growth, climb.failed) = (next, growth, 0);
+            if growth > NEUTRAL {
+                self.judge(&next);
+                climb.growth = self.growth(&next);
+            }
+        } else {
+            climb.direction = (climb.direction + 1) % directions;
+            climb.failed += 1;
+            if climb.failed == directions {
+                climb.failed = 0;
+                climb.stride *= 0.5;
+            }
+        }
+        Some(climb)
     }
 }
 
-/// One of the poses of the outer joints, the first joint at zero; none beyond the last. Mirrored about the vertical an arm
-/// is the same arm, so the second joint needs half of its circle only.
-fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
-    let half = GRID / 2 + 1;
+/// Cells that grow no less than all of their neighbours.
+fn summits<const N: usize>(cells: &[(Judged<N>, f64)]) -> Vec<Judged<N>> {
+    let (half, whole) = (grid::<N>() / 2 + 1, grid::<N>());
+    let stands_out = |index: usize| {
+        let mut apart = 1;
+        (1..N).all(|joint| {
+            let length = if joint == 1 { half } else { whole };
+            let (stride, digit) = (apart, index / apart % length);
+            apart *= length;
+            // The second joint's half circle has ends.
+            let beside = if joint == 1 {
+                [digit.saturating_sub(1), (digit + 1).min(length - 1)]
+            } else {
+                [(digit + length - 1) % length, (digit + 1) % length]
+            };
+            beside.iter().all(|beside| {
+                let neighbour = cells.get(index - digit * stride + beside * stride);
+                neighbour.is_none_or(|neighbour| neighbour.1 <= cells[index].1)
+            })
+        })
+    };
+    (0..cells.len())
+        .filter(|&index| stands_out(index))
+        .map(|index| cells[index].0)
+        .collect()
+}
+
+/// Poses of the outer joints: all of the grid, or, beyond three links, as many as there may be.
+fn cells<const N: usize>() -> (usize, usize) {
+    let half = grid::<N>() / 2 + 1;
     let outer = u32::try_from(N.saturating_sub(2)).unwrap_or(u32::MAX);
     let all = if N < 2 {
         1
     } else {
-        half.saturating_mul(GRID.saturating_pow(outer))
+        half.saturating_mul(grid::<N>().saturating_pow(outer))
     };
-    let taken = all.min(MAX_POSES);
+    (all, all.min(MAX_POSES))
+}
+
+/// One of the poses of the outer joints, the first joint at zero; none beyond the last. Mirrored about the vertical an
+/// arm is the same arm, so the second joint needs half of its circle only.
+fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
+    let (all, taken) = cells::<N>();
+    let half = grid::<N>() / 2 + 1;
     // Beyond three links the grid is thinned evenly.
     let mut index = (index < taken).then(|| index.saturating_mul(all / taken))?;
     Some(std::array::from_fn(|joint| match joint {
@@ -138,12 +305,12 @@ fn outer_pose<const N: usize>(index: usize) -> Option<[f64; N]> {
         1 => {
             let digit = index % half;
             index /= half;
-            PI * ratio(digit, GRID / 2)
+            PI * ratio(digit, grid::<N>() / 2)
         }
         _ => {
-            let digit = index % GRID;
-            index /= GRID;
-            part_of_turn(digit, GRID)
+            let digit = index % grid::<N>();
+            index /= grid::<N>();
+            part_of_turn(digit, grid::<N>())
         }
     }))
 }
@@ -153,10 +320,6 @@ fn part_of_turn(part: usize, whole: usize) -> f64 {
     TAU * ratio(part, whole) - PI
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "grid indices are far below 2^53"
-)]
 fn ratio(part: usize, whole: usize) -> f64 {
-    part as f64 / whole as f64
+    length_in_f64(part) / length_in_f64(whole)
 }

@@ -22,7 +22,8 @@
     reason = "indices run over the states of matrices that are made for them"
 )]
 
-pub use super::limits::{ADVISED_PART, LimitSearch, Limits, limit_held, limits};
+pub use super::critical::{BEYOND, Critical};
+pub use super::limits::{ADVISED_PART, LimitSearch, Limits, Rest, limit_held, limits};
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
 use crate::math::integrator::Method;
@@ -96,7 +97,7 @@ pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) ->
     stepping.search(&Modes::of(linear))
 }
 
-/// What one control period \[s\] of `substeps` steps of the method does to a deviation; states as in [`Linear::flow`].
+/// The matrix by which one control period \[s\] of `substeps` steps changes a deviation; states as in [`Linear::flow`].
 #[must_use]
 pub fn period_matrix(linear: &Linear, method: Method, substeps: u32, period: f64) -> Matrix {
     let stepping = Stepping {
@@ -129,6 +130,11 @@ impl Modes {
         }
     }
 
+    /// A timestep far below the fastest time constant \[s\].
+    pub(super) fn tiny(&self) -> f64 {
+        SEARCH_START / self.rate
+    }
+
     /// Whether there is a mode that no timestep can help: one that grows, or one so near to drifting that rounding
     /// decides on which side it is (a double zero is good to the root of the rounding error).
     pub(super) fn run_away(&self) -> bool {
@@ -149,7 +155,7 @@ pub(super) struct Stepping<'a> {
     substeps: u32,
     /// Whether an effort acts one period late.
     delayed: bool,
-    /// What the method steps: the loop, or the arm with constant efforts.
+    /// The matrix that the method steps: of the loop, or of the arm with constant efforts.
     stepped: Matrix,
 }
 
@@ -169,7 +175,7 @@ impl<'a> Stepping<'a> {
     }
 
     /// `E` of `x ↦ (I + T E) x` over the period `T` \[s\].
-    fn generator(&self, period: f64) -> Matrix {
+    pub(super) fn generator(&self, period: f64) -> Matrix {
         let h = period / f64::from(self.substeps);
         let free = if self.method == Method::Verlet {
             self.verlet(h)

@@ -1,17 +1,17 @@
 //! Who may ask: the rules for `Host`, `Origin` and the token.
 //!
 //! A page from anywhere can make its visitor's browser send requests to this port. It cannot choose two headers: `Host`
-//! tells under which name the browser looked for us (not ours where a hostile name server points a foreign name here), and
-//! `Origin` whose page opens a WebSocket. Programs send what they like there, and could use the raw port as well.
+//! tells under which name the browser looked for us (not ours where a hostile name server points a foreign name here),
+//! and `Origin` whose page opens a WebSocket. Programs send what they like there, and could use the raw port as well.
 //!
 //! **Invariant:** what is not allowed by a rule is refused, with a text that names the rule or the option.
 
 use std::net::SocketAddr;
 
 use super::authority::{Authority, Host};
-use super::head::Request;
-use crate::protocol::text::push_plain;
-use crate::protocol::token::Token;
+use super::head::RequestHead;
+use crate::protocol::op::token::Token;
+use crate::protocol::wire::text::push_plain;
 
 /// Characters of a header that a refusal repeats.
 const MAX_SHOWN: usize = 80;
@@ -19,19 +19,19 @@ const MAX_SHOWN: usize = 80;
 /// The rules.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Access {
-    /// What has to be shown, if anything.
+    /// The token that has to be shown, if there is one.
     pub token: Option<Token>,
     /// Names that `Host` may have besides loopback's; without a port, ours is meant.
     pub hosts: Vec<Authority>,
     /// Pages that may open a WebSocket besides loopback's, as `Origin` writes them, in lower case.
     pub origins: Vec<Box<str>>,
-    /// Of pages only our own may, and those named.
+    /// Only our own pages may, and those named; so it is with a token, too.
     pub strict_origin: bool,
 }
 
 /// Why a request is refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum Refusal {
+pub enum AccessError {
     /// The request does not say which host it looks for.
     #[error("the request must have one Host header")]
     NoHost,
@@ -41,15 +41,15 @@ pub enum Refusal {
          http://localhost:{port}/, or start the runtime with --allow-host and that name"
     )]
     Host {
-        /// What the request says.
+        /// The host that the request names.
         host: String,
         /// Our port.
         port: u16,
     },
     /// A page that may not open a WebSocket.
     #[error(
-        "a page of the origin {0:?} may not open a WebSocket here: it could drive the arm without your knowledge. If it \
-         may, start the runtime with --allow-origin and that origin"
+        "a page of the origin {0:?} may not open a WebSocket here: it could drive the arm without your knowledge. \
+         If it may, start the runtime with --allow-origin and that origin"
     )]
     Origin(String),
     /// The token is missing.
@@ -66,11 +66,11 @@ impl Access {
     /// The host that the request looks for, if it is ours; `local` is the address that the client has connected to.
     ///
     /// # Errors
-    /// [`Refusal::NoHost`] and [`Refusal::Host`].
-    pub fn host(&self, request: &Request, local: SocketAddr) -> Result<Authority, Refusal> {
-        let text = request.one("host").ok_or(Refusal::NoHost)?;
+    /// [`AccessError::NoHost`] and [`AccessError::Host`].
+    pub fn host(&self, request: &RequestHead, local: SocketAddr) -> Result<Authority, AccessError> {
+        let text = request.one("host").ok_or(AccessError::NoHost)?;
         let authority = Authority::parse(text).filter(|host| self.is_ours(host, local));
-        authority.ok_or_else(|| Refusal::Host {
+        authority.ok_or_else(|| AccessError::Host {
             host: shown(text),
             port: local.port(),
         })
@@ -87,12 +87,12 @@ impl Access {
             .any(|one| one.host == asked.host && one.port.unwrap_or(local.port()) == port)
     }
 
-    /// Whether the page that opens a WebSocket may do so; `own` is the host that the request looks for. Without an `Origin`
-    /// it is not a browser that asks.
+    /// Whether the page that opens a WebSocket may do so; `own` is the host that the request looks for. Without an
+    /// `Origin` it is not a browser that asks.
     ///
     /// # Errors
-    /// [`Refusal::Origin`].
-    pub fn origin(&self, request: &Request, own: &Authority) -> Result<(), Refusal> {
+    /// [`AccessError::Origin`].
+    pub fn origin(&self, request: &RequestHead, own: &Authority) -> Result<(), AccessError> {
         if request.count("origin") == 0 {
             return Ok(());
         }
@@ -104,18 +104,21 @@ impl Access {
             .is_some_and(|page| page.host == own.host && page.http_port() == own.http_port());
         let is_local = over_http.is_some_and(|page| page.host.is_loopback());
         let is_named = self.origins.iter().any(|named| **named == lower);
-        if is_own || is_named || (is_local && !self.strict_origin) {
+        // A browser sends the token's cookie along from every port of its host.
+        let is_strict = self.strict_origin || self.token.is_some();
+        if is_own || is_named || (is_local && !is_strict) {
             Ok(())
         } else {
-            Err(Refusal::Origin(shown(text)))
+            Err(AccessError::Origin(shown(text)))
         }
     }
 
-    /// Whether the request shows the token, in its query or its cookie. True if it did so in the query: a cookie is due.
+    /// Whether the request shows the token, in its query or its cookie. True if it did so in the query: a cookie is
+    /// due.
     ///
     /// # Errors
-    /// [`Refusal::NoToken`] and [`Refusal::WrongToken`].
-    pub fn token(&self, request: &Request, local: SocketAddr) -> Result<bool, Refusal> {
+    /// [`AccessError::NoToken`] and [`AccessError::WrongToken`].
+    pub fn token(&self, request: &RequestHead, local: SocketAddr) -> Result<bool, AccessError> {
         let Some(token) = &self.token else {
             return Ok(false);
         };
@@ -123,13 +126,13 @@ impl Access {
             return if token.matches(&shown) {
                 Ok(true)
             } else {
-                Err(Refusal::WrongToken)
+                Err(AccessError::WrongToken)
             };
         }
         match request.cookie(&cookie_name(local.port())) {
             Some(shown) if token.matches(&shown) => Ok(false),
-            Some(_) => Err(Refusal::WrongToken),
-            None => Err(Refusal::NoToken),
+            Some(_) => Err(AccessError::WrongToken),
+            None => Err(AccessError::NoToken),
         }
     }
 
@@ -161,7 +164,7 @@ fn encode(text: &str) -> String {
     encoded
 }
 
-/// What of a header is repeated to its sender.
+/// Returns the part of a header that is repeated to its sender.
 fn shown(text: &str) -> String {
     let mut shown = String::new();
     for character in text.chars().take(MAX_SHOWN) {

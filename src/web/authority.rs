@@ -1,7 +1,7 @@
 //! Hosts with ports, as the `Host` and `Origin` headers write them.
 //!
-//! **Invariant:** two texts that mean the same place read as the same value: case, the brackets of IPv6 and a port that is
-//! left out do not tell them apart.
+//! **Invariant:** two texts that mean the same place read as the same value: case, the brackets of IPv6 and a port that
+//! is left out do not tell them apart.
 
 use std::fmt;
 use std::net::{IpAddr, Ipv6Addr};

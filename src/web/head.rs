@@ -1,6 +1,7 @@
 //! Bytes into a request: the head of HTTP/1, and what of it anybody asks for.
 //!
-//! **Invariant:** a head is read once it is complete and at most [`MAX_HEAD`] bytes long; nothing behind it is looked at.
+//! **Invariant:** a head is read once it is complete and at most [`MAX_HEAD`] bytes long; nothing behind it is looked
+//! at.
 
 use std::borrow::Cow;
 
@@ -11,10 +12,10 @@ const MAX_HEADERS: usize = 64;
 
 /// A request, without a body.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Request {
-    /// What comes before the `?`; begins with a slash.
+pub struct RequestHead {
+    /// The path before the `?`; begins with a slash.
     pub path: String,
-    /// What comes behind it.
+    /// The query behind it.
     query: Option<String>,
     /// HTTP/1.1, not 1.0.
     pub is_http_1_1: bool,
@@ -53,7 +54,7 @@ pub fn end(bytes: &[u8], seen: usize) -> Option<usize> {
     }
 }
 
-impl Request {
+impl RequestHead {
     /// Reads a complete head.
     ///
     /// # Errors
@@ -159,7 +160,7 @@ pub fn decode(text: &str) -> Option<Cow<'_, str>> {
     String::from_utf8(bytes).ok().map(Cow::Owned)
 }
 
-/// What is wrong, in our words.
+/// Names the fault in our words.
 const fn complaint(error: httparse::Error) -> &'static str {
     match error {
         httparse::Error::HeaderName => "a header's name has a character that it may not have",
@@ -175,8 +176,8 @@ const fn complaint(error: httparse::Error) -> &'static str {
 mod tests {
     use super::*;
 
-    fn request(head: &str) -> Result<Request, HeadError> {
-        Request::parse(head.as_bytes())
+    fn request(head: &str) -> Result<RequestHead, HeadError> {
+        RequestHead::parse(head.as_bytes())
     }
 
     #[test]
@@ -193,7 +194,8 @@ mod tests {
 
     #[test]
     fn a_request_is_taken_apart() {
-        let text = "GET /a/b?x=1&token=a%2Bb HTTP/1.1\r\nHost: h\r\nCOOKIE: a=1; b=%20x\r\nConnection: keep-alive, Upgrade\r\n\r\n";
+        let text = "GET /a/b?x=1&token=a%2Bb HTTP/1.1\r\nHost: h\r\n\
+                    COOKIE: a=1; b=%20x\r\nConnection: keep-alive, Upgrade\r\n\r\n";
         let request = request(text).unwrap();
         assert_eq!(request.path, "/a/b");
         assert_eq!(request.query("token").as_deref(), Some("a+b"));

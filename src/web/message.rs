@@ -1,8 +1,8 @@
 //! A WebSocket message into a frame of the stream that the connection reads.
 //!
-//! A message may be pretty-printed: there, line ends are white space. In the stream a line end ends the frame, and a frame
-//! that passes through to other clients must stay on its line, so line ends become spaces. Within a string they are no
-//! valid JSON, and must not become valid: a carriage return, as invalid there, takes their place.
+//! A message may be pretty-printed: there, line ends are white space. In the stream a line end ends the frame, and a
+//! frame that passes through to other clients must stay on its line, so line ends become spaces. Within a string they
+//! are no valid JSON, and must not become valid: a carriage return, as invalid there, takes their place.
 //!
 //! **Invariant:** what is appended has exactly one newline, its last byte.
 
@@ -41,8 +41,8 @@ pub fn append_line(message: &[u8], stream: &mut BytesMut) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::frame::FrameReader;
     use crate::protocol::op;
+    use crate::protocol::wire::frame::FrameReader;
 
     fn line(message: &str) -> String {
         let mut stream = BytesMut::new();

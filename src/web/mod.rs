@@ -10,13 +10,14 @@
 //! | [`serve`] | one request from a stream, one answer to it |
 //! | [`message`] | a WebSocket message into a frame |
 //!
-//! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. What speaks over an upgraded stream is
-//! the same connection as over a plain one.
+//! It may use `protocol` and `tokio`'s streams; it knows no actor and no physics. What speaks over an upgraded stream
+//! is the same connection as over a plain one.
 //!
 //! **Invariant:** one request a connection, then it is closed: what follows a request is never read as another one.
 
 pub mod access;
 pub mod authority;
+pub mod bundle;
 pub mod head;
 pub mod message;
 pub mod page;
@@ -32,9 +33,11 @@ use tokio::sync::Semaphore;
 
 use self::access::Access;
 
-/// Requests that are read or answered at once. A browser opens six connections; the rest is for other people's.
+/// Requests that are answered at once, and as many for files of the report. A browser opens six connections; the rest
+/// is for other people's.
 pub const MAX_REQUESTS: usize = 64;
-/// Bytes of files of the report that are kept at once while they are sent: two of the longest, or the whole of one report.
+/// Bytes of files of the report that are kept at once while they are sent: two of the longest, or the whole of one
+/// report.
 pub const MAX_FILES_TOTAL: u64 = 64 * 1024 * 1024;
 /// Folder of the report, unless another is named.
 pub const DEFAULT_REPORT: &str = "report";
@@ -42,15 +45,13 @@ pub const DEFAULT_REPORT: &str = "report";
 /// Bytes that room for files is counted in.
 pub(crate) const ROOM: u64 = 64 * 1024;
 
-/// What is served over HTTP, and to whom.
+/// The files that are served over HTTP, and the rules for whom.
 #[derive(Debug)]
 pub struct Door {
     /// Who may ask.
     pub access: Access,
     /// Folder of the last report.
     pub report: PathBuf,
-    /// Places for requests.
-    pub(crate) places: Arc<Semaphore>,
     /// Room for files, in [`ROOM`].
     pub(crate) room: Arc<Semaphore>,
 }
@@ -62,7 +63,6 @@ impl Door {
         Self {
             access,
             report,
-            places: Arc::new(Semaphore::new(MAX_REQUESTS)),
             room: Arc::new(Semaphore::new(
                 usize::try_from(MAX_FILES_TOTAL / ROOM).unwrap_or(1),
             )),

@@ -1,6 +1,16 @@
 //! The page: the files of `page/`, in the binary.
 //!
+//! They are served under their own names, never to be kept, and under [`versioned`] ones, which stand for what is in
+//! them and may be kept for ever. The page's document names those, and all scripts as the one file [`SCRIPT`], so that a
+//! browser asks for four files, once per version.
+//!
 //! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
+
+use std::sync::{LazyLock, OnceLock};
+
+use super::authority::Authority;
+use super::bundle::bundle;
+use super::response::HttpResponse;
 
 /// A file of the page.
 #[derive(Debug)]
@@ -11,7 +21,7 @@ pub struct Asset {
     pub file: &'static str,
     /// Its media type.
     pub kind: &'static str,
-    /// What is in it.
+    /// Its bytes.
     pub bytes: &'static [u8],
 }
 
@@ -40,50 +50,160 @@ pub const ASSETS: &[Asset] = &[
     asset!("/", "index.html", HTML),
     asset!("icon.svg", SVG),
     asset!("style.css", CSS),
+    asset!("actions.js", JAVASCRIPT),
     asset!("aim.js", JAVASCRIPT),
     asset!("announce.js", JAVASCRIPT),
     asset!("arm_view.js", JAVASCRIPT),
+    asset!("arrows.js", JAVASCRIPT),
     asset!("axis.js", JAVASCRIPT),
     asset!("backdrop.js", JAVASCRIPT),
     asset!("compare.js", JAVASCRIPT),
     asset!("compare_view.js", JAVASCRIPT),
     asset!("controls.js", JAVASCRIPT),
     asset!("csv.js", JAVASCRIPT),
+    asset!("cursor.js", JAVASCRIPT),
     asset!("dom.js", JAVASCRIPT),
+    asset!("eigen.js", JAVASCRIPT),
     asset!("field.js", JAVASCRIPT),
     asset!("format.js", JAVASCRIPT),
+    asset!("frames.js", JAVASCRIPT),
     asset!("goal_panel.js", JAVASCRIPT),
+    asset!("growth.js", JAVASCRIPT),
+    asset!("history_panel.js", JAVASCRIPT),
     asset!("keyboard.js", JAVASCRIPT),
+    asset!("ladder.js", JAVASCRIPT),
+    asset!("ladder_panel.js", JAVASCRIPT),
     asset!("latest.js", JAVASCRIPT),
+    asset!("lessons.js", JAVASCRIPT),
+    asset!("lessons_panel.js", JAVASCRIPT),
+    asset!("loop.js", JAVASCRIPT),
     asset!("main.js", JAVASCRIPT),
+    asset!("map_view.js", JAVASCRIPT),
     asset!("mechanics.js", JAVASCRIPT),
+    asset!("modes_view.js", JAVASCRIPT),
+    asset!("pencil.js", JAVASCRIPT),
     asset!("phase_plot.js", JAVASCRIPT),
+    asset!("playback.js", JAVASCRIPT),
     asset!("plots.js", JAVASCRIPT),
+    asset!("policy.js", JAVASCRIPT),
     asset!("readouts.js", JAVASCRIPT),
     asset!("recorder.js", JAVASCRIPT),
     asset!("resample.js", JAVASCRIPT),
     asset!("ring.js", JAVASCRIPT),
     asset!("rosbridge.js", JAVASCRIPT),
+    asset!("runs.js", JAVASCRIPT),
     asset!("runtime.js", JAVASCRIPT),
+    asset!("save.js", JAVASCRIPT),
+    asset!("scale.js", JAVASCRIPT),
+    asset!("settings.js", JAVASCRIPT),
     asset!("share.js", JAVASCRIPT),
+    asset!("smooth.js", JAVASCRIPT),
     asset!("store.js", JAVASCRIPT),
     asset!("strip_chart.js", JAVASCRIPT),
     asset!("surface.js", JAVASCRIPT),
+    asset!("svg_context.js", JAVASCRIPT),
+    asset!("tabs.js", JAVASCRIPT),
     asset!("theme.js", JAVASCRIPT),
+    asset!("trail.js", JAVASCRIPT),
     asset!("transport.js", JAVASCRIPT),
     asset!("trial_panel.js", JAVASCRIPT),
 ];
 
-/// The file that is served at `path`.
+/// All scripts in one, served under its versioned name only.
+pub const SCRIPT: &str = "/page.js";
+
+static SCRIPTS: LazyLock<Asset> = LazyLock::new(|| {
+    let files = ASSETS.iter().filter(|asset| asset.kind == JAVASCRIPT);
+    let modules: Vec<_> = files
+        .filter_map(|asset| Some((asset.file, std::str::from_utf8(asset.bytes).ok()?)))
+        .collect();
+    Asset {
+        path: SCRIPT,
+        file: "page.js",
+        kind: JAVASCRIPT,
+        bytes: Box::leak(bundle("main.js", &modules).into_bytes().into_boxed_slice()),
+    }
+});
+
+/// Each file once packed: a fraction of a millisecond, when it is first asked for.
+static PACKED: [OnceLock<Vec<u8>>; ASSETS.len() + 1] =
+    [const { OnceLock::new() }; ASSETS.len() + 1];
+
+/// How hard the packing tries: beyond it text gets hardly smaller.
+const LEVEL: u8 = 6;
+
+/// The beginning of the names that stand for a version: a number made of every byte of every file.
+static VERSION: LazyLock<String> = LazyLock::new(|| {
+    // FNV-1a, 64 bits: it has to tell versions apart, not to resist anybody.
+    let all = ASSETS.iter().flat_map(|asset| asset.bytes);
+    let hash = all.fold(0xcbf2_9ce4_8422_2325_u64, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    });
+    format!("/v/{hash:016x}")
+});
+
+/// The path of a file, given with its slash, that stands for its present content.
 #[must_use]
-pub fn find(path: &str) -> Option<&'static Asset> {
-    ASSETS.iter().find(|asset| asset.path == path)
+pub fn versioned(path: &str) -> String {
+    format!("{}{path}", *VERSION)
 }
 
-/// What the page may do: run its own scripts and styles, draw, and speak to `own`, where it came from. `'self'` covers the
-/// WebSocket in newer browsers only, so that is spelled out. No text can become markup or a script: of trusted types there are none.
+/// The answer to a request for `path`, if that is a file of the page. It goes out packed to a client that takes
+/// `encodings` with `deflate` among them; the document shows the way to the report if there is one.
 #[must_use]
-pub fn policy(own: &super::authority::Authority) -> String {
+pub fn answer(
+    path: &str,
+    own: &Authority,
+    encodings: &str,
+    has_report: bool,
+) -> Option<HttpResponse> {
+    let kept = path.strip_prefix(VERSION.as_str());
+    let wanted = kept.unwrap_or(path);
+    let of_page = ASSETS.iter().position(|asset| asset.path == wanted);
+    let (index, asset) = match of_page {
+        Some(index) => (index, ASSETS.get(index)?),
+        None if kept == Some(SCRIPT) => (ASSETS.len(), &*SCRIPTS),
+        None => return None,
+    };
+    let response = if wanted == "/" {
+        let html = document(asset.bytes, has_report);
+        HttpResponse::file(asset.kind, policy(own), html)
+    } else if encodings.split(',').any(|one| one.trim() == "deflate") {
+        let packed = PACKED
+            .get(index)?
+            .get_or_init(|| miniz_oxide::deflate::compress_to_vec_zlib(asset.bytes, LEVEL));
+        let response = HttpResponse::file(asset.kind, policy(own), packed.as_slice());
+        response.with("Content-Encoding", "deflate")
+    } else {
+        HttpResponse::file(asset.kind, policy(own), asset.bytes)
+    };
+    let response = response.with("Vary", "Accept-Encoding");
+    Some(match kept {
+        Some(_) if wanted != "/" => response.kept(),
+        _ => response,
+    })
+}
+
+/// The page's document: its files by their versioned names, its scripts as one.
+fn document(html: &[u8], has_report: bool) -> Vec<u8> {
+    let mut html = String::from_utf8_lossy(html).into_owned();
+    for (name, path) in [
+        ("main.js", SCRIPT),
+        ("style.css", "/style.css"),
+        ("icon.svg", "/icon.svg"),
+    ] {
+        html = html.replace(&format!("\"{name}\""), &format!("\"{}\"", versioned(path)));
+    }
+    if has_report {
+        html = html.replace("href=\"report/\" hidden", "href=\"report/\"");
+    }
+    html.into_bytes()
+}
+
+/// The policy under which the page may run its own scripts and styles, draw, and speak to `own`, where it came from.
+/// `'self'` covers the WebSocket in newer browsers only, so that is spelled out. No text can become markup or a script:
+/// of trusted types there are none.
+fn policy(own: &Authority) -> String {
     format!(
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; connect-src 'self' ws://{own}; \
          base-uri 'none'; form-action 'none'; frame-ancestors 'none'; require-trusted-types-for 'script'; \
@@ -107,5 +227,41 @@ mod tests {
         assert_eq!(files, served);
         let paths: BTreeSet<&str> = ASSETS.iter().map(|asset| asset.path).collect();
         assert_eq!(paths.len(), ASSETS.len());
+    }
+
+    #[test]
+    fn the_document_names_only_files_that_are_served() {
+        let html = String::from_utf8(document(ASSETS[0].bytes, false)).unwrap();
+        let own = Authority::parse("127.0.0.1:9095").unwrap();
+        let named: Vec<&str> = html
+            .split(['"'])
+            .filter(|one| one.starts_with("/v/"))
+            .collect();
+        let files: BTreeSet<&str> = named.iter().copied().collect();
+        assert_eq!(files.len(), 3, "{files:?}");
+        for path in named {
+            assert!(answer(path, &own, "", false).is_some(), "{path}");
+        }
+    }
+
+    #[test]
+    fn the_one_script_holds_every_module_once_and_imports_nothing() {
+        let text = std::str::from_utf8(SCRIPTS.bytes).unwrap();
+        for asset in ASSETS.iter().filter(|asset| asset.kind == JAVASCRIPT) {
+            let begin = format!("const ${} = (() => {{", asset.file.trim_end_matches(".js"));
+            assert_eq!(text.matches(&begin).count(), 1, "{}", asset.file);
+        }
+        let line = text
+            .lines()
+            .find(|line| line.starts_with("import ") || line.starts_with("} from"));
+        assert_eq!(line, None);
+    }
+
+    #[test]
+    fn the_way_to_the_report_is_shown_only_if_there_is_one() {
+        for (has_report, hidden) in [(true, false), (false, true)] {
+            let html = String::from_utf8(document(ASSETS[0].bytes, has_report)).unwrap();
+            assert_eq!(html.contains("href=\"report/\" hidden"), hidden);
+        }
     }
 }

@@ -1,20 +1,21 @@
 //! The last report: files of one folder, by plain names.
 //!
-//! **Invariant:** what is served lies in the folder, also where a link in it points elsewhere, and is of a kind that is listed.
+//! **Invariant:** what is served lies in the folder, also where a link in it points elsewhere, and is of a kind that is
+//! listed.
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Where it is served.
 pub const PREFIX: &str = "/report/";
-/// What is shown of a folder.
+/// The kinds of files that are shown of a folder.
 const INDEX: &str = "index.html";
 /// Deepest file below the folder, in names.
 const MAX_DEPTH: usize = 8;
 /// Largest file: a report with all its figures has a few MiB.
 pub const MAX_FILE: u64 = 32 * 1024 * 1024;
 
-/// What the report may do: show its own inline styles and figures. No script, no request.
+/// The policy of the report, which may show its own inline styles and figures. It runs no script and makes no request.
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; base-uri 'none'; \
      form-action 'none'; frame-ancestors 'none'";
 
@@ -32,7 +33,7 @@ const KINDS: [(&str, &str); 8] = [
 
 /// A file of the report, by its path on the web.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Name {
+pub struct FileName {
     path: PathBuf,
     /// Its media type.
     pub kind: &'static str,
@@ -43,11 +44,17 @@ pub struct Name {
 pub struct File {
     /// Its media type.
     pub kind: &'static str,
-    /// What is in it.
+    /// Its bytes.
     pub bytes: Vec<u8>,
 }
 
-impl Name {
+/// Whether there is a report in the folder: one look at the disk.
+#[must_use]
+pub fn exists(folder: &Path) -> bool {
+    folder.join(INDEX).is_file()
+}
+
+impl FileName {
     /// The file that `rest`, what follows [`PREFIX`], names: letters, digits, `-`, `_` and `.` between slashes, no name
     /// beginning with a dot, a known ending. A folder's is its index.
     #[must_use]
@@ -85,7 +92,7 @@ impl Name {
         fits.then_some((path, about.len()))
     }
 
-    /// The length of the file in `folder`, as [`Name::read`] would read it now.
+    /// The length of the file in `folder`, as [`FileName::read`] would read it now.
     #[must_use]
     pub fn length(&self, folder: &Path) -> Option<u64> {
         self.find(folder).map(|(_, length)| length)
@@ -117,7 +124,7 @@ mod tests {
             ("data/a-1_b.2.csv", "data/a-1_b.2.csv", "text/csv"),
             ("%61.svg", "a.svg", "image/svg+xml"),
         ] {
-            let name = Name::parse(rest).unwrap();
+            let name = FileName::parse(rest).unwrap();
             assert_eq!(name.path, Path::new(path));
             assert!(name.kind.starts_with(kind));
         }
@@ -146,7 +153,7 @@ mod tests {
             "a.js",
             "1/2/3/4/5/6/7/8/9.svg",
         ] {
-            assert_eq!(Name::parse(rest), None, "{rest}");
+            assert_eq!(FileName::parse(rest), None, "{rest}");
         }
     }
 
@@ -155,7 +162,7 @@ mod tests {
         let folder = std::env::temp_dir().join(format!("pendularm-report-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
         let file = std::fs::File::create(folder.join("a.csv")).unwrap();
-        let name = Name::parse("a.csv").unwrap();
+        let name = FileName::parse("a.csv").unwrap();
         for (length, is_read) in [(MAX_FILE, true), (MAX_FILE + 1, false)] {
             // Nothing is written: such a file has a length and no content on the disk.
             file.set_len(length).unwrap();

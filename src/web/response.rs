@@ -1,13 +1,14 @@
 //! Answers over HTTP, each with the headers that keep a browser strict.
 //!
-//! **Invariant:** no byte of a request becomes part of a header; what a text repeats of one is plain text, and labelled so.
+//! **Invariant:** no byte of a request becomes part of a header; what a text repeats of one is plain text, and labelled
+//! so.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
 /// A status code and its phrase.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Status {
+pub enum HttpStatus {
     /// Here it is.
     Ok,
     /// It is elsewhere.
@@ -30,7 +31,7 @@ pub enum Status {
     Unavailable,
 }
 
-impl Status {
+impl HttpStatus {
     const fn line(self) -> &'static str {
         match self {
             Self::Ok => "200 OK",
@@ -49,19 +50,26 @@ impl Status {
 
 /// An answer.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Response {
-    status: Status,
+pub struct HttpResponse {
+    status: HttpStatus,
     kind: &'static str,
     policy: Cow<'static, str>,
+    /// How long a browser may keep it.
+    cache: &'static str,
     /// Headers besides those that every answer has.
     headers: Vec<(&'static str, String)>,
     body: Cow<'static, [u8]>,
 }
 
-/// What a text may do in a browser: nothing.
+/// The policy of a text in a browser, which may do nothing.
 const NOTHING: &str = "default-src 'none'; frame-ancestors 'none'";
 
-impl Response {
+/// Never: the next time it may be another.
+const NOT_KEPT: &str = "no-store";
+/// For ever, by that browser alone: its name stands for what is in it.
+const KEPT: &str = "private, max-age=31536000, immutable";
+
+impl HttpResponse {
     /// A file, and what it may do in a browser.
     #[must_use]
     pub fn file(
@@ -70,9 +78,10 @@ impl Response {
         body: impl Into<Cow<'static, [u8]>>,
     ) -> Self {
         Self {
-            status: Status::Ok,
+            status: HttpStatus::Ok,
             kind,
             policy: policy.into(),
+            cache: NOT_KEPT,
             headers: Vec::new(),
             body: body.into(),
         }
@@ -80,11 +89,12 @@ impl Response {
 
     /// A sentence to whoever asked.
     #[must_use]
-    pub fn text(status: Status, sentence: &str) -> Self {
+    pub fn text(status: HttpStatus, sentence: &str) -> Self {
         Self {
             status,
             kind: "text/plain; charset=utf-8",
             policy: NOTHING.into(),
+            cache: NOT_KEPT,
             headers: Vec::new(),
             body: format!("{sentence}\n").into_bytes().into(),
         }
@@ -97,25 +107,33 @@ impl Response {
         self
     }
 
-    /// What is answered about.
+    /// The same, to be kept for ever: what is at that path never changes.
+    #[must_use]
+    pub fn kept(mut self) -> Self {
+        self.cache = KEPT;
+        self
+    }
+
+    /// The sentence.
     #[must_use]
     pub fn body(&self) -> &[u8] {
         &self.body
     }
 
-    /// What comes before the body; nothing comes after it, the connection is closed.
+    /// The head, which comes before the body; nothing comes after that, the connection is closed.
     #[must_use]
     pub fn head(&self) -> String {
         let Self {
             status,
             kind,
             policy,
+            cache,
             headers,
             body,
         } = self;
         let mut head = format!(
             "HTTP/1.1 {}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\nConnection: close\r\n\
-             Cache-Control: no-store\r\nContent-Security-Policy: {policy}\r\nX-Content-Type-Options: nosniff\r\n\
+             Cache-Control: {cache}\r\nContent-Security-Policy: {policy}\r\nX-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
              Cross-Origin-Opener-Policy: same-origin\r\nX-Frame-Options: DENY\r\n",
             status.line(),

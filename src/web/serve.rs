@@ -1,223 +1,278 @@
 //! One request from a stream, one answer to it.
 //!
-//! **Invariant:** reading a head and writing an answer are bounded in bytes and in time, and so is how many there are at
-//! once; a client that does neither costs a place for a few seconds.
+//! **Invariant:** reading a head and writing an answer are bounded in bytes and in time. How many there are at once is
+//! bounded by whoever calls.
 
 use std::net::SocketAddr;
+use std::pin::pin;
 use std::sync::Arc;
 use std::time::Duration;
 
-use bytes::{Bytes, BytesMut};
+use bytes::BytesMut;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::sync::OwnedSemaphorePermit;
-use tokio::time::{timeout, timeout_at};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::task::spawn_blocking;
+use tokio::time::{Instant, timeout, timeout_at};
 
-use super::access::Refusal;
+use super::access::AccessError;
 use super::authority::Authority;
-use super::head::{self, HeadError, MAX_HEAD, Request};
-use super::response::{Response, Status};
+use super::head::{self, HeadError, MAX_HEAD, RequestHead};
+use super::response::{HttpResponse, HttpStatus};
 use super::{Door, ROOM, page, report, upgrade};
 
 /// How long a client may take no byte of an answer.
 pub const TAKE_TIME: Duration = Duration::from_secs(10);
 /// How long an answer may take in all: the largest file over a slow line.
 pub const ANSWER_TIME: Duration = Duration::from_secs(120);
+/// How long room for a file is waited for before somebody gives way, and then the next.
+const ROOM_TIME: Duration = Duration::from_millis(20);
 /// Bytes of an answer that are offered at a time.
 const PIECE: usize = 64 * 1024;
-/// How long, and how many bytes, of what follows a request are swallowed so that the answer can still be read: closing a
-/// socket with unread input resets it.
+/// How long, and how many bytes, of what follows a request are swallowed so that the answer can still be read: closing
+/// a socket with unread input resets it.
 const DISCARD_TIME: Duration = Duration::from_secs(1);
 const DISCARD_BYTES: usize = 1024 * 1024;
 
-/// What is to be done about a request.
-enum Outcome {
-    Answer(Response),
+/// The way in which a request is served.
+#[derive(Debug)]
+pub enum Served {
+    /// It is answered.
+    Answer(HttpResponse),
     /// The stream becomes a WebSocket once this has been sent.
     Upgrade(Vec<u8>),
     /// A file of the report is to be read, and a cookie to be set with it.
-    Report(report::Name, Option<String>),
+    Report(report::FileName, Option<String>),
 }
 
-/// Serves one request on `stream`, of which `first` has been read; `local` is the address that the client has connected
-/// to. Gives what followed the head if the stream is a WebSocket now; else it has ended.
-pub async fn serve<S: AsyncRead + AsyncWrite + Unpin>(
+/// A request that gets nothing but this answer.
+#[derive(Debug)]
+pub struct Declined {
+    /// Why.
+    pub response: HttpResponse,
+    /// It showed a token that is not ours.
+    pub is_guess: bool,
+}
+
+impl From<HttpResponse> for Declined {
+    fn from(response: HttpResponse) -> Self {
+        let is_guess = false;
+        Self { response, is_guess }
+    }
+}
+
+/// Reads a request from `stream`, of which `bytes` have been read, until `due`; what came behind its head is left in
+/// `bytes`. Then what is to be done about it; `local` is the address that the client has connected to. `None` if the
+/// client ends before.
+pub async fn receive<S: AsyncRead + Unpin>(
     stream: &mut S,
-    first: BytesMut,
+    bytes: &mut BytesMut,
     door: &Door,
     local: SocketAddr,
-    head_time: Duration,
-) -> Option<Bytes> {
-    let Ok(_place) = door.places.clone().try_acquire_owned() else {
-        let sentence = "too many requests at once; try again";
-        answer(stream, &Response::text(Status::Unavailable, sentence)).await;
-        return None;
-    };
-    let deadline = tokio::time::Instant::now() + head_time;
-    let (request, behind) = match timeout_at(deadline, read_head(stream, first)).await {
-        Ok(Some(Ok(read))) => read,
-        Ok(Some(Err(error))) => {
-            answer(stream, &malformed(&error)).await;
-            return None;
-        }
-        Ok(None) => return None,
+    due: Instant,
+) -> Option<Result<Served, Declined>> {
+    match timeout_at(due, read_head(stream, bytes)).await {
+        Ok(Some(Ok(request))) => Some(judge(&request, door, local)),
+        Ok(Some(Err(error))) => Some(Err(malformed(&error).into())),
+        Ok(None) => None,
         Err(_) => {
             let sentence = "the head of the request took too long";
-            answer(stream, &Response::text(Status::RequestTimeout, sentence)).await;
-            return None;
+            Some(Err(HttpResponse::text(
+                HttpStatus::RequestTimeout,
+                sentence,
+            )
+            .into()))
         }
-    };
-    // What a file takes is given back once it has been sent.
-    let (response, _room) = match judge(&request, door, local) {
-        Outcome::Answer(response) => (response, None),
-        Outcome::Report(name, cookie) => {
-            let (response, room) = read_report(name, door).await;
-            (with_cookie(response, cookie), room)
-        }
-        Outcome::Upgrade(head) => {
-            let sent = take(stream.write_all(&head)).await;
-            return sent.map(|()| behind.freeze());
-        }
-    };
-    answer(stream, &response).await;
-    None
+    }
 }
 
-/// Reads up to the end of the head: the request and what came behind it. `None` if the client ends before.
+/// Does what is to be done about a request. `make_room` has the oldest answer with a file of the report give way; false
+/// if there is none but this. True if the stream is a WebSocket now; else it has ended.
+pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
+    stream: &mut S,
+    outcome: Served,
+    door: &Door,
+    make_room: impl Fn() -> bool,
+) -> bool {
+    // The room of a file is given back once it has been sent.
+    let (response, _room) = match outcome {
+        Served::Answer(response) => (response, None),
+        Served::Report(name, cookie) => {
+            let (response, room) = read_report(name, door, make_room).await;
+            (with_cookie(response, cookie), room)
+        }
+        Served::Upgrade(head) => return take(stream.write_all(&head)).await.is_some(),
+    };
+    answer(stream, &response).await;
+    false
+}
+
+/// Reads up to the end of the head; what came behind it is left. `None` if the client ends before.
 async fn read_head<S: AsyncRead + Unpin>(
     stream: &mut S,
-    mut bytes: BytesMut,
-) -> Option<Result<(Request, BytesMut), HeadError>> {
+    bytes: &mut BytesMut,
+) -> Option<Result<RequestHead, HeadError>> {
     let mut seen = 0;
     loop {
-        if let Some(end) = head::end(&bytes, seen) {
+        if let Some(end) = head::end(bytes, seen) {
             if end > MAX_HEAD {
                 return Some(Err(HeadError::TooLong));
             }
             let head = bytes.split_to(end);
-            return Some(Request::parse(&head).map(|request| (request, bytes)));
+            return Some(RequestHead::parse(&head));
         }
         if bytes.len() > MAX_HEAD {
             return Some(Err(HeadError::TooLong));
         }
         seen = bytes.len();
-        if stream.read_buf(&mut bytes).await.unwrap_or(0) == 0 {
+        if stream.read_buf(bytes).await.unwrap_or(0) == 0 {
             return None;
         }
     }
 }
 
-fn malformed(error: &HeadError) -> Response {
+fn malformed(error: &HeadError) -> HttpResponse {
     let status = match error {
-        HeadError::Malformed(_) => Status::BadRequest,
-        HeadError::TooLong => Status::HeadTooLong,
-        HeadError::Method => Status::MethodNotAllowed,
+        HeadError::Malformed(_) => HttpStatus::BadRequest,
+        HeadError::TooLong => HttpStatus::HeadTooLong,
+        HeadError::Method => HttpStatus::MethodNotAllowed,
     };
-    let response = Response::text(status, &error.to_string());
+    let response = HttpResponse::text(status, &error.to_string());
     match error {
         HeadError::Method => response.with("Allow", "GET"),
         _ => response,
     }
 }
 
-/// What a request may have, and what it gets.
-fn judge(request: &Request, door: &Door, local: SocketAddr) -> Outcome {
-    let refused = |why: &Refusal| {
+/// Judges a request: may it be served, and how.
+fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served, Declined> {
+    let own = door.access.host(request, local)?;
+    let opens_socket = upgrade::is_wanted(request);
+    if opens_socket {
+        door.access.origin(request, &own)?;
+    }
+    let is_shown = door.access.token(request, local)?;
+    let cookie = is_shown.then(|| door.access.cookie(local)).flatten();
+    if opens_socket {
+        return Ok(open_socket(request, cookie.as_deref()));
+    }
+    Ok(match find(request, &own, door) {
+        Served::Answer(response) => Served::Answer(with_cookie(response, cookie)),
+        Served::Report(name, _) => Served::Report(name, cookie),
+        upgrade @ Served::Upgrade(_) => upgrade,
+    })
+}
+
+impl From<AccessError> for Declined {
+    fn from(why: AccessError) -> Self {
         tracing::debug!(%why, "request refused");
         let status = match why {
-            Refusal::NoHost => Status::BadRequest,
-            _ => Status::Forbidden,
+            AccessError::NoHost => HttpStatus::BadRequest,
+            _ => HttpStatus::Forbidden,
         };
-        Outcome::Answer(Response::text(status, &why.to_string()))
-    };
-    let own = match door.access.host(request, local) {
-        Ok(own) => own,
-        Err(why) => return refused(&why),
-    };
-    let opens_socket = upgrade::is_wanted(request);
-    if opens_socket && let Err(why) = door.access.origin(request, &own) {
-        return refused(&why);
-    }
-    let cookie = match door.access.token(request, local) {
-        Ok(true) => door.access.cookie(local),
-        Ok(false) => None,
-        Err(why) => return refused(&why),
-    };
-    if opens_socket {
-        return open_socket(request, cookie.as_deref());
-    }
-    match find(request, &own) {
-        Outcome::Answer(response) => Outcome::Answer(with_cookie(response, cookie)),
-        Outcome::Report(name, _) => Outcome::Report(name, cookie),
-        upgrade @ Outcome::Upgrade(_) => upgrade,
+        Self {
+            response: HttpResponse::text(status, &why.to_string()),
+            is_guess: why == AccessError::WrongToken,
+        }
     }
 }
 
-fn with_cookie(response: Response, cookie: Option<String>) -> Response {
+fn with_cookie(response: HttpResponse, cookie: Option<String>) -> HttpResponse {
     match cookie {
         Some(cookie) => response.with("Set-Cookie", cookie),
         None => response,
     }
 }
 
-fn open_socket(request: &Request, cookie: Option<&str>) -> Outcome {
+fn open_socket(request: &RequestHead, cookie: Option<&str>) -> Served {
     if request.path != "/" {
         let sentence = "the WebSocket of this runtime is at /";
-        return Outcome::Answer(Response::text(Status::NotFound, sentence));
+        return Served::Answer(HttpResponse::text(HttpStatus::NotFound, sentence));
     }
     match upgrade::accept(request, cookie) {
-        Ok(head) => Outcome::Upgrade(head),
-        Err(response) => Outcome::Answer(response),
+        Ok(head) => Served::Upgrade(head),
+        Err(response) => Served::Answer(response),
     }
 }
 
-/// What there is at a path.
-fn find(request: &Request, own: &Authority) -> Outcome {
+/// Finds the page, the file or the sentence that stands at a path.
+fn find(request: &RequestHead, own: &Authority, door: &Door) -> Served {
     let path = request.path.as_str();
-    if let Some(asset) = page::find(path) {
-        let policy = page::policy(own);
-        return Outcome::Answer(Response::file(asset.kind, policy, asset.bytes));
+    let encodings = request.one("accept-encoding").unwrap_or_default();
+    let has_report = || report::exists(&door.report);
+    if let Some(response) = page::answer(path, own, encodings, path == "/" && has_report()) {
+        return Served::Answer(response);
     }
     if let Some(rest) = path.strip_prefix(report::PREFIX) {
-        return match report::Name::parse(rest) {
-            Some(name) => Outcome::Report(name, None),
-            None => Outcome::Answer(Response::text(Status::NotFound, NO_SUCH_FILE)),
+        return match report::FileName::parse(rest) {
+            Some(name) => Served::Report(name, None),
+            None => Served::Answer(HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE)),
         };
     }
     if path == report::PREFIX.trim_end_matches('/') {
-        let response = Response::text(Status::MovedPermanently, "the report is at /report/");
-        return Outcome::Answer(response.with("Location", report::PREFIX));
+        let response =
+            HttpResponse::text(HttpStatus::MovedPermanently, "the report is at /report/");
+        return Served::Answer(response.with("Location", report::PREFIX));
     }
     let sentence = "there is nothing here: the page is at /, the last report at /report/";
-    Outcome::Answer(Response::text(Status::NotFound, sentence))
+    Served::Answer(HttpResponse::text(HttpStatus::NotFound, sentence))
 }
 
 const TOO_MANY_FILES: &str = "too many files of the report are being sent; try again";
-const NO_SUCH_FILE: &str = "there is no such file in the report; the report is at /report/, if there is one. It is read from \
-     the folder that --report names";
+const NO_SUCH_FILE: &str = "there is no such file in the report; the report is at /report/, if there is one. It is \
+     read from the folder that --report names";
 
-/// Reads a file where waiting for the disk holds up nobody, if there is room for it.
-async fn read_report(name: report::Name, door: &Door) -> (Response, Option<OwnedSemaphorePermit>) {
-    let (folder, room) = (door.report.clone(), Arc::clone(&door.room));
-    let read = tokio::task::spawn_blocking(move || {
-        let room_needed = name.length(&folder)? / ROOM + 1;
-        let taken = room.try_acquire_many_owned(u32::try_from(room_needed).ok()?);
-        let Ok(taken) = taken else {
-            return Some(None);
-        };
-        Some(Some((name.read(&folder)?, taken)))
-    });
+/// Reads a file where waiting for the disk holds up nobody, once there is room for it.
+async fn read_report(
+    name: report::FileName,
+    door: &Door,
+    make_room: impl Fn() -> bool,
+) -> (HttpResponse, Option<OwnedSemaphorePermit>) {
+    let not_found = || (HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE), None);
+    let (named, folder) = (name.clone(), door.report.clone());
+    let Ok(Some(length)) = spawn_blocking(move || named.length(&folder)).await else {
+        return not_found();
+    };
+    let Some(taken) = take_room(&door.room, length, make_room).await else {
+        return (
+            HttpResponse::text(HttpStatus::Unavailable, TOO_MANY_FILES),
+            None,
+        );
+    };
+    let folder = door.report.clone();
+    // The room goes with the reading, which goes on where nobody waits for it any more.
+    let read = spawn_blocking(move || name.read(&folder).map(|file| (file, taken)));
     match read.await {
-        Ok(Some(Some((file, taken)))) => {
-            let response = Response::file(file.kind, report::POLICY, file.bytes);
+        Ok(Some((file, taken))) => {
+            let response = HttpResponse::file(file.kind, report::POLICY, file.bytes);
             (response, Some(taken))
         }
-        Ok(Some(None)) => (Response::text(Status::Unavailable, TOO_MANY_FILES), None),
-        _ => (Response::text(Status::NotFound, NO_SUCH_FILE), None),
+        _ => not_found(),
+    }
+}
+
+/// Takes room for a file of that length; the oldest give way until there is.
+async fn take_room(
+    room: &Arc<Semaphore>,
+    length: u64,
+    make_room: impl Fn() -> bool,
+) -> Option<OwnedSemaphorePermit> {
+    let needed = u32::try_from(length / ROOM + 1).ok()?;
+    let mut taking = pin!(Arc::clone(room).acquire_many_owned(needed));
+    loop {
+        if let Ok(taken) = timeout(ROOM_TIME, &mut taking).await {
+            return taken.ok();
+        }
+        if !make_room() {
+            return None;
+        }
     }
 }
 
 /// Sends an answer and ends the stream, within bounds of time.
-async fn answer<S: AsyncRead + AsyncWrite + Unpin>(stream: &mut S, response: &Response) {
+pub(crate) async fn answer<S: AsyncRead + AsyncWrite + Unpin>(
+    stream: &mut S,
+    response: &HttpResponse,
+) {
     let send = async {
         take(stream.write_all(response.head().as_bytes())).await?;
         for piece in response.body().chunks(PIECE) {

@@ -4,8 +4,8 @@
 
 use tokio_tungstenite::tungstenite::handshake::derive_accept_key;
 
-use super::head::Request;
-use super::response::{Response, Status};
+use super::head::RequestHead;
+use super::response::{HttpResponse, HttpStatus};
 
 /// The version that everybody speaks.
 const VERSION: &str = "13";
@@ -14,7 +14,7 @@ const KEY_LENGTH: usize = 24;
 
 /// Whether the request wants to become a WebSocket, rightly or not.
 #[must_use]
-pub fn is_wanted(request: &Request) -> bool {
+pub fn is_wanted(request: &RequestHead) -> bool {
     request.has_word("upgrade", "websocket") || request.count("sec-websocket-key") > 0
 }
 
@@ -22,8 +22,8 @@ pub fn is_wanted(request: &Request) -> bool {
 ///
 /// # Errors
 /// The answer to a handshake that is not as it has to be.
-pub fn accept(request: &Request, cookie: Option<&str>) -> Result<Vec<u8>, Response> {
-    let refused = |why| Err(Response::text(Status::BadRequest, why));
+pub fn accept(request: &RequestHead, cookie: Option<&str>) -> Result<Vec<u8>, HttpResponse> {
+    let refused = |why| Err(HttpResponse::text(HttpStatus::BadRequest, why));
     if !request.is_http_1_1 {
         return refused("a WebSocket is opened with HTTP/1.1");
     }
@@ -34,7 +34,7 @@ pub fn accept(request: &Request, cookie: Option<&str>) -> Result<Vec<u8>, Respon
     }
     if request.one("sec-websocket-version").map(str::trim) != Some(VERSION) {
         let sentence = "this runtime speaks version 13 of the WebSocket protocol";
-        let answer = Response::text(Status::UpgradeRequired, sentence);
+        let answer = HttpResponse::text(HttpStatus::UpgradeRequired, sentence);
         return Err(answer
             .with("Sec-WebSocket-Version", VERSION)
             .with("Upgrade", "websocket"));

@@ -51,9 +51,16 @@ class PageTest(unittest.TestCase):
 
     def connected(self, page=None, links=None):
         page = page or self.page
-        page.until("document.querySelector('#connection').className === 'pill open'", why="connected")
+        page.until("document.querySelector('#connection')?.className === 'pill open'", why="connected")
         page.until(f"document.querySelectorAll('#kp-fields input[type=number]').length === {links or self.links}")
         page.until("document.querySelector('#kp-fields input[type=number]').value !== ''", why="gains shown")
+        # The page's own modules, those that run, by name.
+        page.run("window.own = (name) => import(document.querySelector('script[type=module]').src).then(({ modules }) => modules[name]); 0")
+
+    def tab(self, name):
+        """Opens a panel beside the arm."""
+        self.page.click(f"#tab-{name}")
+        self.page.until(f"!document.querySelector('#{name}').hidden")
 
     def keep(self, name, **how):
         """A screenshot, kept as an artefact."""
@@ -74,7 +81,7 @@ class PageTest(unittest.TestCase):
     def settle(self, positions):
         """The servo holds the arm at `positions`, and then it is paused: a picture that does not change."""
         self.runtime.call("/pid_controller/enable", data=True)
-        self.page.run(f"""import('/runtime.js').then((arm) => arm.sendSetpoint({positions}))""")
+        self.page.run(f"""own('runtime.js').then((arm) => arm.sendSetpoint({positions}))""")
         self.wait(lambda: all(abs(q - p) < 2e-3 for q, p in zip(self.runtime.next("/joint_states")["position"], positions)), "settled")
         self.runtime.call("/arm_sim/pause", data=True)
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")

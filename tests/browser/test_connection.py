@@ -61,7 +61,16 @@ class Token(PageTest):
         page = self.open(f"?token={self.options[1]}")
         page.click("#share")
         page.until("location.hash !== ''")
-        self.assertNotIn("sesame", page.run("import('/share.js').then((share) => share.address())"))
+        self.assertNotIn("sesame", page.run("own('share.js').then((share) => share.address())"))
+
+    def test_the_token_leaves_the_address_and_the_page_lives_on_without_it(self):
+        page = self.open(f"?token={self.options[1]}&theme=x#links=2")
+        page.until("!location.href.includes('sesame')", why="an address without the token")
+        self.assertEqual(page.run("location.search + location.hash"), "?theme=x#links=2")
+        self.assertEqual(page.run("document.cookie"), "")
+        self.page = page
+        page.run("location.reload()")
+        self.connected()
 
     def test_a_page_opened_without_it_is_turned_away(self):
         page = browser().page(self.runtime.url)

@@ -43,12 +43,15 @@ class View:
     def test_nothing_sticks_out_to_the_side(self):
         self.assertLessEqual(self.page.run("document.documentElement.scrollWidth"), self.page.run("innerWidth"))
 
-    def test_canvases_have_a_pixel_for_each_of_the_screen(self):
-        sizes = self.page.run("[...document.querySelectorAll('canvas')].filter((one) => one.clientWidth > 0)"
-                              ".map((one) => [one.width, one.clientWidth, one.height, one.clientHeight])")
-        self.assertGreaterEqual(len(sizes), 6)
-        for width, shown_width, height, shown_height in sizes:
-            self.assertEqual((width, height), (shown_width * self.view.get("density", 1), shown_height * self.view.get("density", 1)))
+    def test_canvases_have_a_pixel_for_each_of_the_screen_and_are_opaque(self):
+        """So that a frame is copied to the screen as it is, neither resampled nor blended: edges are where a browser rounds them to."""
+        canvases = self.page.run("""[...document.querySelectorAll('canvas')].filter((one) => one.clientWidth > 0).map((one) => {
+            const { left, top, right, bottom } = one.getBoundingClientRect();
+            const pixels = (from, to) => Math.round(to * devicePixelRatio) - Math.round(from * devicePixelRatio);
+            return [one.id, one.width - pixels(left, right), one.height - pixels(top, bottom), one.getContext('2d').getContextAttributes().alpha];
+        })""")
+        self.assertEqual(canvases, [[name, 0, 0, False] for name, *_ in canvases])
+        self.assertGreaterEqual(len(canvases), 6)
 
 
 class Sums:
@@ -56,8 +59,8 @@ class Sums:
 
     def test_energy_and_gravity_load_are_those_of_the_runtime(self):
         self.settle(self.pose())
-        self.page.until("import('/store.js').then(({ state }) => state.paused && state.diagnostics?.state === 'paused')")
-        load, energy, told = self.page.run("""Promise.all([import('/recorder.js'), import('/store.js')]).then(([r, { state }]) => {
+        self.page.until("own('store.js').then(({ state }) => state.paused && state.diagnostics?.state === 'paused')")
+        load, energy, told = self.page.run("""Promise.all([own('recorder.js'), own('store.js')]).then(([r, { state }]) => {
             const row = r.record.last();
             return [[...r.record.data.slice(row + r.LOAD, row + r.LOAD + state.links)], r.record.data[row + r.ENERGY], state.diagnostics.energy];
         })""")
@@ -93,17 +96,22 @@ class TwoLinks(View, Sums, PageTest):
         self.page.until("document.querySelector('#arm-text').textContent.includes('paused, servo on. Joints at 29, 29 degrees')")
 
     def test_what_is_written_can_be_saved_as_csv(self):
-        self.page.until("import('/recorder.js').then(({ record }) => record.length > 30)")
+        self.page.until("own('recorder.js').then(({ record }) => record.length > 30)")
         self.runtime.call("/arm_sim/pause", data=True)
         # The file's text; that the button hands it to the browser is seen by the link that it makes.
-        lines = self.page.run("import('/csv.js').then((csv) => csv.csvText(2))").splitlines()
+        lines = self.page.run("Promise.all([own('csv.js'), own('settings.js'), own('store.js')])"
+                              ".then(([csv, { presentSettings }, { state }]) => csv.csvText(2, presentSettings(state)))").splitlines()
+        for setting in ("# method=rk4", "# timestep=0.001", "# kp=1000,250", "# masses=1,1"):
+            self.assertIn(setting, lines)
+        lines = [line for line in lines if not line.startswith("#")]
         self.assertTrue(lines[0].startswith("time [s],position1 [rad],position2 [rad],setpoint1 [rad]"))
         self.assertGreater(len(lines), 30)
-        self.assertEqual({line.count(",") for line in lines}, {11})
+        self.assertEqual({line.count(",") for line in lines}, {13})
         self.page.run("HTMLAnchorElement.prototype.click = function () { window.saved = [this.download, this.href]; }")
-        self.page.click("#plot-csv")
-        self.assertEqual(self.page.run("window.saved[0]"), "pendularm.csv")
-        self.assertTrue(self.page.run("window.saved[1].startsWith('blob:')"))
+        for kind in ("csv", "png", "svg"):
+            self.page.run(f"(() => {{ const e = document.querySelector('#plot-save'); e.value = '{kind}'; e.dispatchEvent(new Event('change')); }})()")
+            self.page.until(f"window.saved?.[0] === 'pendularm.{kind}'")
+            self.assertTrue(self.page.run("window.saved[1].startsWith('blob:')"))
 
 
     def test_an_hour_would_take_no_more_than_ten_megabytes(self):

@@ -1,41 +1,43 @@
 //! Forward dynamics by an articulated-body recursion in which nothing cancels.
 //!
-//! A joint transmits a force and an effort, and the effort is known. So all that link `i` with everything beyond it is to the link
-//! before is a relation between the acceleration `p` of its joint and the force `f` through it: `f = A p + B`, with a symmetric positive
-//! definite 2×2 tensor `A`. One pass from the tip to the base finds every `A` and `B`, one pass back the accelerations.
+//! A joint transmits a force and an effort, and the effort is known. So all that link `i` with everything beyond it is
+//! to the link before is a relation between the acceleration `p` of its joint and the force `f` through it: `f = A p +
+//! B`, with a symmetric positive definite 2×2 tensor `A`. One pass from the tip to the base finds every `A` and `B`,
+//! one pass back the accelerations.
 //!
-//! In the frame of link `i` (x along it, y across it) and in units of its mass, let its tip carry `A = (a b; b c)` and `B`. With
-//! `u = (τ_i - τ_{i+1}) / (m_i l_i)`, `w = l_i φ̇_i²`, `W = 1 + 3c`, `X = 1 + a + 3c + 3 det A` and `E = det A · A⁻¹ B`, Newton and Euler
-//! give for a uniform rod, whatever its length:
+//! In the frame of link `i` (x along it, y across it) and in units of its mass, let its tip carry `A = (a b; b c)` and
+//! `B`. With `u = (τ_i - τ_{i+1}) / (m_i l_i)`, `w = l_i φ̇_i²`, `W = 1 + 3c`, `X = 1 + a + 3c + 3 det A` and `E = det
+//! A · A⁻¹ B`, Newton and Euler give for a uniform rod, whatever its length:
 //!
 //! | | |
 //! | --- | --- |
 //! | acceleration of its tip | `t_x = p_x - w`, `t_y = 3 (u - B_y - b t_x) / W - p_y / 2W` |
 //! | what it is to the link before | `A' = x v vᵀ + d y yᵀ`, `B' = x φ v + ψ y`, along `v = (1, k)` and `y = (0, 1)` |
 //! | stiff and soft part of `A'` | `x = X / W`, `d = ((1 + a) / 4 + c + det A) / X`, `k = -b / 2X` |
-//! | the same parts of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w`, `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
+//! | stiff part of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w` |
+//! | soft part of `B'` | `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
 //!
-//! Why so: the masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares when they are
-//! turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the same two directions, because a
-//! heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff part would bury the soft one. `E` comes
-//! from these parts too. Each of the two costs up to ten digits otherwise. Rotations are taken joint by joint, so that a
-//! joint wound up by 1e8 rad costs nothing either. Gravity is an upward acceleration of the base: two products, and so
-//! nothing that would be worth leaving out at gravity 0.
+//! Why so: the masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares
+//! when they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the
+//! same two directions, because a heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff
+//! part would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise.
+//! Rotations are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
+//! acceleration of the base: two products, and so nothing that would be worth leaving out at gravity 0.
 //!
-//! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a heavy tip (`tests/math_dynamics.rs`). Known
-//! limit: where masses *and* lengths spread by many powers of ten at once, such as 1e7 kg in 0.1 mm at the end of 500 km of
-//! gram-light links, the joint of the tiny tip may lose eight.
+//! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a
+//! heavy tip (`tests/math_dynamics.rs`). Known limit: where masses *and* lengths spread by many powers of ten at once,
+//! such as 1e7 kg in 0.1 mm at the end of 500 km of gram-light links, the joint of the tiny tip may lose eight.
 //!
-//! **Invariant:** one kernel for every arm and every n. Source of the method: Featherstone, *Rigid Body Dynamics Algorithms* (2008),
-//! ch. 7; the split into two directions is our own.
+//! **Invariant:** one kernel for every arm and every n. Source of the method: Featherstone, *Rigid Body Dynamics
+//! Algorithms* (2008), ch. 7; the split into two directions is our own.
 
 #![allow(
     clippy::indexing_slicing,
     reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
 )]
 
-use super::super::arm::Arm;
-use super::super::trig;
+use crate::math::arm::Arm;
+use crate::math::trig;
 use glam::DVec2;
 
 /// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
@@ -153,7 +155,7 @@ impl Body {
     }
 }
 
-/// What the tip of a link carries, in the frame of that link and per unit of its mass: `A = (a b; b c)` and `B`.
+/// The load at the tip of a link, in the frame of that link and per unit of its mass: `A = (a b; b c)` and `B`.
 #[derive(Clone, Copy)]
 struct Carried {
     a: f64,

@@ -4,14 +4,15 @@
 
 use std::fmt;
 
-use super::{Arity, Expression, Level, Op};
+use super::Expression;
+use super::program::{Arity, Operation, Precedence};
 
-/// What is still to be written.
-enum Piece {
+/// A part that is still to be written.
+enum Part {
     /// The operand that ends at this operation, in parentheses if it binds looser than the level.
     Operand {
         root: usize,
-        level: Level,
+        level: Precedence,
     },
     Text(&'static str),
 }
@@ -20,46 +21,46 @@ impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let starts = self.starts();
         // Operands are written from left to right, which is the order of the literals.
-        let mut literals = self.literals.iter();
+        let mut literals = self.0.literals.iter();
         let mut pieces = Vec::new();
-        if let Some(root) = self.ops.len().checked_sub(1) {
-            pieces.push(Piece::Operand {
+        if let Some(root) = self.0.ops.len().checked_sub(1) {
+            pieces.push(Part::Operand {
                 root,
-                level: Level::Sum,
+                level: Precedence::Sum,
             });
         }
         while let Some(piece) = pieces.pop() {
             let (root, level) = match piece {
-                Piece::Operand { root, level } => (root, level),
-                Piece::Text(text) => {
+                Part::Operand { root, level } => (root, level),
+                Part::Text(text) => {
                     f.write_str(text)?;
                     continue;
                 }
             };
-            let Some(&op) = self.ops.get(root) else {
+            let Some(&op) = self.0.ops.get(root) else {
                 continue;
             };
             let parenthesised = op.level() < level;
             if parenthesised {
                 f.write_str("(")?;
-                pieces.push(Piece::Text(")"));
+                pieces.push(Part::Text(")"));
             }
             match op.arity() {
                 Arity::Zero => write_atom(f, op, &mut literals)?,
                 Arity::One => {
                     f.write_str(symbol(op))?;
                     let operand = root.saturating_sub(1);
-                    if op == Op::Negate {
-                        pieces.push(Piece::Operand {
+                    if op == Operation::Negate {
+                        pieces.push(Part::Operand {
                             root: operand,
-                            level: Level::Operand,
+                            level: Precedence::Operand,
                         });
                     } else {
                         f.write_str("(")?;
-                        pieces.push(Piece::Text(")"));
-                        pieces.push(Piece::Operand {
+                        pieces.push(Part::Text(")"));
+                        pieces.push(Part::Operand {
                             root: operand,
-                            level: Level::Sum,
+                            level: Precedence::Sum,
                         });
                     }
                 }
@@ -67,12 +68,12 @@ impl fmt::Display for Expression {
                     let right = root.saturating_sub(1);
                     let left = starts.get(right).map_or(0, |start| start.saturating_sub(1));
                     let (left_level, right_level) = operand_levels(op);
-                    pieces.push(Piece::Operand {
+                    pieces.push(Part::Operand {
                         root: right,
                         level: right_level,
                     });
-                    pieces.push(Piece::Text(symbol(op)));
-                    pieces.push(Piece::Operand {
+                    pieces.push(Part::Text(symbol(op)));
+                    pieces.push(Part::Operand {
                         root: left,
                         level: left_level,
                     });
@@ -86,9 +87,9 @@ impl fmt::Display for Expression {
 impl Expression {
     /// For each operation, where the part of the program that computes its value starts.
     fn starts(&self) -> Vec<usize> {
-        let mut starts = Vec::with_capacity(self.ops.len());
-        let mut open = Vec::with_capacity(self.depth);
-        for (index, op) in self.ops.iter().enumerate() {
+        let mut starts = Vec::with_capacity(self.0.ops.len());
+        let mut open = Vec::with_capacity(self.0.depth);
+        for (index, op) in self.0.ops.iter().enumerate() {
             match op.arity() {
                 Arity::Zero => open.push(index),
                 Arity::One => {}
@@ -103,23 +104,23 @@ impl Expression {
 }
 
 /// The loosest that the left and the right operand may be without parentheses.
-fn operand_levels(op: Op) -> (Level, Level) {
+fn operand_levels(op: Operation) -> (Precedence, Precedence) {
     match op.level() {
-        Level::Sum => (Level::Sum, Level::Product),
-        Level::Product => (Level::Product, Level::Power),
-        _ => (Level::Operand, Level::Power),
+        Precedence::Sum => (Precedence::Sum, Precedence::Product),
+        Precedence::Product => (Precedence::Product, Precedence::Power),
+        _ => (Precedence::Operand, Precedence::Power),
     }
 }
 
-fn symbol(op: Op) -> &'static str {
+fn symbol(op: Operation) -> &'static str {
     match op {
-        Op::Negate => "-",
-        Op::Add => " + ",
-        Op::Subtract => " - ",
-        Op::Multiply => "*",
-        Op::Divide => "/",
-        Op::Power => "^",
-        _ => Op::FUNCTIONS
+        Operation::Negate => "-",
+        Operation::Add => " + ",
+        Operation::Subtract => " - ",
+        Operation::Multiply => "*",
+        Operation::Divide => "/",
+        Operation::Power => "^",
+        _ => Operation::FUNCTIONS
             .into_iter()
             .find(|(_, function)| *function == op)
             .map_or("", |(name, _)| name),
@@ -128,10 +129,10 @@ fn symbol(op: Op) -> &'static str {
 
 fn write_atom<'a>(
     f: &mut fmt::Formatter<'_>,
-    op: Op,
+    op: Operation,
     literals: &mut impl Iterator<Item = &'a f64>,
 ) -> fmt::Result {
-    if op == Op::Variable {
+    if op == Operation::Variable {
         return f.write_str("t");
     }
     let value = literals.next().copied().unwrap_or_default();

@@ -1,4 +1,4 @@
-//! What can be wrong with an expression, told to the person who wrote it.
+//! The faults of an expression, in sentences for the person who wrote it.
 //!
 //! **Invariant:** a message is short and printable whatever the text was: what it quotes is escaped and shortened.
 
@@ -45,7 +45,7 @@ pub enum ExpressionError {
     ExpectedOperand {
         /// Where the value is missing.
         column: usize,
-        /// What is there.
+        /// The text there.
         found: Found,
     },
     /// Something else where only an operator or a closing parenthesis can follow.
@@ -53,7 +53,7 @@ pub enum ExpressionError {
     ExpectedOperator {
         /// Where the operator is missing.
         column: usize,
-        /// What is there.
+        /// The text there.
         found: Found,
     },
     /// A function without a parenthesised argument.
@@ -63,7 +63,7 @@ pub enum ExpressionError {
         function: &'static str,
         /// Where the parenthesis is missing.
         column: usize,
-        /// What is there.
+        /// The text there.
         found: Found,
     },
     /// A closing parenthesis too many.
@@ -80,7 +80,7 @@ pub enum ExpressionError {
     },
 }
 
-/// What stands at a place in the text, fit to be printed.
+/// The text at a place, fit to be printed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Found {
     /// A piece of the text, at most 20 characters of it, escaped.

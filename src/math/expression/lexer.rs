@@ -4,9 +4,9 @@
 
 use super::error::{ExpressionError, Found};
 
-/// What a token is.
+/// The kind of a token.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Kind {
+pub(super) enum LexemeKind {
     /// A literal with its value, which may be infinite.
     Number(f64),
     /// Letters, digits and underscores that don't start with a digit.
@@ -17,8 +17,8 @@ pub(super) enum Kind {
 
 /// A token and where it stands.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Token<'a> {
-    pub(super) kind: Kind,
+pub(super) struct Lexeme<'a> {
+    pub(super) kind: LexemeKind,
     pub(super) text: &'a str,
     /// Offset of its first byte.
     pub(super) start: usize,
@@ -37,7 +37,7 @@ impl<'a> Lexer<'a> {
     }
 
     /// The next token, `None` at the end.
-    pub(super) fn next(&mut self) -> Result<Option<Token<'a>>, ExpressionError> {
+    pub(super) fn next(&mut self) -> Result<Option<Lexeme<'a>>, ExpressionError> {
         self.skip(|byte| byte.is_ascii_whitespace());
         let start = self.at;
         let Some(first) = self.peek() else {
@@ -47,16 +47,16 @@ impl<'a> Lexer<'a> {
             b'0'..=b'9' | b'.' => self.number()?,
             b'a'..=b'z' | b'A'..=b'Z' | b'_' => {
                 self.skip(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
-                Kind::Name
+                LexemeKind::Name
             }
             b'+' | b'-' | b'*' | b'/' | b'^' | b'(' | b')' => {
                 self.at += 1;
-                Kind::Sign(first)
+                LexemeKind::Sign(first)
             }
             _ => return Err(self.unrecognized()),
         };
         let text = self.text.get(start..self.at).unwrap_or_default();
-        Ok(Some(Token { kind, text, start }))
+        Ok(Some(Lexeme { kind, text, start }))
     }
 
     /// The column just after the last character that is not white space. For a text that has been read to its end.
@@ -65,7 +65,7 @@ impl<'a> Lexer<'a> {
     }
 
     /// Digits with at most one point, at least one digit, then perhaps an exponent.
-    fn number(&mut self) -> Result<Kind, ExpressionError> {
+    fn number(&mut self) -> Result<LexemeKind, ExpressionError> {
         let start = self.at;
         let mut digits = self.skip(|byte| byte.is_ascii_digit());
         if self.peek() == Some(b'.') {
@@ -79,11 +79,13 @@ impl<'a> Lexer<'a> {
         // The standard library reads exactly the forms that came this far, correctly rounded, in linear time.
         let value = self.text.get(start..self.at).map(str::parse);
         debug_assert!(matches!(value, Some(Ok(_))), "digits make a number");
-        Ok(Kind::Number(value.and_then(Result::ok).unwrap_or(f64::NAN)))
+        Ok(LexemeKind::Number(
+            value.and_then(Result::ok).unwrap_or(f64::NAN),
+        ))
     }
 
-    /// An `e` right after a number starts its exponent, unless it starts a name (`2exp(t)`): then a name follows a number,
-    /// for which the parser has the better message.
+    /// An `e` right after a number starts its exponent, unless it starts a name (`2exp(t)`): then a name follows a
+    /// number, for which the parser has the better message.
     fn exponent(&mut self, start: usize) -> Result<(), ExpressionError> {
         let rest = self.text.as_bytes().get(self.at..).unwrap_or_default();
         let [b'e' | b'E', after @ ..] = rest else {

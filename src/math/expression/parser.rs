@@ -1,25 +1,25 @@
 //! Orders the tokens of an expression into a postfix program: Dijkstra's shunting yard, which keeps what is still open
 //! on a stack of its own.
 //!
-//! **Invariant:** an operation is emitted only after its operands, so that the program of an accepted text leaves exactly
-//! one value.
+//! **Invariant:** an operation is emitted only after its operands, so that the program of an accepted text leaves
+//! exactly one value.
 
 use super::error::{ExpressionError, Found};
-use super::lexer::{Kind, Lexer, Token, column};
-use super::{Arity, Expression, Level, Op};
+use super::lexer::{Lexeme, LexemeKind, Lexer, column};
+use super::program::{Arity, Operation, Precedence, Program};
 
-/// What waits on the parser's stack.
+/// An entry of the parser's stack.
 #[derive(Debug, Clone, Copy)]
-enum Pending {
+enum Waiting {
     /// An operator whose right operand is being read.
-    Operator(Op),
+    Operator(Operation),
     /// A parenthesis.
     Open,
     /// A function with its parenthesis.
-    Call(Op),
+    Call(Operation),
 }
 
-/// What may come next.
+/// The kind of token that may come next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Expect {
     Operand,
@@ -27,11 +27,12 @@ enum Expect {
 }
 
 /// Reads all of `text`.
-pub(super) fn parse(text: &str) -> Result<Expression, ExpressionError> {
+pub(super) fn parse(text: &str) -> Result<Program, ExpressionError> {
     let mut parser = Parser {
         lexer: Lexer::new(text),
         pending: Vec::new(),
         program: Program::default(),
+        values: 0,
     };
     let mut expect = Expect::Operand;
     while let Some(token) = parser.lexer.next()? {
@@ -45,33 +46,35 @@ pub(super) fn parse(text: &str) -> Result<Expression, ExpressionError> {
 
 struct Parser<'a> {
     lexer: Lexer<'a>,
-    pending: Vec<Pending>,
+    pending: Vec<Waiting>,
     program: Program,
+    /// How many values the program leaves so far.
+    values: usize,
 }
 
 impl Parser<'_> {
     /// Takes a token where a value must start.
-    fn operand(&mut self, token: &Token<'_>) -> Result<Expect, ExpressionError> {
+    fn operand(&mut self, token: &Lexeme<'_>) -> Result<Expect, ExpressionError> {
         match token.kind {
-            Kind::Number(value) => {
+            LexemeKind::Number(value) => {
                 self.program.literals.push(value);
-                self.program.emit(Op::Number);
+                self.emit(Operation::Number);
                 Ok(Expect::Operator)
             }
-            Kind::Name if token.text == "t" => {
-                self.program.emit(Op::Variable);
+            LexemeKind::Name if token.text == "t" => {
+                self.emit(Operation::Variable);
                 Ok(Expect::Operator)
             }
-            Kind::Name => self.call(token),
-            Kind::Sign(b'-') => {
-                self.pending.push(Pending::Operator(Op::Negate));
+            LexemeKind::Name => self.call(token),
+            LexemeKind::Sign(b'-') => {
+                self.pending.push(Waiting::Operator(Operation::Negate));
                 Ok(Expect::Operand)
             }
-            Kind::Sign(b'(') => {
-                self.pending.push(Pending::Open);
+            LexemeKind::Sign(b'(') => {
+                self.pending.push(Waiting::Open);
                 Ok(Expect::Operand)
             }
-            Kind::Sign(_) => Err(ExpressionError::ExpectedOperand {
+            LexemeKind::Sign(_) => Err(ExpressionError::ExpectedOperand {
                 column: column(token.start),
                 found: Found::text(token.text),
             }),
@@ -79,8 +82,8 @@ impl Parser<'_> {
     }
 
     /// Takes a function's name and the parenthesis that must follow.
-    fn call(&mut self, token: &Token<'_>) -> Result<Expect, ExpressionError> {
-        let function = Op::FUNCTIONS
+    fn call(&mut self, token: &Lexeme<'_>) -> Result<Expect, ExpressionError> {
+        let function = Operation::FUNCTIONS
             .into_iter()
             .find(|(name, _)| *name == token.text);
         let Some((name, op)) = function else {
@@ -92,8 +95,8 @@ impl Parser<'_> {
         let next = self.lexer.next()?;
         if !matches!(
             next,
-            Some(Token {
-                kind: Kind::Sign(b'('),
+            Some(Lexeme {
+                kind: LexemeKind::Sign(b'('),
                 ..
             })
         ) {
@@ -104,19 +107,19 @@ impl Parser<'_> {
                 found,
             });
         }
-        self.pending.push(Pending::Call(op));
+        self.pending.push(Waiting::Call(op));
         Ok(Expect::Operand)
     }
 
     /// Takes a token after a complete value.
-    fn operator(&mut self, token: &Token<'_>) -> Result<Expect, ExpressionError> {
+    fn operator(&mut self, token: &Lexeme<'_>) -> Result<Expect, ExpressionError> {
         let op = match token.kind {
-            Kind::Sign(b'+') => Op::Add,
-            Kind::Sign(b'-') => Op::Subtract,
-            Kind::Sign(b'*') => Op::Multiply,
-            Kind::Sign(b'/') => Op::Divide,
-            Kind::Sign(b'^') => Op::Power,
-            Kind::Sign(b')') => return self.close(token),
+            LexemeKind::Sign(b'+') => Operation::Add,
+            LexemeKind::Sign(b'-') => Operation::Subtract,
+            LexemeKind::Sign(b'*') => Operation::Multiply,
+            LexemeKind::Sign(b'/') => Operation::Divide,
+            LexemeKind::Sign(b'^') => Operation::Power,
+            LexemeKind::Sign(b')') => return self.close(token),
             _ => {
                 return Err(ExpressionError::ExpectedOperator {
                     column: column(token.start),
@@ -124,19 +127,20 @@ impl Parser<'_> {
                 });
             }
         };
-        // What binds tighter is complete. So is an equal that groups from the left; only `^` groups from the right.
+        // An operation that binds tighter is complete. So is an equal that groups from the left; only `^` groups from
+        // the right.
         self.emit_while(|waiting| {
-            waiting > op.level() || (waiting == op.level() && waiting != Level::Power)
+            waiting > op.level() || (waiting == op.level() && waiting != Precedence::Power)
         });
-        self.pending.push(Pending::Operator(op));
+        self.pending.push(Waiting::Operator(op));
         Ok(Expect::Operand)
     }
 
-    fn close(&mut self, token: &Token<'_>) -> Result<Expect, ExpressionError> {
+    fn close(&mut self, token: &Lexeme<'_>) -> Result<Expect, ExpressionError> {
         self.emit_while(|_| true);
         match self.pending.pop() {
-            Some(Pending::Call(op)) => self.program.emit(op),
-            Some(Pending::Open | Pending::Operator(_)) => {}
+            Some(Waiting::Call(op)) => self.emit(op),
+            Some(Waiting::Open | Waiting::Operator(_)) => {}
             None => {
                 return Err(ExpressionError::Unopened {
                     column: column(token.start),
@@ -146,7 +150,7 @@ impl Parser<'_> {
         Ok(Expect::Operator)
     }
 
-    fn finish(mut self, text: &str, expect: Expect) -> Result<Expression, ExpressionError> {
+    fn finish(mut self, text: &str, expect: Expect) -> Result<Program, ExpressionError> {
         if expect == Expect::Operand {
             let (column, found) = self.place(None);
             return Err(if column == 1 {
@@ -161,31 +165,33 @@ impl Parser<'_> {
                 column: column(innermost_open(text)),
             });
         }
-        let Program {
-            ops,
-            literals,
-            depth,
-            ..
-        } = self.program;
-        Ok(Expression {
-            ops,
-            literals,
-            depth,
-        })
+        Ok(self.program)
     }
 
     /// Emits the operators on top of the stack, down to a parenthesis or the first one whose level fails the test.
-    fn emit_while(&mut self, test: impl Fn(Level) -> bool) {
-        while let Some(Pending::Operator(op)) = self.pending.last().copied() {
+    fn emit_while(&mut self, test: impl Fn(Precedence) -> bool) {
+        while let Some(Waiting::Operator(op)) = self.pending.last().copied() {
             if !test(op.level()) {
                 break;
             }
             self.pending.pop();
-            self.program.emit(op);
+            self.emit(op);
         }
     }
 
-    fn place(&self, token: Option<&Token<'_>>) -> (usize, Found) {
+    fn emit(&mut self, op: Operation) {
+        match op.arity() {
+            Arity::Zero => {
+                self.values += 1;
+                self.program.depth = self.program.depth.max(self.values);
+            }
+            Arity::One => {}
+            Arity::Two => self.values -= 1,
+        }
+        self.program.ops.push(op);
+    }
+
+    fn place(&self, token: Option<&Lexeme<'_>>) -> (usize, Found) {
         match token {
             Some(token) => (column(token.start), Found::text(token.text)),
             None => (self.lexer.end_column(), Found::End),
@@ -207,27 +213,4 @@ fn innermost_open(text: &str) -> usize {
     }
     debug_assert!(false, "only called with a parenthesis open");
     0
-}
-
-/// The program so far, with the number of values that it leaves.
-#[derive(Default)]
-struct Program {
-    ops: Vec<Op>,
-    literals: Vec<f64>,
-    values: usize,
-    depth: usize,
-}
-
-impl Program {
-    fn emit(&mut self, op: Op) {
-        match op.arity() {
-            Arity::Zero => {
-                self.values += 1;
-                self.depth = self.depth.max(self.values);
-            }
-            Arity::One => {}
-            Arity::Two => self.values -= 1,
-        }
-        self.ops.push(op);
-    }
 }

@@ -1,15 +1,15 @@
 //! Inverse kinematics of 2 and 3 links in closed form.
 //!
-//! With the wrist (the hand itself for 2 links) at distance `r` and bearing `β` from the base, the Law of Cosines closes
-//! the triangle `l₁, l₂, r`, and the last link is decoupled from it:
+//! With the wrist (the end effector itself for 2 links) at distance `r` and bearing `β` from the base, the Law of
+//! Cosines closes the triangle `l₁, l₂, r`, and the last link is decoupled from it:
 //!
 //! ```text
 //! wrist = target - l₃ (cos φ, sin φ)      q₂ = ±(π - ∠(l₁, l₂))      q₁ = β ∓ ∠(l₁, r)      q₃ = φ - q₁ - q₂
 //! ```
 //!
 //! No angle is taken from a cosine: near the edges of reach half of its digits would be gone. Half-angle forms of the
-//! same law, factored so that only differences of given lengths occur, keep them all (W. Kahan, *Miscalculating Area and
-//! Angles of a Needle-like Triangle*).
+//! same law, factored so that only differences of given lengths occur, keep them all (W. Kahan, *Miscalculating Area
+//! and Angles of a Needle-like Triangle*).
 //!
 //! A 3-link arm that may choose its orientation has the wrist at distance `w`, `w² = r² + l₃² - 2 r l₃ cos θ`, with
 //! `θ = φ - β` and the target at distance `r`. That grows with `|θ|`, so `|l₁ - l₂| ≤ w ≤ l₁ + l₂` admits
@@ -33,7 +33,7 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Rounding of one joint angle \[rad\]: four units in the last place of π. Poses that differ by less are as near.
 const ANGLE_ROUNDING: f64 = 8.0 * f64::EPSILON;
 
-/// Joint angles \[rad\], each in (-π, π], that put the hand of an arm with these `lengths` \[m\] on `target`.
+/// Joint angles \[rad\], each in (-π, π], that put the end effector of an arm with these `lengths` \[m\] on `target`.
 ///
 /// `present` \[rad\] decides what the target leaves open. Of the two elbows the one with the smaller sum of squared
 /// wrapped differences from it is given, and `q₂ ≥ 0` where they are equally near. Three links without an orientation
@@ -65,17 +65,17 @@ pub fn solve<const N: usize>(
     }
     match *lengths.as_slice() {
         [l1, l2] => {
-            let arm = Links::new(l1, l2, 0.0);
-            let hand = target.position / arm.unit;
-            arm.checked(arm.wrist_reach(), hand, target)?;
-            Ok(arm.nearest_elbow(hand, 0.0, &present))
+            let arm = Chain::new(l1, l2, 0.0);
+            let end_effector = target.position / arm.unit;
+            arm.checked(arm.wrist_reach(), end_effector, target)?;
+            Ok(arm.nearest_elbow(end_effector, 0.0, &present))
         }
         [l1, l2, l3] => {
-            let arm = Links::new(l1, l2, l3);
-            let hand = target.position / arm.unit;
+            let arm = Chain::new(l1, l2, l3);
+            let end_effector = target.position / arm.unit;
             let (wrist, phi) = match target.orientation {
-                Some(phi) => arm.wrist_for(phi, hand, target)?,
-                None => arm.nearest_wrist(hand, &present, target)?,
+                Some(phi) => arm.wrist_for(phi, end_effector, target)?,
+                None => arm.nearest_wrist(end_effector, &present, target)?,
             };
             Ok(arm.nearest_elbow(wrist, phi, &present))
         }
@@ -84,12 +84,12 @@ pub fn solve<const N: usize>(
 }
 
 /// Lengths in multiples of a power of two near the longest, so that no square or sum of them overflows or vanishes.
-struct Links {
+struct Chain {
     /// The power of two \[m\]; dividing by it is exact.
     unit: f64,
     l1: f64,
     l2: f64,
-    /// 0 for an arm of two links, whose wrist is its hand.
+    /// 0 for an arm of two links, whose wrist is its end effector.
     l3: f64,
 }
 
@@ -99,7 +99,7 @@ enum Outside {
     TooClose,
 }
 
-impl Links {
+impl Chain {
     fn new(l1: f64, l2: f64, l3: f64) -> Self {
         const EXPONENT: u64 = 0x7ff << 52;
         let longest = l1.max(l2).max(l3);
@@ -129,13 +129,18 @@ impl Links {
         }
     }
 
-    /// Refuses a target whose hand is outside the whole arm's `reach`.
+    /// Refuses a target that is outside the whole arm's `reach`.
     ///
     /// One that is only just outside needs no moving: triangles that do not close are made flat by [`half_angle`], and
     /// the flat one is the boundary.
-    fn checked(&self, reach: Reach, hand: DVec2, target: &Target) -> Result<(), Unreachable> {
+    fn checked(
+        &self,
+        reach: Reach,
+        end_effector: DVec2,
+        target: &Target,
+    ) -> Result<(), Unreachable> {
         let DVec2 { x, y } = target.position;
-        match self.judged(reach, hand.x.hypot(hand.y)) {
+        match self.judged(reach, end_effector.x.hypot(end_effector.y)) {
             Ok(()) => Ok(()),
             Err(Outside::Beyond) => Err(Unreachable::Beyond {
                 x,
@@ -152,24 +157,28 @@ impl Links {
         }
     }
 
-    /// Where the wrist must be for the hand to point along `phi`, and `phi`.
+    /// Where the wrist must be for the end effector to point along `phi`, and `phi`.
     fn wrist_for(
         &self,
         phi: f64,
-        hand: DVec2,
+        end_effector: DVec2,
         target: &Target,
     ) -> Result<(DVec2, f64), Unreachable> {
         if !phi.is_finite() {
             return Err(Unreachable::NotFinite("phi"));
         }
-        let wrist = hand - self.l3 * DVec2::from_angle(phi);
+        let wrist = end_effector - self.l3 * DVec2::from_angle(phi);
         let distance = wrist.x.hypot(wrist.y);
         let reach = self.wrist_reach();
         let Err(side) = self.judged(reach, distance) else {
             return Ok((wrist, wrap(phi)));
         };
         // Where no orientation would help, that is what the sender should hear.
-        self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
+        self.checked(
+            Reach::of(&[self.l1, self.l2, self.l3]),
+            end_effector,
+            target,
+        )?;
         let distance = distance * self.unit;
         Err(match side {
             Outside::Beyond => Unreachable::WristBeyond {
@@ -188,27 +197,31 @@ impl Links {
     /// Where the wrist must be for the admissible orientation nearest to the present one, and that orientation.
     fn nearest_wrist<const N: usize>(
         &self,
-        hand: DVec2,
+        end_effector: DVec2,
         present: &[f64; N],
         target: &Target,
     ) -> Result<(DVec2, f64), Unreachable> {
-        self.checked(Reach::of(&[self.l1, self.l2, self.l3]), hand, target)?;
+        self.checked(
+            Reach::of(&[self.l1, self.l2, self.l3]),
+            end_effector,
+            target,
+        )?;
         let present = heading(present);
         let present_phi = present.y.atan2(present.x);
 
-        // Asked first, so that a present orientation is kept bit for bit, on the very edge of what is admissible too. On
-        // the base itself all orientations are admissible or none.
+        // Asked first, so that a present orientation is kept bit for bit, on the very edge of what is admissible too.
+        // On the base itself all orientations are admissible or none.
         let reach = self.wrist_reach();
-        let wrist = hand - self.l3 * present;
+        let wrist = end_effector - self.l3 * present;
         let rounding = ROUNDING * (self.l1 + self.l2 + self.l3);
         let present_distance = wrist.x.hypot(wrist.y);
         let admissible = reach.inner - rounding..=reach.outer + rounding;
-        if admissible.contains(&present_distance) || hand == DVec2::ZERO {
+        if admissible.contains(&present_distance) || end_effector == DVec2::ZERO {
             return Ok((wrist, present_phi));
         }
 
-        let distance = hand.x.hypot(hand.y);
-        let bearing = hand.y.atan2(hand.x);
+        let distance = end_effector.x.hypot(end_effector.y);
+        let bearing = end_effector.y.atan2(end_effector.x);
         let (sin, cos) = half_angle(distance, self.l3, reach.inner);
         let least = 2.0 * sin.atan2(cos);
         let (sin, cos) = half_angle(distance, self.l3, reach.outer);
@@ -216,7 +229,7 @@ impl Links {
         let offset = wrap(turn(bearing, present_phi));
         let nearest = offset.abs().max(least).min(greatest);
         let phi = wrap(bearing + if offset < 0.0 { -nearest } else { nearest });
-        Ok((hand - self.l3 * DVec2::from_angle(phi), phi))
+        Ok((end_effector - self.l3 * DVec2::from_angle(phi), phi))
     }
 
     /// The joints that put the wrist there and turn the last link along `phi`, with the elbow nearer to `present`.

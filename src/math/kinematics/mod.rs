@@ -1,11 +1,12 @@
-//! Where the hand is, and how the joints must stand to put it somewhere: forward and closed-form inverse kinematics.
+//! Where the end effector is, and how the joints must stand to put it somewhere: forward and closed-form inverse
+//! kinematics.
 //!
 //! `x = Σ lᵢ cos φᵢ`, `y = Σ lᵢ sin φᵢ`, `φᵢ = q₁ + … + qᵢ`; angles in rad, counter-clockwise, each relative to the
 //! previous link; the base is the origin.
 //!
 //! | question | function | file |
 //! | --- | --- | --- |
-//! | where is the hand? | [`forward()`], [`joints`], [`heading`] | `forward.rs` |
+//! | where is the end effector? | [`forward()`], [`joints`], [`heading`] | `forward.rs` |
 //! | how must the joints stand? | [`solve`] | `inverse.rs` |
 //! | which of all equal angles is meant? | [`wrap`], [`turn`], [`nearest_turn`] | `angle.rs` |
 //!
@@ -23,16 +24,16 @@ pub use angle::{nearest_turn, turn, wrap};
 pub use forward::{Tip, forward, heading, joints};
 pub use inverse::{BOUNDARY, solve};
 
-/// What inverse kinematics is asked for.
+/// A target of inverse kinematics.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
-    /// Where the hand should be \[m\].
+    /// The place for the end effector \[m\].
     pub position: DVec2,
     /// Heading that the last link should have, `φₙ` \[rad\]; any that is possible where absent. Ignored for 2 links.
     pub orientation: Option<f64>,
 }
 
-/// The distances from the base \[m\] that the hand of an arm can have: a ring, or a disc where `inner` is 0.
+/// The distances from the base \[m\] that the end effector of an arm can have: a ring, or a disc where `inner` is 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// Least distance \[m\]: what the longest link has over all the others together, or 0.
@@ -65,10 +66,10 @@ impl Reach {
 /// Why no pose of the arm answers a [`Target`].
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum Unreachable {
-    /// The hand can't be put so far away.
+    /// The end effector can't be put so far away.
     #[error(
         "target ({}, {}) is {} m from the base, beyond the arm's reach of {} m",
-        Plain(*.x), Plain(*.y), Plain(*.distance), Plain(*.limit)
+        Shown(*.x), Shown(*.y), Shown(*.distance), Shown(*.limit)
     )]
     Beyond {
         /// Target \[m\].
@@ -83,7 +84,7 @@ pub enum Unreachable {
     /// The longest link can't be folded back so far by the others (for 2 links: nearer than `|l1 - l2|`).
     #[error(
         "target ({}, {}) is {} m from the base, closer than the {} m to which the arm can fold",
-        Plain(*.x), Plain(*.y), Plain(*.distance), Plain(*.limit)
+        Shown(*.x), Shown(*.y), Shown(*.distance), Shown(*.limit)
     )]
     TooClose {
         /// Target \[m\].
@@ -98,7 +99,7 @@ pub enum Unreachable {
     /// With this orientation the last link would have to start farther away than the others reach.
     #[error(
         "phi = {} puts the wrist {} m from the base, beyond the reach of links 1 and 2, {} m",
-        Plain(*.phi), Plain(*.distance), Plain(*.limit)
+        Shown(*.phi), Shown(*.distance), Shown(*.limit)
     )]
     WristBeyond {
         /// Orientation asked for \[rad\].
@@ -111,7 +112,7 @@ pub enum Unreachable {
     /// With this orientation the last link would have to start nearer to the base than the others fold.
     #[error(
         "phi = {} puts the wrist {} m from the base, closer than the {} m to which links 1 and 2 can fold",
-        Plain(*.phi), Plain(*.distance), Plain(*.limit)
+        Shown(*.phi), Shown(*.distance), Shown(*.limit)
     )]
     WristTooClose {
         /// Orientation asked for \[rad\].
@@ -136,9 +137,9 @@ pub enum Unreachable {
 }
 
 /// A number as a person would write it: 1e300 is not spelled out in 301 digits.
-struct Plain(f64);
+struct Shown(f64);
 
-impl fmt::Display for Plain {
+impl fmt::Display for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self(number) = self;
         if *number == 0.0 || (1e-4..1e7).contains(&number.abs()) || !number.is_finite() {

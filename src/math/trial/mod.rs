@@ -2,8 +2,8 @@
 //!
 //! A [`Trial`] is told what happens and says what to do about it, as a list of [`Action`]s; the actor around it only
 //! carries messages. It knows no arm: targets come from a closure (usually around [`sample`]), goals are somebody
-//! else's and known by their ids, and the time is the simulation time that [`Trial::tick`] is told, before anything else
-//! that happened at that time.
+//! else's and known by their ids, and the time is the simulation time that [`Trial::tick`] is told, before anything
+//! else that happened at that time.
 //!
 //! ```text
 //!                    start                       accepted                    concluded: reached
@@ -32,14 +32,14 @@ const EARLY_RESULTS: usize = 4;
 
 /// Simulation time since a start, added up over resets of the simulation clock.
 #[derive(Debug, Clone, Copy)]
-struct Clock {
+struct TrialClock {
     /// Time before the clock was last set back \[s\].
     carried: f64,
     origin: f64,
     latest: f64,
 }
 
-impl Clock {
+impl TrialClock {
     const fn started(now: f64) -> Self {
         Self {
             carried: 0.0,
@@ -62,7 +62,7 @@ impl Clock {
     }
 }
 
-/// What the trial is after.
+/// The goal that the trial pursues.
 #[derive(Debug, Clone, PartialEq)]
 enum Pursuit {
     Nothing,
@@ -104,7 +104,7 @@ impl View {
 pub struct Trial {
     settings: Settings,
     /// None before the first start.
-    clock: Option<Clock>,
+    clock: Option<TrialClock>,
     running: bool,
     targets_reached: u64,
     pursuit: Pursuit,
@@ -128,7 +128,7 @@ impl Default for Trial {
 }
 
 impl Trial {
-    /// What the status shows; none before the first start.
+    /// Returns the status; none before the first start.
     #[must_use]
     pub fn status(&self) -> Option<Status> {
         let clock = self.clock?;
@@ -198,7 +198,7 @@ impl Trial {
     ) -> Result<Vec<Action>, Rejection> {
         let target = sample().ok_or(Rejection::NoTarget)?;
         self.settings = changes.to(self.settings);
-        self.clock = Some(Clock::started(now));
+        self.clock = Some(TrialClock::started(now));
         self.running = true;
         self.targets_reached = 0;
         Ok(self.replace(target))
@@ -291,8 +291,8 @@ impl Trial {
         vec![Action::PublishStatus]
     }
 
-    /// Feedback on a goal, anybody's: the hand's `distance` from its target \[m\], and the `positions` it commands
-    /// \[rad\].
+    /// Feedback on a goal, anybody's: the end effector's `distance` from its target \[m\], and the `positions` it
+    /// commands \[rad\].
     pub fn feedback(&mut self, goal_id: &str, distance: f64, positions: &[f64]) {
         if self.is_in_flight(goal_id) {
             self.view.error = Some(distance);

@@ -15,24 +15,29 @@ const DRAWS: u32 = 8;
 /// Share of the reach's width that [`sample`] leaves free at each of its two edges.
 const MARGIN: f64 = 0.05;
 
-/// A random target that an arm with these `lengths` \[m\] can reach; `None` if there is none to be found, as for lengths
-/// whose sum is beyond the number range.
+/// A random target that an arm with these `lengths` \[m\] can reach; `None` if there is none to be found, as for
+/// lengths whose sum is beyond the number range.
+///
+/// `random` gives numbers from 0 to 1, each as likely as any other.
 ///
 /// Every part of the reachable plane is as likely as any other of the same area: uniform in bearing and in the square
 /// of the distance from the base. (Uniform distances or joint angles would crowd around the base.) One twentieth of the
-/// reach's width is left free at either edge: there the arm is stretched or folded, the hand is slow to follow the
-/// joints, part of the epsilon around the target can't be entered, and a small change of the lengths would put the
+/// reach's width is left free at either edge: there the arm is stretched or folded, the end effector is slow to follow
+/// the joints, part of the epsilon around the target can't be entered, and a small change of the lengths would put the
 /// target out of reach. The orientation is left open, for 3 links too, so that the solver may keep the present one:
 /// only the position counts, and a demand that counts for nothing would only make the arm turn over.
-pub fn sample<const N: usize>(lengths: &[f64; N], rng: &mut fastrand::Rng) -> Option<Target> {
+pub fn sample<const N: usize>(
+    lengths: &[f64; N],
+    mut random: impl FnMut() -> f64,
+) -> Option<Target> {
     let Reach { inner, outer } = Reach::of(lengths);
     let margin = MARGIN * (outer - inner);
     let (least, greatest) = (inner + margin, outer - margin);
     // Shares of the greatest distance, whose squares neither overflow nor vanish.
     let hole = (least / greatest).min(1.0).powi(2);
     (0..DRAWS).find_map(|_| {
-        let distance = greatest * (hole + rng.f64() * (1.0 - hole)).sqrt();
-        let bearing = TAU * rng.f64();
+        let distance = greatest * (hole + random() * (1.0 - hole)).sqrt();
+        let bearing = TAU * random();
         let position = distance * DVec2::from_angle(bearing);
         let target = Target {
             position,

@@ -1,4 +1,4 @@
-//! What is said to a trial and by it: settings, actions, rejections, status.
+//! The terms of a trial: settings, actions, rejections, status.
 //!
 //! **Invariant:** plain values; the rules are all in [`Trial`](super::Trial).
 
@@ -10,7 +10,7 @@ use crate::math::kinematics::Target;
 /// `duration` where no start has given one \[s\]: time for a few dozen targets.
 pub const DURATION: f64 = 60.0;
 
-/// What a trial runs by; kept from start to start.
+/// The settings of a trial; kept from start to start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Simulation time that a trial lasts \[s\], greater than 0.
@@ -52,7 +52,7 @@ impl Changes {
     }
 }
 
-/// What the trial wants done, in this order.
+/// A thing that the trial wants done; several are done in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
     /// Cancel this goal, by its id, so that nobody else's is hit; a rejection means that it is over already.
@@ -69,7 +69,7 @@ pub enum Action {
         /// When it counts as reached.
         criteria: Criteria,
     },
-    /// What [`status`](super::Trial::status) shows has changed.
+    /// The [`status`](super::Trial::status) has changed and is to be shown.
     PublishStatus,
 }
 
@@ -116,7 +116,7 @@ impl fmt::Display for ActionStatus {
     }
 }
 
-/// What there is to know about a trial.
+/// The state of a trial as clients see it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
     /// Whether the trial is neither over nor stopped.
@@ -129,7 +129,7 @@ pub struct Status {
     pub targets_reached: u64,
     /// The target being pursued, or the one that was last; none once the trial has ended.
     pub target: Option<Target>,
-    /// The hand's distance from the target \[m\], as last heard.
+    /// The end effector's distance from the target \[m\], as last heard.
     pub error: Option<f64>,
     /// The setpoint that the goal commands \[rad\], as last heard.
     pub desired_positions: Option<Vec<f64>>,
@@ -144,6 +144,6 @@ pub struct Conclusion {
     pub goal_id: String,
     /// How it ended.
     pub outcome: Outcome,
-    /// The hand's distance from the target at the end \[m\].
+    /// The end effector's distance from the target at the end \[m\].
     pub final_distance: f64,
 }

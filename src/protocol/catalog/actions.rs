@@ -1,27 +1,43 @@
-//! The actions: goals with progress and an end, as rosbridge has them beside topics and services.
+//! The actions: one row each. Goals with progress and an end, as rosbridge has them beside topics and services.
 //!
 //! **Invariant:** an action has the fields of the services and topics that do the same: there is one goal machine.
 
-use super::{Field, Node, Service, Topic};
+use super::entry::Field;
+use super::node::Node;
+use super::services::Service;
+use super::table::table;
+use super::topics::Topic;
 use crate::protocol::names;
 
-/// An action of the runtime's own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Action {
-    /// Drives the arm to a tip position.
-    MoveTo,
+table! {
+    /// An action of the runtime's own.
+    pub enum Action of ActionEntry {
+        /// Drives the arm to an end effector position.
+        MoveTo = ActionEntry {
+            name: "/ik_action",
+            type_name: "pendularm_interfaces/action/MoveTo",
+            owner: Node::IkAction,
+            goal: Service::SendGoal.fields(),
+            result: Topic::IkResult.fields(),
+            feedback: Topic::IkFeedback.fields(),
+        },
+    }
+}
+
+pub(super) struct ActionEntry {
+    name: &'static str,
+    type_name: &'static str,
+    owner: Node,
+    goal: &'static [Field],
+    result: &'static [Field],
+    feedback: &'static [Field],
 }
 
 impl Action {
-    /// All actions.
-    pub const ALL: [Self; 1] = [Self::MoveTo];
-
     /// The action's name on the wire.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::MoveTo => "/ik_action",
-        }
+        self.entry().name
     }
 
     /// The action of that name; the leading slash may be left out.
@@ -34,40 +50,30 @@ impl Action {
     /// The action's type, as ROS writes it.
     #[must_use]
     pub const fn type_name(self) -> &'static str {
-        match self {
-            Self::MoveTo => "pendularm_interfaces/action/MoveTo",
-        }
+        self.entry().type_name
     }
 
     /// The node that pursues the goals.
     #[must_use]
     pub const fn owner(self) -> Node {
-        match self {
-            Self::MoveTo => Node::IkAction,
-        }
+        self.entry().owner
     }
 
     /// The fields of a goal.
     #[must_use]
     pub const fn goal_fields(self) -> &'static [Field] {
-        match self {
-            Self::MoveTo => Service::SendGoal.fields(),
-        }
+        self.entry().goal
     }
 
     /// The fields of a result.
     #[must_use]
     pub const fn result_fields(self) -> &'static [Field] {
-        match self {
-            Self::MoveTo => Topic::IkResult.fields(),
-        }
+        self.entry().result
     }
 
     /// The fields of feedback.
     #[must_use]
     pub const fn feedback_fields(self) -> &'static [Field] {
-        match self {
-            Self::MoveTo => Topic::IkFeedback.fields(),
-        }
+        self.entry().feedback
     }
 }

@@ -1,148 +1,166 @@
-//! The questions of rosapi: how clients of the ROS web world find out what there is.
+//! The questions of rosapi: how clients of the ROS web world find out what there is. One row each.
 //!
 //! Each is served under `/rosapi/` and, as newer versions have it, under `/rosapi_node/`.
 //!
-//! **Invariant:** a question without an entry does not compile.
+//! **Invariant:** every row is named under [`PREFIX`]; the other spelling is made of it.
 
-use super::services::ServiceEntry;
-use super::{Field, Node, optional, required};
+use super::entry::{Field, ServiceEntry, optional, required, service};
+use super::node::Node;
+use super::table::{fields, table};
 
 /// Where the questions stand.
 pub const PREFIX: &str = "/rosapi/";
 /// Where they stand too.
 pub const PRIVATE_PREFIX: &str = "/rosapi_node/";
 
-/// One question.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Rosapi {
-    /// Every topic and its type.
-    Topics,
-    /// The topics of one type.
-    TopicsForType,
-    /// Every topic, its type, and the text that defines the type.
-    TopicsAndRawTypes,
-    /// The type of one topic.
-    TopicType,
-    /// The nodes that publish a topic.
-    Publishers,
-    /// The nodes that subscribe to a topic.
-    Subscribers,
-    /// Every service.
-    Services,
-    /// The services of one type.
-    ServicesForType,
-    /// The type of one service.
-    ServiceType,
-    /// The node that provides a service.
-    ServiceNode,
-    /// The nodes that provide a type of service.
-    ServiceProviders,
-    /// Every node.
-    Nodes,
-    /// What one node subscribes to, publishes and provides.
-    NodeDetails,
-    /// The fields of a message type, and of the types in it.
-    MessageDetails,
-    /// The fields of a request.
-    ServiceRequestDetails,
-    /// The fields of a response.
-    ServiceResponseDetails,
-    /// Every action.
-    ActionServers,
-    /// The type of one action.
-    ActionType,
-    /// The fields of a goal.
-    ActionGoalDetails,
-    /// The fields of a goal's result.
-    ActionResultDetails,
-    /// The fields of a goal's feedback.
-    ActionFeedbackDetails,
-    /// Every type that the runtime knows.
-    Interfaces,
-    /// The value of a parameter, as JSON text.
-    GetParam,
-    /// Sets a parameter.
-    SetParam,
-    /// Whether there is such a parameter.
-    HasParam,
-    /// Deletes a parameter: always refused.
-    DeleteParam,
-    /// Every parameter.
-    GetParamNames,
-    /// The simulation time.
-    GetTime,
-    /// Which ROS this looks like.
-    GetRosVersion,
+table! {
+    /// One question.
+    pub enum Rosapi of ServiceEntry {
+        /// Every topic and its type.
+        Topics = question("/rosapi/topics", "rosapi_msgs/srv/Topics")
+            .response(fields![
+                required("topics", "string[]", ""),
+                required("types", "string[]", ""),
+            ]),
+        /// The topics of one type.
+        TopicsForType = question("/rosapi/topics_for_type", "rosapi_msgs/srv/TopicsForType")
+            .request(fields![required("type", "string", "")])
+            .response(fields![required("topics", "string[]", "")]),
+        /// Every topic, its type, and the text that defines the type.
+        TopicsAndRawTypes = question("/rosapi/topics_and_raw_types", "rosapi_msgs/srv/TopicsAndRawTypes")
+            .response(fields![
+                required("topics", "string[]", ""),
+                required("types", "string[]", ""),
+                required("typedefs_full_text", "string[]", ""),
+            ]),
+        /// The type of one topic.
+        TopicType = question("/rosapi/topic_type", "rosapi_msgs/srv/TopicType")
+            .request(fields![required("topic", "string", "")])
+            .response(fields![required("type", "string", "")]),
+        /// The nodes that publish a topic.
+        Publishers = question("/rosapi/publishers", "rosapi_msgs/srv/Publishers")
+            .request(fields![required("topic", "string", "")])
+            .response(fields![required("publishers", "string[]", "")]),
+        /// The nodes that subscribe to a topic.
+        Subscribers = question("/rosapi/subscribers", "rosapi_msgs/srv/Subscribers")
+            .request(fields![required("topic", "string", "")])
+            .response(fields![required("subscribers", "string[]", "")]),
+        /// Every service.
+        Services = question("/rosapi/services", "rosapi_msgs/srv/Services")
+            .response(fields![required("services", "string[]", "")]),
+        /// The services of one type.
+        ServicesForType = question("/rosapi/services_for_type", "rosapi_msgs/srv/ServicesForType")
+            .request(fields![required("type", "string", "")])
+            .response(fields![required("services", "string[]", "")]),
+        /// The type of one service.
+        ServiceType = question("/rosapi/service_type", "rosapi_msgs/srv/ServiceType")
+            .request(fields![required("service", "string", "")])
+            .response(fields![required("type", "string", "")]),
+        /// The node that provides a service.
+        ServiceNode = question("/rosapi/service_node", "rosapi_msgs/srv/ServiceNode")
+            .request(fields![required("service", "string", "")])
+            .response(fields![required("node", "string", "")]),
+        /// The nodes that provide a type of service.
+        ServiceProviders = question("/rosapi/service_providers", "rosapi_msgs/srv/ServiceProviders")
+            .request(fields![required("service", "string", "")])
+            .response(fields![required("providers", "string[]", "")]),
+        /// Every node.
+        Nodes = question("/rosapi/nodes", "rosapi_msgs/srv/Nodes")
+            .response(fields![required("nodes", "string[]", "")]),
+        /// The topics and services of one node.
+        NodeDetails = question("/rosapi/node_details", "rosapi_msgs/srv/NodeDetails")
+            .request(fields![required("node", "string", "")])
+            .response(fields![
+                required("subscribing", "string[]", ""),
+                required("publishing", "string[]", ""),
+                required("services", "string[]", ""),
+            ]),
+        /// The fields of a message type, and of the types in it.
+        MessageDetails = question("/rosapi/message_details", "rosapi_msgs/srv/MessageDetails")
+            .request(fields![required("type", "string", "")])
+            .response(&TYPEDEFS),
+        /// The fields of a request.
+        ServiceRequestDetails = question("/rosapi/service_request_details", "rosapi_msgs/srv/ServiceRequestDetails")
+            .request(fields![required("type", "string", "")])
+            .response(&TYPEDEFS),
+        /// The fields of a response.
+        ServiceResponseDetails = question("/rosapi/service_response_details", "rosapi_msgs/srv/ServiceResponseDetails")
+            .request(fields![required("type", "string", "")])
+            .response(&TYPEDEFS),
+        /// Every action.
+        ActionServers = question("/rosapi/action_servers", "rosapi_msgs/srv/GetActionServers")
+            .response(fields![required("action_servers", "string[]", "")]),
+        /// The type of one action.
+        ActionType = question("/rosapi/action_type", "rosapi_msgs/srv/ActionType")
+            .request(fields![required("action", "string", "")])
+            .response(fields![required("type", "string", "")]),
+        /// The fields of a goal.
+        ActionGoalDetails = question("/rosapi/action_goal_details", "rosapi_msgs/srv/ActionGoalDetails")
+            .request(fields![required("type", "string", "")])
+            .response(&TYPEDEFS),
+        /// The fields of a goal's result.
+        ActionResultDetails = question("/rosapi/action_result_details", "rosapi_msgs/srv/ActionResultDetails")
+            .request(fields![required("type", "string", "")])
+            .response(&TYPEDEFS),
+        /// The fields of a goal's feedback.
+        ActionFeedbackDetails = question("/rosapi/action_feedback_details", "rosapi_msgs/srv/ActionFeedbackDetails")
+            .request(fields![required("type", "string", "")])
+            .response(&TYPEDEFS),
+        /// Every type that the runtime knows.
+        Interfaces = question("/rosapi/interfaces", "rosapi_msgs/srv/Interfaces")
+            .response(fields![required("interfaces", "string[]", "")]),
+        /// The value of a parameter, as JSON text.
+        GetParam = question("/rosapi/get_param", "rosapi_msgs/srv/GetParam")
+            .request(fields![
+                required("name", "string", ""),
+                optional("default_value", "string", ""),
+            ])
+            .response(fields![
+                required("value", "string", ""),
+                required("successful", "bool", ""),
+                required("reason", "string", ""),
+            ]),
+        /// Sets a parameter.
+        SetParam = question("/rosapi/set_param", "rosapi_msgs/srv/SetParam")
+            .request(fields![
+                required("name", "string", ""),
+                required("value", "string", ""),
+            ])
+            .response(&DONE),
+        /// Whether there is such a parameter.
+        HasParam = question("/rosapi/has_param", "rosapi_msgs/srv/HasParam")
+            .request(fields![required("name", "string", "")])
+            .response(fields![required("exists", "bool", "")]),
+        /// Deletes a parameter: always refused.
+        DeleteParam = question("/rosapi/delete_param", "rosapi_msgs/srv/DeleteParam")
+            .request(fields![required("name", "string", "")])
+            .response(&DONE),
+        /// Every parameter.
+        GetParamNames = question("/rosapi/get_param_names", "rosapi_msgs/srv/GetParamNames")
+            .response(fields![required("names", "string[]", "")]),
+        /// The simulation time.
+        GetTime = question("/rosapi/get_time", "rosapi_msgs/srv/GetTime")
+            .response(fields![required("time", "builtin_interfaces/msg/Time", "s, ns")]),
+        /// Which ROS this looks like.
+        GetRosVersion = question("/rosapi/get_ros_version", "rosapi_msgs/srv/GetROSVersion")
+            .response(fields![
+                required("version", "uint8", ""),
+                required("distro", "string", ""),
+            ]),
+    }
 }
 
+const fn question(name: &'static str, type_name: &'static str) -> ServiceEntry {
+    service(name, type_name, Node::Rosapi)
+}
+
+const TYPEDEFS: [Field; 1] = [required("typedefs", "rosapi_msgs/msg/TypeDef[]", "")];
+const DONE: [Field; 2] = [
+    required("successful", "bool", ""),
+    required("reason", "string", ""),
+];
+
 impl Rosapi {
-    /// All questions, in the order in which they are documented.
-    pub const ALL: [Self; 29] = [
-        Self::Topics,
-        Self::TopicsForType,
-        Self::TopicsAndRawTypes,
-        Self::TopicType,
-        Self::Publishers,
-        Self::Subscribers,
-        Self::Services,
-        Self::ServicesForType,
-        Self::ServiceType,
-        Self::ServiceNode,
-        Self::ServiceProviders,
-        Self::Nodes,
-        Self::NodeDetails,
-        Self::MessageDetails,
-        Self::ServiceRequestDetails,
-        Self::ServiceResponseDetails,
-        Self::ActionServers,
-        Self::ActionType,
-        Self::ActionGoalDetails,
-        Self::ActionResultDetails,
-        Self::ActionFeedbackDetails,
-        Self::Interfaces,
-        Self::GetParam,
-        Self::SetParam,
-        Self::HasParam,
-        Self::DeleteParam,
-        Self::GetParamNames,
-        Self::GetTime,
-        Self::GetRosVersion,
-    ];
-
-    pub(super) const fn entry(self) -> &'static ServiceEntry {
-        match self {
-            Self::Topics => &TOPICS,
-            Self::TopicsForType => &TOPICS_FOR_TYPE,
-            Self::TopicsAndRawTypes => &TOPICS_AND_RAW_TYPES,
-            Self::TopicType => &TOPIC_TYPE,
-            Self::Publishers => &PUBLISHERS,
-            Self::Subscribers => &SUBSCRIBERS,
-            Self::Services => &SERVICES,
-            Self::ServicesForType => &SERVICES_FOR_TYPE,
-            Self::ServiceType => &SERVICE_TYPE,
-            Self::ServiceNode => &SERVICE_NODE,
-            Self::ServiceProviders => &SERVICE_PROVIDERS,
-            Self::Nodes => &NODES,
-            Self::NodeDetails => &NODE_DETAILS,
-            Self::MessageDetails => &MESSAGE_DETAILS,
-            Self::ServiceRequestDetails => &SERVICE_REQUEST_DETAILS,
-            Self::ServiceResponseDetails => &SERVICE_RESPONSE_DETAILS,
-            Self::ActionServers => &ACTION_SERVERS,
-            Self::ActionType => &ACTION_TYPE,
-            Self::ActionGoalDetails => &ACTION_GOAL_DETAILS,
-            Self::ActionResultDetails => &ACTION_RESULT_DETAILS,
-            Self::ActionFeedbackDetails => &ACTION_FEEDBACK_DETAILS,
-            Self::Interfaces => &INTERFACES,
-            Self::GetParam => &GET_PARAM,
-            Self::SetParam => &SET_PARAM,
-            Self::HasParam => &HAS_PARAM,
-            Self::DeleteParam => &DELETE_PARAM,
-            Self::GetParamNames => &GET_PARAM_NAMES,
-            Self::GetTime => &GET_TIME,
-            Self::GetRosVersion => &GET_ROS_VERSION,
-        }
-    }
-
     /// The question without a prefix: `topics`.
     #[must_use]
     pub fn short_name(self) -> &'static str {
@@ -161,223 +179,3 @@ impl Rosapi {
             .find(|question| question.short_name() == short)
     }
 }
-
-const fn question(
-    name: &'static str,
-    type_name: &'static str,
-    request: &'static [Field],
-    response: &'static [Field],
-) -> ServiceEntry {
-    ServiceEntry {
-        name,
-        type_name,
-        owner: Node::Rosapi,
-        request,
-        response,
-    }
-}
-
-const TYPEDEFS: [Field; 1] = [required("typedefs", "rosapi_msgs/msg/TypeDef[]", "")];
-const DONE: [Field; 2] = [
-    required("successful", "bool", ""),
-    required("reason", "string", ""),
-];
-
-const TOPICS: ServiceEntry = question(
-    "/rosapi/topics",
-    "rosapi_msgs/srv/Topics",
-    &[],
-    &[
-        required("topics", "string[]", ""),
-        required("types", "string[]", ""),
-    ],
-);
-const TOPICS_FOR_TYPE: ServiceEntry = question(
-    "/rosapi/topics_for_type",
-    "rosapi_msgs/srv/TopicsForType",
-    &[required("type", "string", "")],
-    &[required("topics", "string[]", "")],
-);
-const TOPICS_AND_RAW_TYPES: ServiceEntry = question(
-    "/rosapi/topics_and_raw_types",
-    "rosapi_msgs/srv/TopicsAndRawTypes",
-    &[],
-    &[
-        required("topics", "string[]", ""),
-        required("types", "string[]", ""),
-        required("typedefs_full_text", "string[]", ""),
-    ],
-);
-const TOPIC_TYPE: ServiceEntry = question(
-    "/rosapi/topic_type",
-    "rosapi_msgs/srv/TopicType",
-    &[required("topic", "string", "")],
-    &[required("type", "string", "")],
-);
-const PUBLISHERS: ServiceEntry = question(
-    "/rosapi/publishers",
-    "rosapi_msgs/srv/Publishers",
-    &[required("topic", "string", "")],
-    &[required("publishers", "string[]", "")],
-);
-const SUBSCRIBERS: ServiceEntry = question(
-    "/rosapi/subscribers",
-    "rosapi_msgs/srv/Subscribers",
-    &[required("topic", "string", "")],
-    &[required("subscribers", "string[]", "")],
-);
-const SERVICES: ServiceEntry = question(
-    "/rosapi/services",
-    "rosapi_msgs/srv/Services",
-    &[],
-    &[required("services", "string[]", "")],
-);
-const SERVICES_FOR_TYPE: ServiceEntry = question(
-    "/rosapi/services_for_type",
-    "rosapi_msgs/srv/ServicesForType",
-    &[required("type", "string", "")],
-    &[required("services", "string[]", "")],
-);
-const SERVICE_TYPE: ServiceEntry = question(
-    "/rosapi/service_type",
-    "rosapi_msgs/srv/ServiceType",
-    &[required("service", "string", "")],
-    &[required("type", "string", "")],
-);
-const SERVICE_NODE: ServiceEntry = question(
-    "/rosapi/service_node",
-    "rosapi_msgs/srv/ServiceNode",
-    &[required("service", "string", "")],
-    &[required("node", "string", "")],
-);
-const SERVICE_PROVIDERS: ServiceEntry = question(
-    "/rosapi/service_providers",
-    "rosapi_msgs/srv/ServiceProviders",
-    &[required("service", "string", "")],
-    &[required("providers", "string[]", "")],
-);
-const NODES: ServiceEntry = question(
-    "/rosapi/nodes",
-    "rosapi_msgs/srv/Nodes",
-    &[],
-    &[required("nodes", "string[]", "")],
-);
-const NODE_DETAILS: ServiceEntry = question(
-    "/rosapi/node_details",
-    "rosapi_msgs/srv/NodeDetails",
-    &[required("node", "string", "")],
-    &[
-        required("subscribing", "string[]", ""),
-        required("publishing", "string[]", ""),
-        required("services", "string[]", ""),
-    ],
-);
-const MESSAGE_DETAILS: ServiceEntry = question(
-    "/rosapi/message_details",
-    "rosapi_msgs/srv/MessageDetails",
-    &[required("type", "string", "")],
-    &TYPEDEFS,
-);
-const SERVICE_REQUEST_DETAILS: ServiceEntry = question(
-    "/rosapi/service_request_details",
-    "rosapi_msgs/srv/ServiceRequestDetails",
-    &[required("type", "string", "")],
-    &TYPEDEFS,
-);
-const SERVICE_RESPONSE_DETAILS: ServiceEntry = question(
-    "/rosapi/service_response_details",
-    "rosapi_msgs/srv/ServiceResponseDetails",
-    &[required("type", "string", "")],
-    &TYPEDEFS,
-);
-const ACTION_SERVERS: ServiceEntry = question(
-    "/rosapi/action_servers",
-    "rosapi_msgs/srv/GetActionServers",
-    &[],
-    &[required("action_servers", "string[]", "")],
-);
-const ACTION_TYPE: ServiceEntry = question(
-    "/rosapi/action_type",
-    "rosapi_msgs/srv/ActionType",
-    &[required("action", "string", "")],
-    &[required("type", "string", "")],
-);
-const ACTION_GOAL_DETAILS: ServiceEntry = question(
-    "/rosapi/action_goal_details",
-    "rosapi_msgs/srv/ActionGoalDetails",
-    &[required("type", "string", "")],
-    &TYPEDEFS,
-);
-const ACTION_RESULT_DETAILS: ServiceEntry = question(
-    "/rosapi/action_result_details",
-    "rosapi_msgs/srv/ActionResultDetails",
-    &[required("type", "string", "")],
-    &TYPEDEFS,
-);
-const ACTION_FEEDBACK_DETAILS: ServiceEntry = question(
-    "/rosapi/action_feedback_details",
-    "rosapi_msgs/srv/ActionFeedbackDetails",
-    &[required("type", "string", "")],
-    &TYPEDEFS,
-);
-const INTERFACES: ServiceEntry = question(
-    "/rosapi/interfaces",
-    "rosapi_msgs/srv/Interfaces",
-    &[],
-    &[required("interfaces", "string[]", "")],
-);
-const GET_PARAM: ServiceEntry = question(
-    "/rosapi/get_param",
-    "rosapi_msgs/srv/GetParam",
-    &[
-        required("name", "string", ""),
-        optional("default_value", "string", ""),
-    ],
-    &[
-        required("value", "string", ""),
-        required("successful", "bool", ""),
-        required("reason", "string", ""),
-    ],
-);
-const SET_PARAM: ServiceEntry = question(
-    "/rosapi/set_param",
-    "rosapi_msgs/srv/SetParam",
-    &[
-        required("name", "string", ""),
-        required("value", "string", ""),
-    ],
-    &DONE,
-);
-const HAS_PARAM: ServiceEntry = question(
-    "/rosapi/has_param",
-    "rosapi_msgs/srv/HasParam",
-    &[required("name", "string", "")],
-    &[required("exists", "bool", "")],
-);
-const DELETE_PARAM: ServiceEntry = question(
-    "/rosapi/delete_param",
-    "rosapi_msgs/srv/DeleteParam",
-    &[required("name", "string", "")],
-    &DONE,
-);
-const GET_PARAM_NAMES: ServiceEntry = question(
-    "/rosapi/get_param_names",
-    "rosapi_msgs/srv/GetParamNames",
-    &[],
-    &[required("names", "string[]", "")],
-);
-const GET_TIME: ServiceEntry = question(
-    "/rosapi/get_time",
-    "rosapi_msgs/srv/GetTime",
-    &[],
-    &[required("time", "builtin_interfaces/msg/Time", "s, ns")],
-);
-const GET_ROS_VERSION: ServiceEntry = question(
-    "/rosapi/get_ros_version",
-    "rosapi_msgs/srv/GetROSVersion",
-    &[],
-    &[
-        required("version", "uint8", ""),
-        required("distro", "string", ""),
-    ],
-);

@@ -1,68 +1,19 @@
 //! The message types: what the runtime's own topics carry, and what is inside.
 //!
-//! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its end.
+//! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its
+//! end.
 
-use super::{Field, Topic, required};
+pub use super::entry::{Constant, Count, Type};
+use super::entry::{Field, byte, message, required};
+use super::topics::Topic;
 use crate::protocol::names;
 
 /// Stands between the definitions of a type and of the types in it: 80 of these in a line.
 const SEPARATOR: &str = "=";
 
-/// A message type.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Type {
-    /// Its name, as ROS writes it: `std_msgs/msg/Header`.
-    pub name: &'static str,
-    /// Its fields, in the order of the definition.
-    pub fields: &'static [Field],
-    /// Its constants.
-    pub constants: &'static [Constant],
-}
-
-/// A named value of a type.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Constant {
-    /// `WARN`.
-    pub name: &'static str,
-    /// `byte`.
-    pub kind: &'static str,
-    /// `30`.
-    pub value: &'static str,
-}
-
-/// How often a field's type is there.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Count {
-    /// Once.
-    One,
-    /// Any number of times: `float64[]`.
-    Any,
-}
-
-impl Field {
-    /// The field's type without brackets, and how often it is there.
-    #[must_use]
-    pub fn element(&self) -> (&'static str, Count) {
-        match self.kind.strip_suffix("[]") {
-            Some(kind) => (kind, Count::Any),
-            None => (self.kind, Count::One),
-        }
-    }
-}
-
 /// All message types: those of the topics, then those inside.
 pub fn all() -> impl Iterator<Item = Type> {
-    let of_topics = Topic::ALL.into_iter().map(|topic| Type {
-        name: topic.type_name(),
-        fields: topic.fields(),
-        constants: constants(topic.type_name()),
-    });
-    let inside = PARTS.into_iter().map(|(name, fields)| Type {
-        name,
-        fields,
-        constants: constants(name),
-    });
-    of_topics.chain(inside)
+    Topic::ALL.into_iter().map(Topic::message).chain(PARTS)
 }
 
 /// The type of that name; its middle part may be left out.
@@ -127,17 +78,17 @@ const TIME: [Field; 2] = [
 ];
 
 /// The types inside others.
-const PARTS: [(&str, &[Field]); 12] = [
-    (
+const PARTS: [Type; 12] = [
+    message(
         "std_msgs/msg/Header",
         &[
             required("stamp", "builtin_interfaces/msg/Time", "s, ns"),
             required("frame_id", "string", ""),
         ],
     ),
-    ("builtin_interfaces/msg/Time", &TIME),
-    ("builtin_interfaces/msg/Duration", &TIME),
-    (
+    message("builtin_interfaces/msg/Time", &TIME),
+    message("builtin_interfaces/msg/Duration", &TIME),
+    message(
         "trajectory_msgs/msg/JointTrajectoryPoint",
         &[
             required("positions", "float64[]", "rad"),
@@ -151,7 +102,7 @@ const PARTS: [(&str, &[Field]); 12] = [
             ),
         ],
     ),
-    (
+    message(
         "diagnostic_msgs/msg/DiagnosticStatus",
         &[
             required("level", "byte", ""),
@@ -160,15 +111,16 @@ const PARTS: [(&str, &[Field]); 12] = [
             required("hardware_id", "string", ""),
             required("values", "diagnostic_msgs/msg/KeyValue[]", ""),
         ],
-    ),
-    (
+    )
+    .constants(&HEALTH),
+    message(
         "diagnostic_msgs/msg/KeyValue",
         &[
             required("key", "string", ""),
             required("value", "string", ""),
         ],
     ),
-    (
+    message(
         "pendularm_interfaces/msg/Target",
         &[
             required("x", "float64", "m"),
@@ -176,7 +128,7 @@ const PARTS: [(&str, &[Field]); 12] = [
             required("phi", "float64", "rad"),
         ],
     ),
-    (
+    message(
         "geometry_msgs/msg/TransformStamped",
         &[
             required("header", "std_msgs/msg/Header", ""),
@@ -184,15 +136,15 @@ const PARTS: [(&str, &[Field]); 12] = [
             required("transform", "geometry_msgs/msg/Transform", "m"),
         ],
     ),
-    (
+    message(
         "geometry_msgs/msg/Transform",
         &[
             required("translation", "geometry_msgs/msg/Vector3", "m"),
             required("rotation", "geometry_msgs/msg/Quaternion", ""),
         ],
     ),
-    ("geometry_msgs/msg/Vector3", &XYZ),
-    (
+    message("geometry_msgs/msg/Vector3", &XYZ),
+    message(
         "geometry_msgs/msg/Quaternion",
         &[
             required("x", "float64", "1"),
@@ -201,7 +153,7 @@ const PARTS: [(&str, &[Field]); 12] = [
             required("w", "float64", "1"),
         ],
     ),
-    (
+    message(
         "rosapi_msgs/msg/TypeDef",
         &[
             required("type", "string", ""),
@@ -221,29 +173,6 @@ const XYZ: [Field; 3] = [
     required("z", "float64", "m"),
 ];
 
-fn constants(name: &str) -> &'static [Constant] {
-    match name {
-        "rcl_interfaces/msg/Log" => &LOG_LEVELS,
-        "diagnostic_msgs/msg/DiagnosticStatus" => &HEALTH,
-        _ => &[],
-    }
-}
-
-const fn byte(name: &'static str, value: &'static str) -> Constant {
-    Constant {
-        name,
-        kind: "byte",
-        value,
-    }
-}
-
-const LOG_LEVELS: [Constant; 5] = [
-    byte("DEBUG", "10"),
-    byte("INFO", "20"),
-    byte("WARN", "30"),
-    byte("ERROR", "40"),
-    byte("FATAL", "50"),
-];
 const HEALTH: [Constant; 4] = [
     byte("OK", "0"),
     byte("WARN", "1"),

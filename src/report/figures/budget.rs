@@ -2,16 +2,16 @@
 //!
 //! **Invariant:** the parts are measured each on its own; their sum bounds the whole.
 
-use super::super::Desk;
-use super::super::csv::Csv;
-use super::super::section::{Block, Cell, Figure, Section, Table, Verdict};
-use super::super::svg::{
+use super::slope::slope;
+use crate::math::integrator::Method;
+use crate::report::csv::Csv;
+use crate::report::experiments::budget::{Budget, Parts};
+use crate::report::experiments::error::OUTPUTS;
+use crate::report::making::Making;
+use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::svg::{
     Axis, Key, Marker, Plot, Point, Series, Unit, number, scientific, seconds,
 };
-use super::slope;
-use crate::math::integrator::Method;
-use crate::study::budget::{Budget, Parts};
-use crate::study::error::OUTPUTS;
 
 const DURATION: f64 = 2.0;
 const METHODS: [Method; 3] = [Method::Euler, Method::Verlet, Method::Rk4];
@@ -23,8 +23,8 @@ struct Panel {
     parts: Vec<Parts>,
 }
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
-    let halvings = desk.choose(9, 5);
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let halvings = making.choose(9, 5);
     let mut panels = Vec::new();
     let mut done = 0;
     for control in [false, true] {
@@ -44,11 +44,11 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
             // Each halving costs as much as all before it.
             done += OUTPUTS << halving;
             let of = 2 * ((OUTPUTS << (halvings + 1)) - OUTPUTS);
-            desk.at(to_usize(done), to_usize(of));
+            making.at(to_usize(done), to_usize(of));
         }
         panels.append(&mut columns);
     }
-    desk.keep("error-budget", rows(&panels));
+    making.keep("error-budget", rows(&panels));
     Section {
         findings: findings(&panels),
         verdicts: verdicts(&panels),
@@ -221,8 +221,28 @@ fn findings(panels: &[Panel]) -> Vec<String> {
     let rk4 = panels
         .iter()
         .find(|panel| panel.control && panel.method == Method::Rk4);
-    let near = rk4.and_then(|panel| panel.parts.iter().find(|parts| parts.timestep < 1.5e-3));
-    if let Some(parts) = near {
+    let near = |panel: &'_ Panel| {
+        let parts = panel.parts.iter();
+        parts.copied().find(|parts| parts.timestep < 1.5e-3)
+    };
+    let euler = panels
+        .iter()
+        .find(|panel| panel.control && panel.method == Method::Euler);
+    if let (Some(euler), Some(rk4)) = (euler.and_then(near), rk4.and_then(near)) {
+        let part = euler.total / rk4.total;
+        findings.push(format!(
+            "**All told, hold and truncation, Euler is off by {} rad at {} on this move and RK4 by {} rad**: {}.",
+            scientific(euler.total),
+            seconds(rk4.timestep),
+            scientific(rk4.total),
+            if part < 0.9 {
+                "Euler's truncation happens to cancel part of the hold, which makes it no better method"
+            } else {
+                "the hold is all that shows"
+            }
+        ));
+    }
+    if let Some(parts) = rk4.and_then(near) {
         findings.push(format!(
             "**At a control period of {} holding the effort costs {} rad, RK4's truncation {} and rounding {}**: a better method cannot make \
              good what the control period loses.",

@@ -2,13 +2,13 @@
 //!
 //! **Invariant:** drift is divided by the arm's energy scale, never by its energy, which is 0 at the start.
 
-use super::super::Desk;
-use super::super::csv::Csv;
-use super::super::section::{Block, Figure, Section, Verdict};
-use super::super::svg::{Axis, Key, Plot, Series, Unit, number, scientific, seconds};
 use crate::math::arm::{Arm, State};
 use crate::math::integrator::Method;
-use crate::study::chaos::energy_drift;
+use crate::report::csv::Csv;
+use crate::report::experiments::chaos::energy_drift;
+use crate::report::making::Making;
+use crate::report::section::{Block, Figure, Section, Verdict};
+use crate::report::svg::{Axis, Key, Plot, Series, Unit, number, scientific, seconds};
 
 const TIMESTEP: f64 = 1e-3;
 
@@ -19,8 +19,8 @@ struct Panel {
     duration: f64,
 }
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
-    let duration = desk.choose(1000.0, 60.0);
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let duration = making.choose(1000.0, 60.0);
     let hanging = -std::f64::consts::FRAC_PI_2;
     let regular = State {
         position: [hanging + 0.3, 0.0],
@@ -50,7 +50,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
             "Chaotic swing, 3 links from horizontal",
             energy_drift(&three, &State::rest(), method, TIMESTEP, duration),
         );
-        desk.at(index + 1, Method::ALL.len());
+        making.at(index + 1, Method::ALL.len());
     }
     let mut csv = Csv::new("scene,method,dt,t,dE_max_scaled");
     for panel in &panels {
@@ -64,7 +64,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
             ]);
         }
     }
-    desk.keep("energy-drift", csv);
+    making.keep("energy-drift", csv);
     Section {
         findings: findings(&panels),
         verdicts: verdicts(&panels),

@@ -2,14 +2,15 @@
 //!
 //! **Invariant:** an error is shown only where the reference is known better.
 
-use super::super::Desk;
-use super::super::csv::Csv;
-use super::super::section::{Block, Cell, Figure, Section, Table, Verdict};
-use super::super::svg::{Axis, Key, Mark, Plot, Series, Unit, number, seconds};
 use crate::math::arm::{Arm, State};
+use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
-use crate::study::chaos::{HORIZON_ERROR, horizon, lyapunov_rate, separation};
-use crate::study::reference::{Law, Reference};
+use crate::report::csv::Csv;
+use crate::report::experiments::chaos::{HORIZON_ERROR, horizon, lyapunov_rate, separation};
+use crate::report::experiments::reference::{Law, Reference};
+use crate::report::making::Making;
+use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::svg::{Axis, Key, Mark, Plot, Series, Unit, number, seconds};
 
 /// Time between samples \[s\], a multiple of every timestep.
 const SPACING: f64 = 1.0 / 16.0;
@@ -17,7 +18,10 @@ const SPACING: f64 = 1.0 / 16.0;
 /// Steps per sample: timesteps of 1/64, 1/256, … s.
 const EVERY: [u64; 5] = [4, 16, 64, 256, 1024];
 
-/// What is shown over time.
+/// Steps per sample of Runge-Kutta 4 alone, of 15 and 4 µs: its truncation is far below rounding there.
+const FINE: [u64; 2] = [4096, 16384];
+
+/// Steps per sample of the runs that are shown over time.
 const SHOWN: u64 = 64;
 
 struct Swing {
@@ -30,9 +34,12 @@ struct Swing {
     runs: Vec<(Method, u64, Vec<f64>)>,
 }
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
-    let samples = desk.choose(640, 192);
-    let swings = [swing::<2>(desk, samples, 0), swing::<3>(desk, samples, 1)];
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let samples = making.choose(640, 192);
+    let swings = [
+        swing::<2>(making, samples, 0),
+        swing::<3>(making, samples, 1),
+    ];
     let mut csv = Csv::new("links,method,dt,t,err_rad");
     for swing in &swings {
         for (method, every, errors) in &swing.runs {
@@ -47,7 +54,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
             }
         }
     }
-    desk.keep("separation", csv);
+    making.keep("separation", csv);
     let mut section = Section {
         findings: swings.iter().filter_map(finding).collect(),
         verdicts: swings.iter().map(verdict).collect(),
@@ -58,7 +65,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     section
 }
 
-fn swing<const N: usize>(desk: &mut Desk<'_>, samples: usize, before: usize) -> Swing {
+fn swing<const N: usize>(making: &mut Making<'_>, samples: usize, before: usize) -> Swing {
     let (arm, start) = (Arm::<N>::default(), State::rest());
     let reference = Reference::of(&arm, &start, &Law::FREE, SPACING, samples);
     let known = reference
@@ -75,10 +82,17 @@ fn swing<const N: usize>(desk: &mut Desk<'_>, samples: usize, before: usize) -> 
             errors.truncate(known);
             runs.push((method, every, errors));
         }
-        desk.at(before * parts + index + 1, 2 * parts);
+        making.at(before * parts + index + 1, 2 * parts);
     }
-    let rate = lyapunov_rate(&arm, &start, desk.choose(600.0, 60.0));
-    desk.at((before + 1) * parts, 2 * parts);
+    // They take seconds each, which a quick look does not have.
+    for every in FINE.into_iter().filter(|_| !making.quick) {
+        let h = timestep(every);
+        let mut errors = separation(&arm, &start, Method::Rk4, h, every, &reference);
+        errors.truncate(known);
+        runs.push((Method::Rk4, every, errors));
+    }
+    let rate = lyapunov_rate(&arm, &start, making.choose(600.0, 60.0));
+    making.at((before + 1) * parts, 2 * parts);
     Swing {
         links: N,
         known,
@@ -87,17 +101,12 @@ fn swing<const N: usize>(desk: &mut Desk<'_>, samples: usize, before: usize) -> 
     }
 }
 
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "counts of samples are far below 2^53"
-)]
 fn time(index: usize) -> f64 {
-    (index + 1) as f64 * SPACING
+    length_in_f64(index + 1) * SPACING
 }
 
-#[allow(clippy::cast_precision_loss, reason = "steps per sample are few")]
 fn timestep(every: u64) -> f64 {
-    SPACING / every as f64
+    SPACING / in_f64(every)
 }
 
 impl Swing {
@@ -107,6 +116,12 @@ impl Swing {
             .iter()
             .find(|run| run.0 == method && run.1 == every)?;
         horizon(&run.2, SPACING)
+    }
+
+    fn has(&self, method: Method, every: u64) -> bool {
+        self.runs
+            .iter()
+            .any(|run| run.0 == method && run.1 == every)
     }
 
     fn known_until(&self) -> f64 {
@@ -188,8 +203,7 @@ fn headline(swings: &[Swing]) -> String {
     let words: Vec<String> = swings
         .iter()
         .map(|swing| {
-            let last = EVERY
-                .into_iter()
+            let last = (EVERY.into_iter().chain(FINE))
                 .filter_map(|every| swing.horizon(Method::Rk4, every))
                 .fold(0.0, f64::max);
             format!("{} links: {} s", swing.links, number(last))
@@ -203,7 +217,8 @@ fn headline(swings: &[Swing]) -> String {
 
 fn table(swings: &[Swing]) -> Table {
     let mut head = vec!["Swing".to_owned(), "Method".to_owned()];
-    head.extend(EVERY.map(|every| format!("dt {}", seconds(timestep(every)))));
+    let every = || EVERY.into_iter().chain(FINE);
+    head.extend(every().map(|every| format!("dt {}", seconds(timestep(every)))));
     head.push("Lyapunov time".to_owned());
     let head: Vec<&str> = head.iter().map(String::as_str).collect();
     let mut table = Table::new(
@@ -218,7 +233,11 @@ fn table(swings: &[Swing]) -> Table {
                 Cell::new(format!("{} links", swing.links)),
                 Cell::method(method),
             ];
-            for every in EVERY {
+            for every in every() {
+                if !swing.has(method, every) {
+                    row.push(Cell::new("not run").class("soft"));
+                    continue;
+                }
                 row.push(match swing.horizon(method, every) {
                     Some(at) => Cell::new(number(at)),
                     None => Cell::new(format!("after {}", number(swing.known_until())))
@@ -244,16 +263,32 @@ fn table(swings: &[Swing]) -> Table {
 fn finding(swing: &Swing) -> Option<String> {
     let coarse = swing.horizon(Method::Rk4, 64)?;
     let fine = swing.horizon(Method::Rk4, 1024)?;
+    let floor = FINE
+        .into_iter()
+        .filter_map(|every| Some((every, swing.horizon(Method::Rk4, every)?)));
+    let end = floor.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(every, at)| {
+        // What truncation alone would buy: the fourth power of the ratio of timesteps.
+        let ratio = timestep(1024) / timestep(every);
+        let bought = ratio.powi(4).ln() * swing.lyapunov_time();
+        format!(
+            " With steps of {} it is {} s, {} s later, where truncation alone would have bought {} s: rounding ends it.",
+            seconds(timestep(every)),
+            number(at),
+            number(at - fine),
+            number(bought)
+        )
+    });
     Some(format!(
         "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every {} s, so sixteen times the work \
-         buys {} s.",
+         buys {} s.{}",
         swing.links,
         number(coarse),
         seconds(timestep(64)),
         number(fine),
         seconds(timestep(1024)),
         number(swing.lyapunov_time()),
-        number(fine - coarse)
+        number(fine - coarse),
+        end.unwrap_or_default()
     ))
 }
 

@@ -8,10 +8,11 @@ mod drift;
 mod error;
 mod horizon;
 mod scenarios;
+mod slope;
 mod stability;
 mod work;
 
-use super::Desk;
+use super::making::Making;
 use super::section::Section;
 
 /// How a section is made.
@@ -21,7 +22,7 @@ pub(crate) struct Maker {
     pub(crate) title: &'static str,
     /// About how many seconds it takes.
     pub(crate) weight: f64,
-    pub(crate) make: fn(&mut Desk<'_>) -> Section,
+    pub(crate) make: fn(&mut Making<'_>) -> Section,
 }
 
 /// All sections in the order in which they are made and shown.
@@ -75,21 +76,3 @@ pub(crate) const SECTIONS: [Maker; 8] = [
         make: work::make,
     },
 ];
-
-/// Slope of the least-squares line through `(log x, log y)`; `None` for fewer than two points.
-pub(crate) fn slope(points: impl IntoIterator<Item = (f64, f64)>) -> Option<f64> {
-    let logs: Vec<(f64, f64)> = points.into_iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    if logs.len() < 2 {
-        return None;
-    }
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "counts of points are far below 2^53"
-    )]
-    let count = logs.len() as f64;
-    let mean_x = logs.iter().map(|p| p.0).sum::<f64>() / count;
-    let mean_y = logs.iter().map(|p| p.1).sum::<f64>() / count;
-    let along: f64 = logs.iter().map(|p| (p.0 - mean_x) * (p.1 - mean_y)).sum();
-    let spread: f64 = logs.iter().map(|p| (p.0 - mean_x).powi(2)).sum();
-    Some(along / spread)
-}

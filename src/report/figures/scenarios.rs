@@ -2,12 +2,12 @@
 //!
 //! **Invariant:** a scene that is not run is listed as not run, one that falls short as falling short.
 
-use super::super::Desk;
-use super::super::csv::Csv;
-use super::super::section::{Block, Cell, Section, Table, Verdict};
-use crate::study::scenarios;
+use crate::report::csv::Csv;
+use crate::report::experiments::scenarios;
+use crate::report::making::Making;
+use crate::report::section::{Block, Cell, Section, Table, Verdict};
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
+pub(super) fn make(making: &mut Making<'_>) -> Section {
     let all = scenarios::all();
     let mut table = Table::new(
         "scenarios",
@@ -19,7 +19,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     let (mut run, mut short) = (0, Vec::new());
     for (index, scene) in all.iter().enumerate() {
         // Slow ones take seconds each, which a quick look does not have.
-        let verdict = (!scene.slow || !desk.quick).then(|| scene.run());
+        let verdict = (!scene.slow || !making.quick).then(|| scene.run());
         let (observed, cell) = match &verdict {
             Some(verdict) => (verdict.observed.as_str(), Cell::verdict(verdict.holds)),
             None => (
@@ -51,9 +51,9 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
             Cell::new(observed),
             cell,
         ]);
-        desk.at(index + 1, all.len());
+        making.at(index + 1, all.len());
     }
-    desk.keep("scenarios", csv);
+    making.keep("scenarios", csv);
     let held = run - short.len();
     let mut finding = format!("**{held} of {run} stiff and extreme scenes do as theory says**");
     if short.is_empty() {

@@ -17,6 +17,7 @@ pub(crate) use plot::Plot;
 
 use std::fmt::Write;
 
+use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 
 /// Classes that plots use, for the page and for files of their own.
@@ -202,7 +203,10 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
     };
     let rows = panels.len().div_ceil(columns);
     let header = 62.0;
-    let (width, height) = (WIDTH * in_f64(columns), HEIGHT * in_f64(rows) + header);
+    let (width, height) = (
+        WIDTH * length_in_f64(columns),
+        HEIGHT * length_in_f64(rows) + header,
+    );
     let mut out = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\">\
          <style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
@@ -217,12 +221,12 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
             "<g transform=\"translate({x} 40)\">{swatch}<text class=\"label\" x=\"34\" y=\"10\">{}</text></g>",
             escape(&key.label)
         );
-        x += 52.0 + 6.6 * in_f64(key.label.chars().count());
+        x += 52.0 + 6.6 * length_in_f64(key.label.chars().count());
     }
     for (index, panel) in panels.iter().enumerate() {
         let (x, y) = (
-            WIDTH * in_f64(index % columns),
-            header + HEIGHT * in_f64(index / columns),
+            WIDTH * length_in_f64(index % columns),
+            header + HEIGHT * length_in_f64(index / columns),
         );
         let placed = panel.replacen(
             "<svg ",
@@ -241,12 +245,4 @@ pub(crate) fn escape(text: &str) -> String {
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "counts of panels and letters are far below 2^53"
-)]
-fn in_f64(count: usize) -> f64 {
-    count as f64
 }

@@ -1,10 +1,11 @@
-//! What an offline run is asked for, and why it is refused.
+//! The request for an offline run, and why it is refused.
 //!
 //! **Invariant:** a plan that passes has a bounded number of steps and samples, and no number that is not finite.
 
-use crate::math::arm::{Arm, State};
-use crate::math::integrator::Method;
-use crate::math::pid::{Gains, Setpoint};
+use crate::math::arm::State;
+use crate::math::count::in_f64;
+use crate::math::pid::Gains;
+use crate::study::control_loop::ControlLoop;
 
 /// Most steps of one run: some seconds of one core, with a reference under control up to a minute.
 pub const MAX_STEPS: u64 = 10_000_000;
@@ -12,23 +13,15 @@ pub const MAX_STEPS: u64 = 10_000_000;
 /// Most samples of one run, some 30 MB of JSON.
 pub const MAX_SAMPLES: u64 = 100_000;
 
-/// What to run.
+/// A run to be made.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan<const N: usize> {
-    /// The arm.
-    pub arm: Arm<N>,
-    /// Where it starts.
+    /// The loop that the steps obey.
+    pub control: ControlLoop<N>,
+    /// Where the arm starts.
     pub start: State<N>,
     /// How long \[s\]; the run ends with the last whole step within it.
     pub duration: f64,
-    /// Length of a step \[s\].
-    pub timestep: f64,
-    /// The method.
-    pub method: Method,
-    /// Gains of the controller; `None`: no control.
-    pub gains: Option<Gains<N>>,
-    /// What the controller is to hold.
-    pub setpoint: Setpoint<N>,
     /// How many samples, start and end among them, if there are as many steps.
     pub samples: u64,
     /// Whether to run the reference too.
@@ -43,7 +36,7 @@ pub enum RolloutError {
     NotFinite {
         /// `q0`, `qdot0`, `duration`, `timestep`, `kp`, `ki`, `kd` or `setpoint`.
         field: &'static str,
-        /// What was given.
+        /// The given value.
         value: f64,
     },
     /// A duration or a timestep that is zero or negative.
@@ -51,7 +44,7 @@ pub enum RolloutError {
     NotPositive {
         /// `duration` or `timestep`.
         field: &'static str,
-        /// What was given \[s\].
+        /// The given time \[s\].
         value: f64,
     },
     /// A gain that is negative.
@@ -59,27 +52,27 @@ pub enum RolloutError {
     Negative {
         /// `kp`, `ki` or `kd`.
         field: &'static str,
-        /// What was given.
+        /// The given value.
         value: f64,
     },
     /// Not one whole step.
     #[error("duration must be at least the timestep {timestep}, got {duration}")]
     TooShort {
-        /// What was given \[s\].
+        /// The given time \[s\].
         duration: f64,
-        /// What was given \[s\].
+        /// The given time \[s\].
         timestep: f64,
     },
     /// More steps than [`MAX_STEPS`].
     #[error("duration / timestep must be at most {MAX_STEPS} steps, got {steps}")]
     TooManySteps {
-        /// What was given.
+        /// The given value.
         steps: f64,
     },
     /// Fewer samples than start and end, or more than [`MAX_SAMPLES`].
     #[error("samples must be between 2 and {MAX_SAMPLES}, got {samples}")]
     Samples {
-        /// What was given.
+        /// The given value.
         samples: u64,
     },
 }
@@ -92,23 +85,25 @@ impl<const N: usize> Plan<N> {
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
-        clippy::cast_precision_loss,
         reason = "the quotient is checked to lie between 1 and MAX_STEPS"
     )]
     pub(super) fn check(&self) -> Result<u64, RolloutError> {
-        let [kp, ki, kd] = self
-            .gains
-            .map_or([[0.0; N]; 3], |gains| [gains.kp, gains.ki, gains.kd]);
+        let ControlLoop {
+            gains: Gains { kp, ki, kd },
+            setpoint,
+            timestep,
+            ..
+        } = self.control;
         let fields: [(&'static str, &[f64]); 9] = [
             ("q0", &self.start.position),
             ("qdot0", &self.start.velocity),
             ("duration", &[self.duration]),
-            ("timestep", &[self.timestep]),
+            ("timestep", &[timestep]),
             ("kp", &kp),
             ("ki", &ki),
             ("kd", &kd),
-            ("setpoint", &self.setpoint.position),
-            ("setpoint", &self.setpoint.velocity),
+            ("setpoint", &setpoint.position),
+            ("setpoint", &setpoint.velocity),
         ];
         for (field, values) in fields {
             if let Some(&value) = values.iter().find(|value| !value.is_finite()) {
@@ -120,7 +115,7 @@ impl<const N: usize> Plan<N> {
                 return Err(RolloutError::Negative { field, value });
             }
         }
-        let (duration, timestep) = (self.duration, self.timestep);
+        let duration = self.duration;
         for (field, value) in [("duration", duration), ("timestep", timestep)] {
             if value <= 0.0 {
                 return Err(RolloutError::NotPositive { field, value });
@@ -130,7 +125,7 @@ impl<const N: usize> Plan<N> {
         if steps < 1.0 {
             return Err(RolloutError::TooShort { duration, timestep });
         }
-        if steps > MAX_STEPS as f64 {
+        if steps > in_f64(MAX_STEPS) {
             return Err(RolloutError::TooManySteps { steps });
         }
         if !(2..=MAX_SAMPLES).contains(&self.samples) {

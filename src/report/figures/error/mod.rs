@@ -10,13 +10,14 @@ use plots::{against_evaluations, against_time, against_timestep};
 use tables::{cheapest, orders, real_time, scene_list};
 use words::{findings, verdicts};
 
-use super::super::Desk;
-use super::super::csv::{Csv, Field};
-use super::super::section::{Block, Section};
-use super::super::timing::{Effort, Timing, time};
-use super::slope;
+use super::slope::slope;
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::study::error::{OUTPUTS, Outcome, Scene, scenes};
+use crate::report::csv::{Csv, Field};
+use crate::report::experiments::error::{OUTPUTS, Outcome, Scene, scenes};
+use crate::report::making::Making;
+use crate::report::section::{Block, Section};
+use crate::report::timing::{Effort, Timing, time};
 
 /// One scene with all its runs.
 struct Data {
@@ -39,11 +40,11 @@ const FITTED: usize = 4;
 
 const TARGETS: [f64; 5] = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10];
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
-    let data = compute(desk);
-    desk.keep("work-precision", table_of_runs(&data));
-    desk.keep("work-precision-time", table_of_runs(&data));
-    desk.keep("convergence", table_of_runs(&data));
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let data = compute(making);
+    making.keep("work-precision", table_of_runs(&data));
+    making.keep("work-precision-time", table_of_runs(&data));
+    making.keep("convergence", table_of_runs(&data));
     let mut section = Section {
         findings: findings(&data),
         verdicts: verdicts(&data),
@@ -61,9 +62,9 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     section
 }
 
-fn compute(desk: &mut Desk<'_>) -> Vec<Data> {
-    let halvings = desk.choose(15, 9);
-    let effort = desk.choose(
+fn compute(making: &mut Making<'_>) -> Vec<Data> {
+    let halvings = making.choose(15, 9);
+    let effort = making.choose(
         Effort {
             least: 5,
             most: 25,
@@ -93,7 +94,7 @@ fn compute(desk: &mut Desk<'_>) -> Vec<Data> {
                     timing: time(effort, || scene.replay(method, steps)),
                 });
                 done += 1;
-                desk.at(done, of);
+                making.at(done, of);
             }
         }
         data.push(Data { scene, runs });
@@ -147,7 +148,7 @@ impl Data {
     }
 }
 
-/// What it takes.
+/// The work that it takes.
 #[derive(Clone, Copy)]
 struct Cost {
     timestep: f64,
@@ -229,12 +230,4 @@ fn best(data: &Data, target: f64) -> Option<Best> {
     let mut reached = reached.into_iter();
     let (method, cost) = reached.next()?;
     Some((method, cost, reached.next()))
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "counts of a run are far below 2^53"
-)]
-fn in_f64(count: u64) -> f64 {
-    count as f64
 }

@@ -2,12 +2,12 @@
 //!
 //! **Invariant:** the same error axis in every panel.
 
-use super::super::super::section::Figure;
-use super::super::super::svg::{Axis, Key, Mark, Plot, Point, Series, Unit, scientific, seconds};
 use super::words::{headline_evaluations, headline_time, headline_timestep};
 use super::{Data, Run, in_f64};
 use crate::math::integrator::Method;
-use crate::study::error::Outcome;
+use crate::report::experiments::error::Outcome;
+use crate::report::section::Figure;
+use crate::report::svg::{Axis, Key, Mark, Plot, Point, Series, Unit, scientific, seconds};
 
 /// All panels share this, so that scenes can be compared. An exact hit is drawn on the lower edge.
 fn error_axis() -> Axis {

@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** what no run reached is called not reached.
 
-use super::super::super::section::{Cell, Table};
-use super::super::super::svg::{number, power, scientific, seconds};
 use super::{Data, TARGETS, best};
 use crate::math::integrator::Method;
+use crate::report::section::{Cell, Table};
+use crate::report::svg::{number, power, scientific, seconds};
 
 pub(super) fn cheapest(data: &[Data]) -> Table {
     let mut head = vec!["Scene".to_owned()];

@@ -2,15 +2,16 @@
 //!
 //! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
 
-use super::super::super::Desk;
-use super::super::super::csv::Csv;
-use super::super::super::section::Figure;
-use super::super::super::svg::{Axis, Heat, Key, Marker, Plot, Point, Series, Unit, seconds};
-use super::{Meter, setting};
+use super::{Meter, stiffened};
+use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
+use crate::report::csv::Csv;
+use crate::report::experiments::measure::{STEPS, growth};
+use crate::report::making::Making;
+use crate::report::section::Figure;
+use crate::report::svg::{Axis, Heat, Key, Marker, Plot, Point, Series, Unit, seconds};
 use crate::study::linear::Linear;
 use crate::study::matrix::Matrix;
-use crate::study::measure::STEPS;
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
 
 /// Ends of the axes: timestep \[s\], factor on the shipped gains.
@@ -32,7 +33,7 @@ pub(super) struct Map {
 }
 
 /// Measures `columns` timesteps at three quarters as many stiffnesses, for every method and kind of control.
-pub(super) fn map(desk: &mut Desk<'_>, meter: &mut Meter, columns: usize) -> Map {
+pub(super) fn map(making: &mut Making<'_>, meter: &mut Meter, columns: usize) -> Map {
     let mut map = Map {
         csv: Csv::new("control,method,dt,gain_factor,growth,predicted_limit"),
         cells: 0,
@@ -44,7 +45,7 @@ pub(super) fn map(desk: &mut Desk<'_>, meter: &mut Meter, columns: usize) -> Map
     };
     for sampling in Sampling::ALL {
         for method in Method::ALL {
-            map.panel(desk, meter, method, sampling);
+            map.panel(making, meter, method, sampling);
         }
     }
     map
@@ -53,7 +54,7 @@ pub(super) fn map(desk: &mut Desk<'_>, meter: &mut Meter, columns: usize) -> Map
 impl Map {
     fn panel(
         &mut self,
-        desk: &mut Desk<'_>,
+        making: &mut Making<'_>,
         meter: &mut Meter,
         method: Method,
         sampling: Sampling,
@@ -73,7 +74,7 @@ impl Map {
             let (limit, row) = self.row(factor, method, sampling, &mut disagreeing);
             line.push((limit, factor));
             rows.push(row);
-            meter.add(desk, 1);
+            meter.add(making, 1);
         }
         self.disagreeing += disagreeing.len();
         plot.heat = Some(Heat {
@@ -100,12 +101,12 @@ impl Map {
         sampling: Sampling,
         disagreeing: &mut Vec<Point>,
     ) -> (f64, Vec<i8>) {
-        let setting = setting(factor, method, sampling);
-        let linear = Linear::at_setpoint(&setting.arm, &setting.gains, &setting.setpoint);
+        let control = stiffened(factor).with_method(method);
+        let linear = Linear::at_setpoint(&control);
         let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
         let mut row = Vec::new();
         for h in centres(&self.timesteps) {
-            let growth = setting.growth(h);
+            let growth = growth(&control.with_timestep(h), sampling);
             self.csv.row(&[
                 sampling.name().into(),
                 method.name().into(),
@@ -154,8 +155,7 @@ impl Map {
 /// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor e
 /// meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
 fn undecided(step: &Matrix) -> bool {
-    #[allow(clippy::cast_precision_loss, reason = "a few thousand")]
-    let watched = STEPS as f64;
+    let watched = in_f64(STEPS);
     2.0 * watched * step.spectral_radius().ln().abs() < 1.0
 }
 
@@ -174,11 +174,7 @@ fn level(growth: Option<f64>) -> i8 {
 }
 
 fn edges_between((low, high): (f64, f64), count: usize) -> Vec<f64> {
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "counts of cells are far below 2^53"
-    )]
-    let part = |index: usize| index as f64 / count as f64;
+    let part = |index: usize| length_in_f64(index) / length_in_f64(count);
     (0..=count)
         .map(|index| low * (high / low).powf(part(index)))
         .collect()

@@ -12,13 +12,14 @@ use period::{growth, period_table, periods};
 use radius::radius_figure;
 use words::{findings, verdicts};
 
-use super::super::Desk;
-use super::super::section::{Block, Cell, Section, Table};
-use super::super::svg::seconds;
 use crate::math::arm::Arm;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::study::measure::Setting;
+use crate::report::experiments::measure::measured_limit;
+use crate::report::making::Making;
+use crate::report::section::{Block, Cell, Section, Table};
+use crate::report::svg::seconds;
+use crate::study::control_loop::ControlLoop;
 use crate::study::stability::{Sampling, limits};
 
 /// Measured and predicted limits may differ by this part.
@@ -42,51 +43,39 @@ impl Line {
     }
 }
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
-    let cells = desk.choose(48, 16);
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let cells = making.choose(48, 16);
     // Lines of the table count 3 each beside the rows of the maps.
     let mut meter = Meter {
         done: 0,
         of: 3 * 56 + 3 * 12 + 3 * 4 + 8 * cells,
     };
     let mut lines = Vec::new();
-    let bent = |position| Setpoint {
-        position,
-        velocity: [0.0; 2],
-    };
     for (name, gains) in gains_two() {
         lines_of(
-            desk,
+            making,
             &mut meter,
             &mut lines,
             name,
-            &Arm::<2>::default(),
-            &gains,
-            &bent([0.4, 0.8]),
+            &ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8])),
         );
     }
     for (name, gains) in gains_three() {
-        let setpoint = Setpoint {
-            position: [0.4, 0.8, -0.5],
-            velocity: [0.0; 3],
-        };
         lines_of(
-            desk,
+            making,
             &mut meter,
             &mut lines,
             name,
-            &Arm::<3>::default(),
-            &gains,
-            &setpoint,
+            &ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8, -0.5])),
         );
     }
-    let map = map(desk, &mut meter, cells);
-    desk.keep("stability-map", map.csv.clone());
-    let periods = periods(desk, &mut meter);
+    let map = map(making, &mut meter, cells);
+    making.keep("stability-map", map.csv.clone());
+    let periods = periods(making, &mut meter);
     let (radius, csv) = radius_figure(&lines);
-    desk.keep("spectral-radius", csv);
-    let growth = growth(desk, &mut meter);
-    desk.keep("control-period", growth.csv.clone());
+    making.keep("spectral-radius", csv);
+    let growth = growth(making, &mut meter);
+    making.keep("control-period", growth.csv.clone());
     Section {
         findings: findings(&lines),
         verdicts: verdicts(&lines, &map, &periods, &growth),
@@ -108,9 +97,9 @@ struct Meter {
 }
 
 impl Meter {
-    fn add(&mut self, desk: &mut Desk<'_>, work: usize) {
+    fn add(&mut self, making: &mut Making<'_>, work: usize) {
         self.done += work;
-        desk.at(self.done, self.of);
+        making.at(self.done, self.of);
     }
 }
 
@@ -140,31 +129,23 @@ fn gains_three() -> [(&'static str, Gains<3>); 3] {
 }
 
 fn lines_of<const N: usize>(
-    desk: &mut Desk<'_>,
+    making: &mut Making<'_>,
     meter: &mut Meter,
     lines: &mut Vec<Line>,
     name: &'static str,
-    arm: &Arm<N>,
-    gains: &Gains<N>,
-    setpoint: &Setpoint<N>,
+    control: &ControlLoop<N>,
 ) {
     for method in Method::ALL {
-        let limits = limits(arm, gains, setpoint, method);
+        let control = control.with_method(method);
+        let limits = limits(&control);
         for sampling in Sampling::ALL {
             let (predicted, over_poses) = match sampling {
                 Sampling::Held => (limits.held, limits.minimum_held),
                 Sampling::Continuous => (limits.continuous, limits.minimum_continuous),
             };
-            meter.add(desk, 3);
+            meter.add(making, 3);
             let Some(predicted) = predicted.filter(|limit| *limit > 0.0) else {
                 continue;
-            };
-            let setting = Setting {
-                arm: *arm,
-                gains: *gains,
-                setpoint: *setpoint,
-                method,
-                sampling,
             };
             lines.push(Line {
                 links: N,
@@ -172,7 +153,7 @@ fn lines_of<const N: usize>(
                 method,
                 sampling,
                 predicted,
-                measured: setting.measured_limit(predicted),
+                measured: measured_limit(&control, sampling, predicted),
                 over_poses,
                 advised: limits.advised.filter(|_| sampling == Sampling::Held),
             });
@@ -198,8 +179,8 @@ fn table(lines: &[Line]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
-        "Predicted from the loop linearised at its setpoint, measured by nudging the arm itself and watching whether it settles; the smallest predicted limit over \
-         a grid of poses, and 0.8 times that as advice. Prediction and measurement must agree to 1 %.",
+        "Predicted from the loop linearised where it rests, at (0.4, 0.8), with 3 links (0.4, 0.8, -0.5), measured by nudging the arm itself and watching whether \
+         it settles; the smallest limit of all poses, proven where it can be, and 0.8 times that as advice. Prediction and measurement must agree to 1 %.",
         &[
             "Links",
             "Gains",
@@ -285,22 +266,14 @@ fn edges(lines: &[Line]) -> Table {
 }
 
 /// The 2-link arm with the shipped gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
-fn setting(factor: f64, method: Method, sampling: Sampling) -> Setting<2> {
+fn stiffened(factor: f64) -> ControlLoop<2> {
     let Gains { kp, ki, kd } = Gains::<2>::default();
-    Setting {
-        arm: Arm::default(),
-        gains: Gains {
-            kp: kp.map(|kp| kp * factor),
-            ki: ki.map(|ki| ki * factor.powf(1.5)),
-            kd: kd.map(|kd| kd * factor.sqrt()),
-        },
-        setpoint: Setpoint {
-            position: [0.4, 0.8],
-            velocity: [0.0; 2],
-        },
-        method,
-        sampling,
-    }
+    let gains = Gains {
+        kp: kp.map(|kp| kp * factor),
+        ki: ki.map(|ki| ki * factor.powf(1.5)),
+        kd: kd.map(|kd| kd * factor.sqrt()),
+    };
+    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
 fn shipped(lines: &[Line], sampling: Sampling, method: Method) -> Option<&Line> {

@@ -2,17 +2,16 @@
 //!
 //! **Invariant:** what takes too long to measure is called not measured.
 
-use super::super::super::Desk;
-use super::super::super::csv::Csv;
-use super::super::super::section::{Cell, Figure, Table};
-use super::super::super::svg::{
-    Axis, Key, Mark, Marker, Plot, Point, Series, Unit, number, seconds,
-};
-use super::{Meter, setting};
+use super::{Meter, stiffened};
 use crate::math::integrator::Method;
-use crate::study::growth::growth_per_period;
+use crate::report::csv::Csv;
+use crate::report::experiments::growth::growth_per_period;
+use crate::report::experiments::measure::measured_period;
+use crate::report::making::Making;
+use crate::report::section::{Cell, Figure, Table};
+use crate::report::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, number, seconds};
 use crate::study::linear::Linear;
-use crate::study::stability::{Sampling, largest_period, period_matrix};
+use crate::study::stability::{largest_period, period_matrix};
 
 /// Ends of the axis of control periods \[s\], and the growth up to which curves are drawn.
 const PERIODS: (f64, f64) = (5e-4, 2e-2);
@@ -24,20 +23,19 @@ const SUBSTEPS: [u32; 3] = [1, 10, 100];
 /// Method, steps per control period, largest stable control period as predicted and as measured.
 pub(super) type Period = (Method, u32, Option<f64>, Option<f64>);
 
-pub(super) fn periods(desk: &mut Desk<'_>, meter: &mut Meter) -> Vec<Period> {
-    let shipped = setting(1.0, Method::Rk4, Sampling::Held);
-    let linear = Linear::at_setpoint(&shipped.arm, &shipped.gains, &shipped.setpoint);
+pub(super) fn periods(making: &mut Making<'_>, meter: &mut Meter) -> Vec<Period> {
+    let linear = Linear::at_setpoint(&stiffened(1.0));
     let mut periods = Vec::new();
     for method in Method::ALL {
         for substeps in SUBSTEPS {
             let predicted = largest_period(&linear, method, substeps);
-            let setting = setting(1.0, method, Sampling::Held);
+            let control = stiffened(1.0).with_method(method);
             // A hundred steps per period take seconds to measure.
             let measured = predicted
-                .filter(|_| substeps <= desk.choose(100, 10))
-                .and_then(|guess| setting.measured_period(guess, substeps, false));
+                .filter(|_| substeps <= making.choose(100, 10))
+                .and_then(|guess| measured_period(&control, guess, substeps, false));
             periods.push((method, substeps, predicted, measured));
-            meter.add(desk, 3);
+            meter.add(making, 3);
         }
     }
     periods
@@ -79,7 +77,7 @@ pub(super) struct Growth {
 }
 
 /// Curves and dots for every method and number of steps per period.
-pub(super) fn growth(desk: &mut Desk<'_>, meter: &mut Meter) -> Growth {
+pub(super) fn growth(making: &mut Making<'_>, meter: &mut Meter) -> Growth {
     let mut growth = Growth {
         csv: Csv::new("method,substeps,period,growth_predicted,growth_measured"),
         dots: 0,
@@ -87,10 +85,10 @@ pub(super) fn growth(desk: &mut Desk<'_>, meter: &mut Meter) -> Growth {
         apart: 0.0,
         plots: Vec::new(),
     };
-    let dots = desk.choose(12, 4);
+    let dots = making.choose(12, 4);
     for method in Method::ALL {
         growth.panel(method, dots);
-        meter.add(desk, 3);
+        meter.add(making, 3);
     }
     growth
 }
@@ -120,8 +118,8 @@ fn between(index: u32, count: u32) -> f64 {
 
 impl Growth {
     fn panel(&mut self, method: Method, dots: u32) {
-        let setting = setting(1.0, method, Sampling::Held);
-        let linear = Linear::at_setpoint(&setting.arm, &setting.gains, &setting.setpoint);
+        let control = stiffened(1.0).with_method(method);
+        let linear = Linear::at_setpoint(&control);
         let x = Axis::log_between("control period", Unit::Seconds, PERIODS.0, PERIODS.1);
         let y = Axis::linear("growth per control period", GROWTH.0, GROWTH.1);
         let mut plot = Plot::new(method.name(), x, y);
@@ -151,7 +149,7 @@ impl Growth {
                 if expected.is_nan() || expected > GROWTH.1 {
                     continue;
                 }
-                let measured = growth_per_period(&setting, period, substeps);
+                let measured = growth_per_period(&control.with_timestep(period), substeps);
                 self.csv.row(&[
                     method.name().into(),
                     u64::from(substeps).into(),

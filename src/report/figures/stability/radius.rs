@@ -2,11 +2,11 @@
 //!
 //! **Invariant:** lines are predicted, marks are measured.
 
-use super::super::super::csv::Csv;
-use super::super::super::section::Figure;
-use super::super::super::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, seconds};
-use super::{Line, capital, setting, shipped, told};
+use super::{Line, capital, shipped, stiffened, told};
 use crate::math::integrator::Method;
+use crate::report::csv::Csv;
+use crate::report::section::Figure;
+use crate::report::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, seconds};
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, step_matrix};
 
@@ -36,8 +36,7 @@ fn panel(lines: &[Line], sampling: Sampling, csv: &mut Csv) -> Plot {
         right: false,
     });
     for method in Method::ALL {
-        let setting = setting(1.0, method, sampling);
-        let linear = Linear::at_setpoint(&setting.arm, &setting.gains, &setting.setpoint);
+        let linear = Linear::at_setpoint(&stiffened(1.0).with_method(method));
         let mut curve = Vec::new();
         for index in 0..=400 {
             let h = 5e-4 * 40_f64.powf(f64::from(index) / 400.0);

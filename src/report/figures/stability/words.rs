@@ -1,13 +1,13 @@
-//! What stability comes to, in words.
+//! Stability in words.
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
-use super::super::super::section::Verdict;
-use super::super::super::svg::{number, seconds};
 use super::map::Map;
 use super::period::{Growth, Period};
 use super::{AGREEMENT, Line, shipped};
 use crate::math::integrator::Method;
+use crate::report::section::Verdict;
+use crate::report::svg::{number, seconds};
 use crate::study::stability::Sampling;
 
 pub(super) fn findings(lines: &[Line]) -> Vec<String> {

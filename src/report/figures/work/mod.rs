@@ -5,6 +5,7 @@
 //!
 //! **Invariant:** no number in here that was not measured for this report.
 
+mod cells;
 mod server;
 mod tables;
 
@@ -13,17 +14,18 @@ use std::hint::black_box;
 
 use tables::{steps_table, table};
 
-use super::super::Desk;
-use super::super::csv::Csv;
-use super::super::section::{Block, Figure, Section, Verdict};
-use super::super::svg::{Bars, number};
-use super::super::timing::{Effort, Timing, time};
 use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
 use crate::math::particle::Particle;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
+use crate::report::csv::Csv;
+use crate::report::making::Making;
+use crate::report::section::{Block, Figure, Section, Verdict};
+use crate::report::svg::{Bars, number};
+use crate::report::timing::{Effort, Timing, time};
 
 const STEPS: u64 = 20_000;
 
@@ -43,9 +45,9 @@ impl Kind {
 /// Counts by name, as the script left them.
 type Counts = HashMap<String, f64>;
 
-pub(super) fn make(desk: &mut Desk<'_>) -> Section {
-    let counts = read(desk);
-    let kinds = time_kinds(desk);
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let counts = read(making);
+    let kinds = time_kinds(making);
     let same_bits = off_is_zero_gains::<2>() && off_is_zero_gains::<3>();
     let mut csv = Csv::new("name,ns_per_step,ns_iqr,instructions_per_step");
     for kind in &kinds {
@@ -58,7 +60,7 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
             counts.get(kind.name).copied().into(),
         ]);
     }
-    desk.keep("left-out", csv);
+    making.keep("left-out", csv);
     let table = table(&kinds, &counts, same_bits);
     Section {
         findings: findings(&counts),
@@ -72,8 +74,8 @@ pub(super) fn make(desk: &mut Desk<'_>) -> Section {
     }
 }
 
-fn read(desk: &Desk<'_>) -> Counts {
-    let text = std::fs::read_to_string(desk.out.join("work.csv")).unwrap_or_default();
+fn read(making: &Making<'_>) -> Counts {
+    let text = std::fs::read_to_string(making.out.join("work.csv")).unwrap_or_default();
     text.lines()
         .skip(1)
         .filter_map(|line| {
@@ -112,8 +114,8 @@ where
     simulation
 }
 
-fn time_kinds(desk: &mut Desk<'_>) -> Vec<Kind> {
-    let effort = desk.choose(
+fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
+    let effort = making.choose(
         Effort {
             least: 15,
             most: 60,
@@ -131,7 +133,7 @@ fn time_kinds(desk: &mut Desk<'_>) -> Vec<Kind> {
             name,
             timing: time(effort, work),
         });
-        desk.at(kinds.len(), 12);
+        making.at(kinds.len(), 12);
     };
     let two = |gravity, integral, control, method| {
         let ready = start::<2>(gravity, integral, control, method);
@@ -357,12 +359,4 @@ fn verdicts(counts: &Counts, same_bits: bool) -> Vec<Verdict> {
         });
     }
     verdicts
-}
-
-#[allow(
-    clippy::cast_precision_loss,
-    reason = "counts of steps are far below 2^53"
-)]
-fn in_f64(count: u64) -> f64 {
-    count as f64
 }

@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** what was not counted for this report is called not measured.
 
-use super::super::super::section::Cell;
-use super::super::super::svg::number;
 use super::Counts;
-use super::tables::{percent_saved, unmeasured};
+use super::cells::{percent_saved, unmeasured};
+use crate::report::section::Cell;
+use crate::report::svg::number;
 
 /// All rows, in the order of the table.
 pub(super) fn rows(counts: &Counts) -> [Vec<Cell>; 7] {
@@ -170,7 +170,7 @@ fn web(counts: &Counts) -> Vec<Cell> {
     let (with, without) = ("program-size", "program-size-bare");
     vec![
         Cell::new("Web code without its feature"),
-        Cell::new("cargo build --no-default-features"),
+        Cell::new("cargo build --no-default-features --features runtime"),
         cell(with, "web-symbols-whole"),
         cell(without, "web-symbols-bare"),
         percent_saved(counts.get(with).copied(), counts.get(without).copied()),

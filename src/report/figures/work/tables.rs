@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** what was not counted for this report is called not measured.
 
-use super::super::super::section::{Cell, Table};
-use super::super::super::svg::{number, seconds};
+use super::cells::{UNMEASURED, percent_saved, unmeasured};
 use super::server;
 use super::{Counts, Kind, STEPS, in_f64};
+use crate::report::section::{Cell, Table};
+use crate::report::svg::{number, seconds};
 
 /// Something left out: what, where, and the names of the counts with it and without it.
 struct Row {
@@ -41,22 +42,6 @@ const ROWS: [Row; 4] = [
         without: "step-2-rk4-free",
     },
 ];
-
-const UNMEASURED: &str = "not measured in this run";
-
-pub(super) fn unmeasured() -> Cell {
-    Cell::new(UNMEASURED).class("soft")
-}
-
-pub(super) fn percent_saved(with: Option<f64>, without: Option<f64>) -> Cell {
-    match (with, without) {
-        (Some(with), Some(without)) => Cell::new(format!(
-            "{} %",
-            number((100.0 * (1.0 - without / with)).round())
-        )),
-        _ => Cell::default(),
-    }
-}
 
 /// The table of the section: rows of the step, of the server, and of what nobody measured.
 pub(super) fn table(kinds: &[Kind], counts: &Counts, same_bits: bool) -> Table {

@@ -1,0 +1,83 @@
+//! The goal that is being pursued, and what its messages say.
+//!
+//! **Invariant:** a goal's messages show the target and the setpoint that it was accepted with.
+
+use super::messages::{GoalNews, GoalOwner};
+use crate::actors::arm::ik::target_message;
+use crate::actors::arm::sim::GoalJudged;
+use crate::actors::ros::follower::{Canceller, GoalStatus};
+use crate::math::goal::Outcome;
+use crate::math::kinematics::Target;
+use crate::protocol::messages::goal::{IkFeedback, IkResult};
+
+/// The goal that is being pursued.
+pub(super) struct ActiveGoal<const N: usize> {
+    pub(super) number: u64,
+    pub(super) id: String,
+    pub(super) target: Target,
+    /// The setpoint that was sent \[rad\].
+    pub(super) positions: [f64; N],
+    /// Who follows it besides the subscribers.
+    pub(super) owner: Option<GoalOwner<N>>,
+    /// Somebody has asked for its end.
+    pub(super) cancelled: bool,
+}
+
+impl<const N: usize> ActiveGoal<N> {
+    pub(super) fn is(&self, judged: &GoalJudged<N>) -> bool {
+        self.number == judged.number
+    }
+
+    pub(super) fn feedback(&self, judged: &GoalJudged<N>) -> IkFeedback<'_> {
+        IkFeedback {
+            goal_id: &self.id,
+            target: target_message(&self.target),
+            positions: &self.positions,
+            distance_remaining: judged.distance,
+            elapsed: judged.elapsed,
+        }
+    }
+
+    pub(super) fn result(&self, judged: &GoalJudged<N>) -> IkResult<'_> {
+        IkResult {
+            goal_id: &self.id,
+            outcome: judged.outcome.map_or("", Outcome::name),
+            target: target_message(&self.target),
+            final_distance: judged.distance,
+        }
+    }
+
+    fn status(&self, judged: &GoalJudged<N>) -> GoalStatus {
+        match judged.outcome {
+            Some(Outcome::Reached) => GoalStatus::Succeeded,
+            _ if self.cancelled => GoalStatus::Canceled,
+            _ => GoalStatus::Aborted,
+        }
+    }
+
+    /// Whether the client sent it that now wants its end.
+    pub(super) fn is_meant_by(&self, who: &Canceller) -> bool {
+        match &self.owner {
+            Some(GoalOwner::Client(follower)) => follower.is_meant_by(who),
+            _ => false,
+        }
+    }
+
+    /// Its owner hears how it goes, or how it ended.
+    pub(super) fn inform_owner(&self, judged: &GoalJudged<N>) {
+        match &self.owner {
+            None => {}
+            Some(GoalOwner::Client(follower)) => match judged.outcome {
+                None => follower.feed_back(&self.feedback(judged)),
+                Some(_) => follower.conclude(&self.result(judged), self.status(judged)),
+            },
+            Some(GoalOwner::Node(owner)) => owner.do_send(GoalNews {
+                goal_id: self.id.clone(),
+                distance: judged.distance,
+                positions: self.positions,
+                pose: judged.pose,
+                outcome: judged.outcome,
+            }),
+        }
+    }
+}

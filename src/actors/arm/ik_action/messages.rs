@@ -1,0 +1,113 @@
+//! The questions to `ik_action`, and its news.
+//!
+//! **Invariant:** nobody has to ask twice: every question says what has become of it.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+
+use crate::actors::arm::ik::SolveError;
+use crate::actors::arm::sim::Pose;
+use crate::actors::node::{Ask, Done};
+use crate::actors::ros::follower::{Canceller, Follower};
+use crate::math::goal::{Criteria, Outcome};
+use crate::math::kinematics::Target;
+use crate::protocol::catalog::Node;
+
+/// Go there. The answer is the goal's id, given before its trajectory goes out.
+#[derive(Clone)]
+pub struct SendGoal<const N: usize> {
+    /// Where to.
+    pub target: Target,
+    /// When it counts as reached.
+    pub criteria: Criteria,
+    /// Hears how the goal goes, besides the subscribers; its being gone is nobody's trouble.
+    pub owner: Option<GoalOwner<N>>,
+}
+
+impl<const N: usize> Ask for SendGoal<N> {
+    type Answer = Result<String, GoalRejected>;
+}
+
+/// Who follows a goal besides the subscribers.
+#[derive(Clone)]
+pub enum GoalOwner<const N: usize> {
+    /// A node.
+    Node(Recipient<GoalNews<N>>),
+    /// A client that sent it by the action.
+    Client(Arc<Follower>),
+}
+
+/// Why a goal was not accepted; nothing has changed.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GoalRejected {
+    /// There is no solution.
+    #[error(transparent)]
+    Unsolved(#[from] SolveError),
+    /// A node has ended.
+    #[error("{0} does not answer")]
+    NoAnswer(
+        /// Its name.
+        &'static str,
+    ),
+}
+
+/// The active goal is preempted; answered after its result has been published.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct CancelGoal {
+    /// The goal that is meant; the active one, if none is named.
+    pub goal_id: Option<String>,
+}
+
+impl Ask for CancelGoal {
+    type Answer = Result<(), CancelRejected>;
+}
+
+/// The goal that the same client has sent by the action is preempted.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct CancelFollowed {
+    /// Who wants it; an error status goes there where no such goal is active.
+    pub from: Canceller,
+    /// Dropped when the goal has ended.
+    pub done: Done,
+}
+
+/// Why nothing was cancelled.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum CancelRejected {
+    /// There is nothing to cancel.
+    #[error("no goal is active")]
+    NotActive,
+    /// Another goal was meant.
+    #[error("goal_id is not that of the active goal, {active}")]
+    OtherGoal {
+        /// The active goal.
+        active: String,
+    },
+    /// The arm has ended.
+    #[error("{} does not answer", Node::ArmSim.name())]
+    NoAnswer,
+}
+
+/// How a goal goes. To the owner that its [`SendGoal`] named.
+#[derive(Message, Debug, Clone, PartialEq)]
+#[rtype(result = "()")]
+pub struct GoalNews<const N: usize> {
+    /// The goal.
+    pub goal_id: String,
+    /// Distance between end effector and target \[m\].
+    pub distance: f64,
+    /// The setpoint that the goal commanded \[rad\].
+    pub positions: [f64; N],
+    /// The arm at that instant.
+    pub pose: Pose<N>,
+    /// How it ended; none while it is active.
+    pub outcome: Option<Outcome>,
+}
+
+/// Answered when all that reached this node before has been dealt with. From `ik_trial`, which so hears all that the
+/// arm had said about goals before it gave the time.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct Settle;

@@ -1,0 +1,272 @@
+//! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
+//! `/ik_action/result`.
+//!
+//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the setpoint.
+//! Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears nothing else,
+//! so that goals follow one another whole.
+//!
+//! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
+//! the old goal's result, the response, the trajectory, feedback, result.
+
+mod active;
+mod messages;
+mod wire;
+
+use actix::prelude::*;
+
+use self::active::ActiveGoal;
+pub use self::messages::{
+    CancelFollowed, CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, SendGoal, Settle,
+};
+use crate::actors::arm::ik::Solve;
+use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names};
+use crate::actors::node::{Call, Frame, Interest, Publish, Reply, ask};
+use crate::math::goal::Outcome;
+use crate::protocol::catalog::{Node, Topic};
+use crate::protocol::messages::{self as frames, goal::setpoint_trajectory};
+
+/// The error for a client that cancels a goal which it has not sent, or which has ended.
+const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `ik_action` for an arm of `N` links.
+pub struct IkAction<const N: usize> {
+    ik: Recipient<Call<Solve<N>>>,
+    arm: GoalTracker<N>,
+    publish: Recipient<Publish>,
+    active: Option<ActiveGoal<N>>,
+    /// Goals accepted so far: their numbers make the ids.
+    accepted: u64,
+    feedback_wanted: bool,
+    result_wanted: bool,
+}
+
+/// The arm, as far as goals are concerned.
+#[derive(Clone)]
+pub struct GoalTracker<const N: usize> {
+    /// Begins a goal.
+    pub track: Recipient<TrackGoal<N>>,
+    /// Sets it in motion.
+    pub command: Recipient<CommandGoal<N>>,
+    /// Ends it.
+    pub end: Recipient<EndGoal<N>>,
+}
+
+impl<const N: usize> IkAction<N> {
+    /// A node without a goal.
+    #[must_use]
+    pub fn new(
+        ik: Recipient<Call<Solve<N>>>,
+        arm: GoalTracker<N>,
+        publish: Recipient<Publish>,
+    ) -> Self {
+        Self {
+            ik,
+            arm,
+            publish,
+            active: None,
+            accepted: 0,
+            feedback_wanted: false,
+            result_wanted: false,
+        }
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for IkAction<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<SendGoal<N>>> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<SendGoal<N>>, ctx: &mut Context<Self>) {
+        let pursuit = self.pursue(call.ask, call.reply, ctx.address());
+        ctx.wait(pursuit);
+    }
+}
+
+impl<const N: usize> Handler<Call<CancelGoal>> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<CancelGoal>, ctx: &mut Context<Self>) {
+        let mut reply = call.reply;
+        let cancellation = self.cancel(call.ask.goal_id.as_deref());
+        ctx.wait(cancellation.map(move |outcome, _, _| reply.answer(outcome)));
+    }
+}
+
+impl<const N: usize> Handler<CancelFollowed> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, message: CancelFollowed, ctx: &mut Context<Self>) {
+        let CancelFollowed { from, done } = message;
+        let goal = self.active.as_ref();
+        let Some(id) = goal
+            .filter(|goal| goal.is_meant_by(&from))
+            .map(|goal| goal.id.clone())
+        else {
+            return from.refuse(NOT_ACTIVE);
+        };
+        let cancellation = self.cancel(Some(&id));
+        ctx.wait(cancellation.map(move |_, _, _| drop(done)));
+    }
+}
+
+impl<const N: usize> Handler<GoalJudged<N>> for IkAction<N> {
+    type Result = ();
+
+    /// From the arm. News of a goal that is not active any more come too late to be passed on.
+    fn handle(&mut self, judged: GoalJudged<N>, _: &mut Context<Self>) {
+        if judged.outcome.is_some() {
+            self.conclude(&judged);
+        } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&judged)) {
+            if self.feedback_wanted {
+                self.publish(Topic::IkFeedback, &goal.feedback(&judged));
+            }
+            goal.inform_owner(&judged);
+        }
+    }
+}
+
+impl<const N: usize> Handler<Settle> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
+}
+
+impl<const N: usize> Handler<Interest> for IkAction<N> {
+    type Result = ();
+
+    fn handle(&mut self, Interest { topic, wanted }: Interest, _: &mut Context<Self>) {
+        match topic {
+            Topic::IkFeedback => self.feedback_wanted = wanted,
+            Topic::IkResult => self.result_wanted = wanted,
+            other => debug_assert!(false, "{} is not this node's", other.name()),
+        }
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> IkAction<N> {
+    /// Solves a goal and sets it in motion; who sent it is answered in between.
+    fn pursue(
+        &self,
+        goal: SendGoal<N>,
+        mut reply: Reply<Result<String, GoalRejected>>,
+        own: Addr<Self>,
+    ) -> ResponseActFuture<Self, ()> {
+        let (ik, arm) = (self.ik.clone(), self.arm.track.clone());
+        let number = self.accepted + 1;
+        let (target, criteria) = (goal.target, goal.criteria);
+        let begun = async move {
+            let solution = ask(&ik, Solve(target)).await;
+            let solution = solution.map_err(|_| GoalRejected::NoAnswer(Node::Ik.name()))??;
+            arm.send(TrackGoal {
+                number,
+                target: target.position,
+                criteria,
+                solution,
+                owner: own.recipient(),
+            })
+            .await
+            .map_err(|_| GoalRejected::NoAnswer(Node::ArmSim.name()))
+        };
+        Box::pin(begun.into_actor(self).map(move |tracking, node, _| {
+            let is_accepted = tracking.is_ok();
+            reply.answer(tracking.map(|tracking| node.accept(number, goal, tracking)));
+            if is_accepted {
+                node.set_in_motion();
+            }
+            drop(reply);
+        }))
+    }
+
+    /// The old goal's result goes out, and the new goal takes its place.
+    fn accept(&mut self, number: u64, goal: SendGoal<N>, tracking: Tracking<N>) -> String {
+        if let Some(before) = tracking.before {
+            self.conclude(&before);
+        }
+        let id = format!("goal-{number}");
+        self.accepted = number;
+        self.active = Some(ActiveGoal {
+            number,
+            id: id.clone(),
+            target: goal.target,
+            positions: tracking.positions,
+            owner: goal.owner,
+            cancelled: false,
+        });
+        id
+    }
+
+    /// The active goal's setpoint goes out to the subscribers, and then to the arm.
+    fn set_in_motion(&self) {
+        let Some(goal) = &self.active else {
+            return;
+        };
+        let (number, positions) = (goal.number, goal.positions);
+        let topic = Topic::JointTrajectory;
+        let frame = Frame::unwritten(move || {
+            frames::publish(
+                topic.name(),
+                &setpoint_trajectory(&joint_names::<N>(), &positions),
+            )
+        });
+        self.publish.do_send(Publish { topic, frame });
+        self.arm.command.do_send(CommandGoal { number, positions });
+    }
+
+    /// Preempts the active goal if it is the one that is meant, and if the arm has not found it reached already.
+    fn cancel(&self, goal_id: Option<&str>) -> ResponseActFuture<Self, Result<(), CancelRejected>> {
+        let number = match &self.active {
+            None => Err(CancelRejected::NotActive),
+            Some(goal) if goal_id.is_some_and(|id| id != goal.id) => {
+                Err(CancelRejected::OtherGoal {
+                    active: goal.id.clone(),
+                })
+            }
+            Some(goal) => Ok(goal.number),
+        };
+        let arm = self.arm.end.clone();
+        let ended = async move {
+            let number = number?;
+            let ended = arm.send(EndGoal { number }).await;
+            ended.map_err(|_| CancelRejected::NoAnswer)
+        };
+        Box::pin(ended.into_actor(self).map(|ended, node, _| {
+            let ended = ended?.ok_or(CancelRejected::NotActive)?;
+            if let Some(goal) = &mut node.active {
+                goal.cancelled = true;
+            }
+            node.conclude(&ended);
+            match ended.outcome {
+                Some(Outcome::Preempted) => Ok(()),
+                _ => Err(CancelRejected::NotActive),
+            }
+        }))
+    }
+
+    /// Publishes the goal's result, if the goal is still the active one, which then it is no more.
+    fn conclude(&mut self, judged: &GoalJudged<N>) {
+        let Some(goal) = self.active.take_if(|goal| goal.is(judged)) else {
+            return;
+        };
+        if self.result_wanted {
+            self.publish(Topic::IkResult, &goal.result(judged));
+        }
+        goal.inform_owner(judged);
+    }
+
+    fn publish(&self, topic: Topic, message: &impl serde::Serialize) {
+        self.publish.do_send(Publish {
+            topic,
+            frame: frames::publish(topic.name(), message).into(),
+        });
+    }
+}

@@ -1,0 +1,72 @@
+//! How a trial moves the arm: by goals that it sends to `ik_action`.
+//!
+//! **Invariant:** each wish is done whole before the next.
+
+use actix::prelude::*;
+
+use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, SendGoal, Settle};
+use crate::actors::arm::sim::ArmPose;
+use crate::actors::node::{Call, ask};
+use crate::math::trial::Action;
+
+/// `ik_action`, as its client sees it.
+#[derive(Clone)]
+pub struct GoalClient<const N: usize> {
+    /// Sends a goal.
+    pub send: Recipient<Call<SendGoal<N>>>,
+    /// Cancels it.
+    pub cancel: Recipient<Call<CancelGoal>>,
+    /// Waits until the news so far have arrived.
+    pub settle: Recipient<Settle>,
+}
+
+/// The answer of `ik_action` to a goal that the trial sent.
+pub(super) struct GoalAnswer<const N: usize> {
+    pub(super) ticket: u64,
+    /// The goal's id, if it was accepted.
+    pub(super) goal_id: Option<String>,
+    /// Lengths after a refusal \[m\]: they may have been the reason.
+    pub(super) lengths: Option<[f64; N]>,
+}
+
+/// Takes the trial's wishes to `ik_action`, one after another.
+pub(super) async fn carry_out<const N: usize>(
+    commands: Vec<Action>,
+    arm: Recipient<ArmPose<N>>,
+    goals: GoalClient<N>,
+    owner: Recipient<GoalNews<N>>,
+) -> Vec<GoalAnswer<N>> {
+    let mut answers = Vec::new();
+    for command in commands {
+        match command {
+            Action::CancelGoal { goal_id } => {
+                let goal_id = Some(goal_id);
+                // A refusal means that the goal is over already: all that was wanted.
+                let _ = ask(&goals.cancel, CancelGoal { goal_id }).await;
+            }
+            Action::SendGoal {
+                ticket,
+                target,
+                criteria,
+            } => {
+                let goal = SendGoal {
+                    target,
+                    criteria,
+                    owner: Some(GoalOwner::Node(owner.clone())),
+                };
+                let goal_id = ask(&goals.send, goal).await.ok().and_then(Result::ok);
+                let lengths = match goal_id {
+                    Some(_) => None,
+                    None => arm.send(ArmPose).await.ok().map(|pose| pose.lengths),
+                };
+                answers.push(GoalAnswer {
+                    ticket,
+                    goal_id,
+                    lengths,
+                });
+            }
+            Action::PublishStatus => {}
+        }
+    }
+    answers
+}

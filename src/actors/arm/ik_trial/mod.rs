@@ -1,0 +1,365 @@
+//! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the state of things on `/ik_trial/status`.
+//!
+//! The rules are `math::trial`'s. The node asks the arm for lengths and simulation time before it does anything, and
+//! moves it through `ik_action` only. What it wants done there it does whole before it hears of anything else.
+//!
+//! **Invariant:** time and goals' news are taken in the order in which the arm gave them; nothing ticks while no trial
+//! runs and nobody watches.
+
+mod goals;
+mod messages;
+mod wire;
+
+use std::time::Duration;
+
+use actix::prelude::*;
+
+pub use self::goals::GoalClient;
+use self::goals::{GoalAnswer, carry_out};
+pub use self::messages::{NotStarted, SkipTarget, StartTrial, StopTrial, Terms};
+use super::ik::target_message;
+use super::ik_action::{GoalNews, Settle};
+use crate::actors::arm::sim::{ArmPose, Pose};
+use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
+use crate::math::trial::{Action, Changes, Conclusion, Rejection, Trial, sample};
+use crate::protocol::catalog::{Node, Topic};
+use crate::protocol::messages as frames;
+use crate::protocol::messages::goal::TrialStatus;
+
+/// Time between two messages of `/ik_trial/status` while nothing changes.
+pub const STATUS_PERIOD: Duration = Duration::from_millis(100);
+/// Least time before the clock is looked at again to see whether a trial is over: what remains of it may take long, if
+/// the arm is paused or slow.
+const SHORTEST_NAP: Duration = Duration::from_millis(20);
+/// Longest such time: a timer can't be set to any number of seconds that a client may think of.
+const LONGEST_NAP: Duration = Duration::from_secs(3600);
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `ik_trial` for an arm of `N` links.
+pub struct IkTrial<const N: usize> {
+    arm: Recipient<ArmPose<N>>,
+    goals: GoalClient<N>,
+    publish: Recipient<Publish>,
+    trial: Trial,
+    rng: fastrand::Rng,
+    /// Lengths as last heard \[m\].
+    lengths: [f64; N],
+    /// Simulation time as last heard \[s\].
+    simulated: f64,
+    status_wanted: bool,
+    /// A timer for `/ik_trial/status`, while somebody watches.
+    status_timer: Option<SpawnHandle>,
+    /// The arm has been asked for the time of a status: one question at a time.
+    status_asked: bool,
+    /// A timer for the end of the trial, while one runs.
+    deadline: Option<SpawnHandle>,
+}
+
+impl<const N: usize> IkTrial<N> {
+    /// A node that has not run a trial yet; the targets come from `rng`.
+    #[must_use]
+    pub fn new(
+        arm: Recipient<ArmPose<N>>,
+        goals: GoalClient<N>,
+        publish: Recipient<Publish>,
+        rng: fastrand::Rng,
+    ) -> Self {
+        Self {
+            arm,
+            goals,
+            publish,
+            trial: Trial::default(),
+            rng,
+            lengths: [1.0; N],
+            simulated: 0.0,
+            status_wanted: false,
+            status_timer: None,
+            status_asked: false,
+            deadline: None,
+        }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// The arm's answer, and what it was asked for. From this node to itself, so that it stands behind all the news that
+/// the arm gave before.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct PoseKnown<const N: usize> {
+    /// None if the arm has ended.
+    pose: Option<Pose<N>>,
+    intent: Intent,
+}
+
+/// The node's next deed, once it knows lengths and time.
+enum Intent {
+    Start(Changes, Reply<Terms>),
+    Skip(Reply<Result<(), Rejection>>),
+    Stop(Reply<Result<(), Rejection>>),
+    /// The trial may be over.
+    CheckDeadline,
+    /// A status is due.
+    ShowStatus,
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for IkTrial<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<StartTrial>> for IkTrial<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<StartTrial>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        if ask.rejected.is_empty() {
+            self.ask_arm(Intent::Start(ask.changes, reply), ctx);
+        } else {
+            reply.answer(self.terms(Err(NotStarted::Rejected(ask.rejected))));
+        }
+    }
+}
+
+impl<const N: usize> Handler<Call<SkipTarget>> for IkTrial<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<SkipTarget>, ctx: &mut Context<Self>) {
+        self.ask_arm(Intent::Skip(call.reply), ctx);
+    }
+}
+
+impl<const N: usize> Handler<Call<StopTrial>> for IkTrial<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<StopTrial>, ctx: &mut Context<Self>) {
+        self.ask_arm(Intent::Stop(call.reply), ctx);
+    }
+}
+
+impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
+    type Result = ();
+
+    fn handle(&mut self, known: PoseKnown<N>, ctx: &mut Context<Self>) {
+        let Some(pose) = known.pose else {
+            return known.intent.refuse();
+        };
+        let mut actions = self.hear(&pose);
+        let target = || sample(&self.lengths, || self.rng.f64());
+        let (decided, pending) = match known.intent {
+            Intent::Start(changes, reply) => {
+                let decided = self.trial.start(self.simulated, changes, target);
+                if decided.is_ok() {
+                    self.cancel_deadline(ctx);
+                }
+                (decided, Some(Pending::Start(reply)))
+            }
+            Intent::Skip(reply) => (self.trial.skip(target), Some(Pending::Other(reply))),
+            Intent::Stop(reply) => (self.trial.stop(), Some(Pending::Other(reply))),
+            Intent::CheckDeadline => (Ok(Vec::new()), None),
+            Intent::ShowStatus => {
+                self.status_asked = false;
+                (Ok(vec![Action::PublishStatus]), None)
+            }
+        };
+        match decided {
+            Ok(more) => {
+                actions.extend(more);
+                self.perform(actions, pending, ctx);
+            }
+            Err(why) => {
+                self.perform(actions, None, ctx);
+                self.answer(pending, Err(why));
+            }
+        }
+    }
+}
+
+impl<const N: usize> Handler<GoalNews<N>> for IkTrial<N> {
+    type Result = ();
+
+    fn handle(&mut self, news: GoalNews<N>, ctx: &mut Context<Self>) {
+        let mut actions = self.hear(&news.pose);
+        match news.outcome {
+            None => self
+                .trial
+                .feedback(&news.goal_id, news.distance, &news.positions),
+            Some(outcome) => {
+                let conclusion = Conclusion {
+                    goal_id: news.goal_id,
+                    outcome,
+                    final_distance: news.distance,
+                };
+                let target = || sample(&self.lengths, || self.rng.f64());
+                actions.extend(self.trial.concluded(conclusion, target));
+            }
+        }
+        self.perform(actions, None, ctx);
+    }
+}
+
+impl<const N: usize> Handler<Interest> for IkTrial<N> {
+    type Result = ();
+
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
+        self.status_wanted = interest.wanted;
+        self.keep_timers(ctx);
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl Intent {
+    /// Without an arm nothing comes of it.
+    fn refuse(self) {
+        let why = Unserved::NoAnswer(Node::ArmSim.name());
+        match self {
+            Self::Start(_, mut reply) => reply.refuse(why),
+            Self::Skip(mut reply) | Self::Stop(mut reply) => reply.refuse(why),
+            Self::CheckDeadline | Self::ShowStatus => {}
+        }
+    }
+}
+
+/// A call that is answered once all that it asked for is under way.
+enum Pending {
+    Start(Reply<Terms>),
+    Other(Reply<Result<(), Rejection>>),
+}
+
+impl<const N: usize> IkTrial<N> {
+    /// Asks the arm, and goes on when all that it said before has been heard too.
+    fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
+        let (arm, settle, own) = (self.arm.clone(), self.goals.settle.clone(), ctx.address());
+        let question = async move {
+            let pose = arm.send(ArmPose).await.ok();
+            let _ = settle.send(Settle).await;
+            own.do_send(PoseKnown { pose, intent });
+        };
+        ctx.spawn(question.into_actor(self));
+    }
+
+    /// Takes note of lengths and time. Two questions may be answered in either order: the later time counts.
+    fn hear(&mut self, pose: &Pose<N>) -> Vec<Action> {
+        self.lengths = pose.lengths;
+        self.simulated = self.simulated.max(pose.simulated);
+        self.trial.tick(self.simulated)
+    }
+
+    /// Does what the trial wants done, then answers the call that led to it.
+    fn perform(&mut self, actions: Vec<Action>, pending: Option<Pending>, ctx: &mut Context<Self>) {
+        let mut commands = Vec::new();
+        for action in actions {
+            match action {
+                Action::PublishStatus => self.publish_status(),
+                command => commands.push(command),
+            }
+        }
+        self.keep_timers(ctx);
+        if commands.is_empty() {
+            return self.answer(pending, Ok(()));
+        }
+        let carried_out = carry_out(
+            commands,
+            self.arm.clone(),
+            self.goals.clone(),
+            ctx.address().recipient(),
+        );
+        ctx.wait(carried_out.into_actor(self).map(move |answers, node, ctx| {
+            let actions = answers
+                .into_iter()
+                .flat_map(|answer| node.goal_answered(answer))
+                .collect();
+            node.perform(actions, pending, ctx);
+        }));
+    }
+
+    fn goal_answered(&mut self, answer: GoalAnswer<N>) -> Vec<Action> {
+        self.lengths = answer.lengths.unwrap_or(self.lengths);
+        let target = || sample(&self.lengths, || self.rng.f64());
+        match answer.goal_id {
+            Some(goal_id) => self.trial.accepted(answer.ticket, &goal_id, target),
+            None => self.trial.refused(answer.ticket, target),
+        }
+    }
+
+    fn answer(&self, pending: Option<Pending>, outcome: Result<(), Rejection>) {
+        match pending {
+            Some(Pending::Start(mut reply)) => {
+                reply.answer(self.terms(outcome.map_err(NotStarted::Refused)));
+            }
+            Some(Pending::Other(mut reply)) => reply.answer(outcome),
+            None => {}
+        }
+    }
+
+    fn terms(&self, outcome: Result<(), NotStarted>) -> Terms {
+        Terms {
+            settings: self.trial.settings(),
+            outcome,
+        }
+    }
+
+    fn publish_status(&self) {
+        let Some(status) = self.trial.status().filter(|_| self.status_wanted) else {
+            return;
+        };
+        let message = TrialStatus {
+            running: status.running,
+            elapsed: status.elapsed,
+            duration: status.duration,
+            targets_reached: status.targets_reached,
+            target: status.target.as_ref().map(target_message),
+            error: status.error,
+            desired_positions: status.desired_positions.as_deref(),
+            action_status: status.action_status.name(),
+        };
+        let topic = Topic::TrialStatus;
+        self.publish.do_send(Publish {
+            topic,
+            frame: frames::publish(topic.name(), &message).into(),
+        });
+    }
+
+    /// The timers that the present state asks for, and no others.
+    fn keep_timers(&mut self, ctx: &mut Context<Self>) {
+        match self.trial.remaining() {
+            None => self.cancel_deadline(ctx),
+            Some(remaining) if self.deadline.is_none() => {
+                let nap = Duration::try_from_secs_f64(remaining).unwrap_or(LONGEST_NAP);
+                let nap = nap.clamp(SHORTEST_NAP, LONGEST_NAP);
+                self.deadline = Some(ctx.run_later(nap, |node, ctx| {
+                    node.deadline = None;
+                    node.ask_arm(Intent::CheckDeadline, ctx);
+                }));
+            }
+            Some(_) => {}
+        }
+        let is_watched = self.status_wanted && self.trial.status().is_some();
+        if is_watched && self.status_timer.is_none() {
+            self.status_timer = Some(ctx.run_interval(STATUS_PERIOD, Self::status_due));
+        } else if !is_watched && let Some(timer) = self.status_timer.take() {
+            ctx.cancel_future(timer);
+        }
+    }
+
+    fn cancel_deadline(&mut self, ctx: &mut Context<Self>) {
+        if let Some(timer) = self.deadline.take() {
+            ctx.cancel_future(timer);
+        }
+    }
+
+    /// A status shows the present time, which while a trial runs is the arm's to tell.
+    fn status_due(&mut self, ctx: &mut Context<Self>) {
+        if !self.trial.running() {
+            self.publish_status();
+        } else if !self.status_asked {
+            self.status_asked = true;
+            self.ask_arm(Intent::ShowStatus, ctx);
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! A call on its way through the workers: room for its answer is taken, the answer is worked out, then written.
+//!
+//! **Invariant:** a call is answered once, and works no more once its caller is gone.
+
+use std::time::Instant;
+
+use super::work_clock;
+use super::workers::{Computation, Progress, WorkerPool};
+use crate::actors::gateway::budget::NoRoom;
+use crate::actors::node::{Pieces, Reply, Unserved};
+
+/// The longest number and the comma behind it, and the number itself while the answer is computed.
+pub(super) const NUMBER_BYTES: usize = 25 + 8;
+
+/// The work that a call asks for, done a piece at a time.
+pub(super) trait Work<T>: Send {
+    /// The most bytes that the answer can have, and its computation beside it; asked before it begins.
+    fn most_bytes(&self) -> usize;
+
+    /// Does a piece, a fraction of a slice; the answer, once that was the last.
+    fn advance(&mut self) -> Option<T>;
+}
+
+/// Hands a call to the workers.
+pub(super) fn answer<T: Send + 'static>(
+    workers: &WorkerPool,
+    reply: Reply<T>,
+    work: impl Work<T> + 'static,
+) {
+    let of = reply.client();
+    let stage = Stage::Asked(Box::new(work));
+    workers.submit(of, Box::new(Answering { reply, stage }));
+}
+
+struct Answering<T> {
+    reply: Reply<T>,
+    stage: Stage<T>,
+}
+
+enum Stage<T> {
+    /// Room for the answer is yet to be taken.
+    Asked(Box<dyn Work<T>>),
+    Working(Box<dyn Work<T>>),
+    Writing(Box<dyn Pieces>),
+    Answered,
+}
+
+impl<T: Send> Answering<T> {
+    fn caller_is_gone(&self) -> bool {
+        match &self.stage {
+            Stage::Writing(pieces) => pieces.is_gone(),
+            _ => self.reply.caller_is_gone(),
+        }
+    }
+
+    fn end(&mut self, why: Unserved) {
+        match std::mem::replace(&mut self.stage, Stage::Answered) {
+            Stage::Asked(_) | Stage::Working(_) => self.reply.refuse(why),
+            Stage::Writing(mut pieces) => pieces.refuse(why),
+            // The pool may end between the answer and the last look at the clock.
+            Stage::Answered => {}
+        }
+    }
+}
+
+impl<T: Send> Computation for Answering<T> {
+    fn advance(&mut self, deadline: Instant) -> Progress {
+        while !matches!(self.stage, Stage::Answered) {
+            if self.caller_is_gone() {
+                self.end(Unserved::CallerGone);
+            }
+            self.stage = match std::mem::replace(&mut self.stage, Stage::Answered) {
+                Stage::Asked(work) => match self.reply.reserve(work.most_bytes()) {
+                    Ok(()) => Stage::Working(work),
+                    Err(NoRoom::Yet) => {
+                        self.stage = Stage::Asked(work);
+                        return Progress::Waiting;
+                    }
+                    Err(why) => {
+                        self.reply.refuse(why.into());
+                        Stage::Answered
+                    }
+                },
+                Stage::Working(mut work) => match work.advance() {
+                    None => Stage::Working(work),
+                    Some(answer) => Stage::Writing(self.reply.answer_in_pieces(answer)),
+                },
+                Stage::Writing(mut pieces) => {
+                    if pieces.advance() {
+                        Stage::Answered
+                    } else {
+                        Stage::Writing(pieces)
+                    }
+                }
+                Stage::Answered => Stage::Answered,
+            };
+            if work_clock::now() >= deadline && !matches!(self.stage, Stage::Answered) {
+                return Progress::Unfinished;
+            }
+        }
+        Progress::Finished
+    }
+
+    fn is_abandoned(&self) -> bool {
+        self.caller_is_gone()
+    }
+
+    fn refuse(&mut self, why: &'static str) {
+        self.end(Unserved::Refused(why));
+    }
+}

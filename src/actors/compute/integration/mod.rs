@@ -1,0 +1,146 @@
+//! `/arm_sim/integration_step`: the four methods on `x'' = f(t)`, done on the worker pool, apart from the live arm.
+//!
+//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a time.
+//!
+//! **Invariant:** nothing here knows the arm; whatever is asked, the arm and the other clients go on.
+
+mod wire;
+
+use actix::prelude::*;
+
+use super::answering::{NUMBER_BYTES, Work, answer};
+use super::workers::WorkerPool;
+use crate::actors::node::{Ask, Call};
+use crate::math::expression::Expression;
+use crate::math::integrator::Method;
+use crate::math::particle::{Particle, ParticleError};
+use crate::protocol::op::fields::{Rejection, Rejections};
+
+/// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
+const NODES_PER_LOOK: u64 = 50_000;
+/// Memory that a byte of an expression may take once it has been parsed.
+const EXPRESSION_BYTES: usize = 32;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The actor that takes the calls and hands them to the workers.
+pub struct Integration {
+    workers: WorkerPool,
+}
+
+impl Integration {
+    /// An actor that computes on `workers`.
+    #[must_use]
+    pub fn new(workers: WorkerPool) -> Self {
+        Self { workers }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// Integrates a particle of one degree of freedom. All or nothing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct IntegrationStep {
+    /// Its acceleration as a formula \[m/s²\], of t in s.
+    pub function: Option<String>,
+    /// Where it starts \[m\].
+    pub x0: Option<f64>,
+    /// How fast \[m/s\]; 0 if it is not said.
+    pub xdot0: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub dt: Option<f64>,
+    /// How many.
+    pub steps: Option<u64>,
+    /// The method that takes them.
+    pub method: Option<Method>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for IntegrationStep {
+    type Answer = Result<Box<Particle>, NotIntegrated>;
+}
+
+/// Why nothing was integrated.
+#[derive(Debug, thiserror::Error)]
+pub enum NotIntegrated {
+    /// Fields were not valid.
+    #[error("{0}")]
+    Rejected(Rejections),
+    /// They do not go together.
+    #[error(transparent)]
+    Particle(#[from] ParticleError),
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl Actor for Integration {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Handler<Call<IntegrationStep>> for Integration {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<IntegrationStep>, _: &mut Context<Self>) {
+        answer(&self.workers, call.reply, Integrating::Asked(call.ask));
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+/// A particle on its way.
+enum Integrating {
+    Asked(IntegrationStep),
+    Stepping(Box<Particle>),
+    Done,
+}
+
+impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
+    fn most_bytes(&self) -> usize {
+        let Self::Asked(ask) = self else {
+            return 0;
+        };
+        let steps = usize::try_from(ask.steps.unwrap_or_default()).unwrap_or(usize::MAX);
+        let values = steps.saturating_add(1).saturating_mul(3 * NUMBER_BYTES);
+        let function = ask.function.as_ref().map_or(0, String::len);
+        values.saturating_add(EXPRESSION_BYTES * function)
+    }
+
+    fn advance(&mut self) -> Option<Result<Box<Particle>, NotIntegrated>> {
+        match std::mem::replace(self, Self::Done) {
+            Self::Asked(ask) => match begin(ask) {
+                Ok(particle) => *self = Self::Stepping(Box::new(particle)),
+                Err(why) => return Some(Err(why)),
+            },
+            Self::Stepping(mut particle) => {
+                if particle.advance(particle.steps_within(NODES_PER_LOOK)) == 0 {
+                    return Some(Ok(particle));
+                }
+                *self = Self::Stepping(particle);
+            }
+            Self::Done => debug_assert!(false, "the particle has been given away"),
+        }
+        None
+    }
+}
+
+/// Parses the formula; every field that is wrong is named, in the order of the request, whose first it is.
+fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
+    let function = ask.function.as_deref().map(Expression::parse);
+    let mut rejected = match &function {
+        Some(Err(why)) => Rejection::refused("function:", why).into(),
+        _ => Rejections::default(),
+    };
+    rejected.append(ask.rejected);
+    match (function, ask.x0, ask.dt, ask.steps, ask.method) {
+        (Some(Ok(function)), Some(x0), Some(dt), Some(steps), Some(method))
+            if rejected.is_empty() =>
+        {
+            let xdot0 = ask.xdot0.unwrap_or(0.0);
+            Ok(Particle::new(function, x0, xdot0, dt, steps, method)?)
+        }
+        _ => Err(NotIntegrated::Rejected(rejected)),
+    }
+}

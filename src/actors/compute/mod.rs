@@ -1,0 +1,9 @@
+//! Work that takes longer than a turn of an actor: a pool of workers, and the services that compute on it.
+//!
+//! **Invariant:** nothing in here keeps an actor's thread for longer than a slice.
+
+mod answering;
+pub mod integration;
+pub mod study;
+pub mod work_clock;
+pub mod workers;

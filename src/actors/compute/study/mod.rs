@@ -1,0 +1,142 @@
+//! `/study/*`: predictions and offline runs of the arm, done on the worker pool, apart from the live arm.
+//!
+//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is. A connection
+//! hands over one computation at a time.
+//!
+//! **Invariant:** a call is answered once, and neither the arm nor another client waits for it.
+
+mod advice;
+mod messages;
+mod rollout;
+mod stability;
+mod wire;
+
+use std::time::Instant;
+
+use actix::prelude::*;
+use tokio::sync::oneshot;
+
+use self::advice::{GainsWork, PlanWork};
+pub use self::messages::{
+    NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
+    RunOffline, SuggestGains, Suggested,
+};
+use self::rollout::RolloutWork;
+use self::stability::StabilityWork;
+use super::answering::{Work, answer};
+use super::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use crate::actors::arm::sim::{ArmSettings, HeldLimit, Present};
+use crate::actors::node::{Call, Reply, Unserved};
+use crate::protocol::catalog::Node;
+use crate::study::control_loop::ControlLoop;
+use crate::study::stability::limit_held;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `study` for an arm of `N` links.
+pub struct Study<const N: usize> {
+    arm: Recipient<ArmSettings<N>>,
+    workers: WorkerPool,
+}
+
+impl<const N: usize> Study<N> {
+    /// A node that asks `arm` and computes on `workers`.
+    #[must_use]
+    pub fn new(arm: Recipient<ArmSettings<N>>, workers: WorkerPool) -> Self {
+        Self { arm, workers }
+    }
+
+    /// Asks the arm for its present settings, then hands the work to the workers.
+    fn begin<T: Send + 'static, W: Work<T> + 'static>(
+        &self,
+        mut reply: Reply<T>,
+        ctx: &mut Context<Self>,
+        work: impl FnOnce(Present<N>) -> W + 'static,
+    ) {
+        let present = self.arm.send(ArmSettings).into_actor(self);
+        ctx.spawn(present.map(move |present, study, _| match present {
+            Ok(present) => answer(&study.workers, reply, work(present)),
+            Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
+        }));
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for Study<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<PredictStability<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<PredictStability<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| StabilityWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<Call<RunOffline<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<RunOffline<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| RolloutWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<Call<SuggestGains<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<SuggestGains<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| GainsWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<Call<PlanRun<N>>> for Study<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<PlanRun<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, reply } = call;
+        self.begin(reply, ctx, |present| PlanWork::new(ask, present));
+    }
+}
+
+impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
+    type Result = ResponseFuture<Option<f64>>;
+
+    fn handle(&mut self, HeldLimit(control): HeldLimit<N>, _: &mut Context<Self>) -> Self::Result {
+        let (answer, answered) = oneshot::channel();
+        let answer = Some(answer);
+        self.workers
+            .submit(RUNTIME, Box::new(Limiting { control, answer }));
+        Box::pin(async move { answered.await.ok() })
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+/// The arm's question for its limit: one slice.
+struct Limiting<const N: usize> {
+    control: ControlLoop<N>,
+    /// Dropped unused, it says that there is no answer.
+    answer: Option<oneshot::Sender<f64>>,
+}
+
+impl<const N: usize> Computation for Limiting<N> {
+    fn advance(&mut self, _: Instant) -> Progress {
+        let limit = limit_held(&self.control).unwrap_or(f64::INFINITY);
+        if let Some(answer) = self.answer.take() {
+            // The arm may have ended meanwhile.
+            let _ = answer.send(limit);
+        }
+        Progress::Finished
+    }
+
+    fn refuse(&mut self, _: &'static str) {
+        self.answer = None;
+    }
+}

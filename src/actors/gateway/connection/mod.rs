@@ -1,0 +1,212 @@
+//! One client: bytes in, ops to the registry; messages and responses back, through a bounded outbox.
+//!
+//! A reception judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
+//! reading task hands one op at a time to the registry and waits until it has taken effect; the actor's handlers put
+//! what they are sent into the outbox; the writer, which the same actor polls behind its handlers, drains it. A
+//! client that reads slowly fills its own outbox and nothing else.
+//!
+//! Generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
+//!
+//! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
+
+mod admission;
+mod encoding;
+pub mod gate;
+mod guesses;
+mod outgoing;
+mod perform;
+mod places;
+mod reader;
+mod reception;
+mod shared;
+mod talk;
+mod transport;
+mod unfinished;
+#[cfg(feature = "web")]
+mod watched;
+#[cfg(feature = "web")]
+mod web;
+mod writer;
+
+use std::future::poll_fn;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use actix::prelude::*;
+use tokio::io::{AsyncRead, AsyncWrite};
+
+use self::gate::Gate;
+use self::reception::Reception;
+use self::shared::Shared;
+pub use super::ends::Ends;
+use super::gauges::Gauges;
+use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
+use super::registry::Registry;
+use crate::actors::panics::{contain, contained};
+use crate::protocol::catalog::{Node, Service, Topic};
+
+/// Topics that a response of the arm makes old: after the response to a pause, no message from before it may follow.
+const ARM_STATE: [&str; 8] = [
+    Topic::JointStates.name(),
+    Topic::JointStates.short_name(),
+    Topic::Clock.name(),
+    Topic::Clock.short_name(),
+    Topic::Diagnostics.name(),
+    Topic::Diagnostics.short_name(),
+    Topic::Tf.name(),
+    Topic::Tf.short_name(),
+];
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The actor of one client.
+pub struct Connection<S> {
+    /// The stream, until the reception takes it.
+    stream: Option<S>,
+    shared: Rc<Shared>,
+    /// The client has to pass this first.
+    gate: Arc<Gate>,
+    ends: Ends,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
+    /// Starts the actor for `stream` in the present system; nothing is asked of the client first.
+    pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
+        Self::start_behind(Arc::default(), Ends::default(), stream, registry, gauges)
+    }
+
+    /// Starts the actor behind a gate.
+    pub fn start_behind(
+        gate: Arc<Gate>,
+        ends: impl Into<Ends>,
+        stream: S,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Addr<Self> {
+        Self {
+            stream: Some(stream),
+            shared: Rc::new(Shared::new(registry, gauges)),
+            gate,
+            ends: ends.into(),
+        }
+        .start()
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        let address = ctx.address();
+        let outlets = Outlets {
+            deliver: address.clone().recipient(),
+            respond: address.clone().recipient(),
+            configure: address.clone().recipient(),
+            finish: address.recipient(),
+            gone: Arc::new(AtomicBool::new(false)),
+            backlog: Arc::clone(&self.shared.outgoing.backlog),
+            account: Arc::clone(&self.shared.account),
+            displaced: Arc::clone(&self.shared.displaced),
+        };
+        self.begin(outlets, ctx);
+    }
+
+    fn stopped(&mut self, _: &mut Context<Self>) {
+        if let Some(id) = self.shared.id.take() {
+            self.shared.registry.do_send(Disconnect(id));
+        }
+    }
+}
+
+// ---- handlers: the writer is polled behind them ---------------------------------------------------------------------
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Deliver> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, mut message: Deliver, ctx: &mut Context<Self>) {
+        let underway = message.underway.take();
+        self.contain(ctx, |connection| {
+            let outgoing = &connection.shared.outgoing;
+            outgoing.hold(underway);
+            outgoing.accept(message);
+        });
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Response> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, response: Response, ctx: &mut Context<Self>) {
+        self.contain(ctx, |connection| {
+            let shared = &connection.shared;
+            let service = response.service;
+            let of_arm = service.is_some_and(|one| one.owner() == Node::ArmSim);
+            let superseded: &[&str] = if of_arm { &ARM_STATE } else { &[] };
+            shared.outgoing.push_response(response.frame, superseded);
+            if service.is_some_and(Service::is_computation) {
+                shared.end_computation();
+            }
+        });
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Configure> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, configure: Configure, ctx: &mut Context<Self>) {
+        self.contain(ctx, |connection| {
+            let outgoing = &connection.shared.outgoing;
+            outgoing.configure(&configure.topic, configure.throttle);
+        });
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Finish> for Connection<S> {
+    type Result = ();
+
+    fn handle(&mut self, _: Finish, _: &mut Context<Self>) {
+        self.shared.finish();
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
+    /// Serves the client, or says why not, behind the handlers of this actor, and ends with it.
+    fn begin(&mut self, outlets: Outlets, ctx: &mut Context<Self>) {
+        let Some(stream) = self.stream.take() else {
+            return;
+        };
+        let reception = Reception {
+            shared: Rc::clone(&self.shared),
+            finish: ctx.address().recipient(),
+            gate: Arc::clone(&self.gate),
+            ends: self.ends,
+        };
+        let outgoing = Rc::clone(&self.shared.outgoing);
+        let mut serving = contained(reception.run(stream, outlets));
+        let served = poll_fn(move |cx| {
+            let polled = Pin::new(&mut serving).poll(cx);
+            outgoing.settle();
+            polled
+        });
+        ctx.spawn(served.into_actor(self).map(|served, _, ctx| {
+            if let Err(panic) = served {
+                tracing::error!(%panic, "a client's task failed; its connection ends");
+            }
+            ctx.stop();
+        }));
+    }
+
+    /// Does `work`; its panic ends this client and nothing else.
+    fn contain(&mut self, ctx: &mut Context<Self>, work: impl FnOnce(&mut Self)) {
+        if let Err(panic) = contain(|| work(self)) {
+            tracing::error!(%panic, "a client's actor failed; its connection ends");
+            ctx.stop();
+        }
+    }
+}

@@ -1,0 +1,304 @@
+//! The outgoing side of one client: its outbox, the messages that have to be encoded first, and the news for the
+//! writer.
+//!
+//! The connection's handlers put things in and the [writer](super::writer) takes them out. The writer is polled after
+//! each message that the actor has handled, so it looks for itself; whatever changes something from another task says
+//! so by [`Outgoing::tell`].
+//!
+//! **Invariant:** nothing that borrows a cell here waits while it does.
+
+use std::cell::{Cell, RefCell};
+use std::future::poll_fn;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::task::Poll;
+
+use bytes::Bytes;
+use tokio::sync::Notify;
+use tokio::time::Instant;
+
+use super::encoding::Encoding;
+use crate::actors::gateway::budget::{Account, MESSAGES_LEFT, free_elsewhere};
+use crate::actors::gateway::gauges::Gauges;
+use crate::actors::gateway::limits::{BATCH_BYTES, BATCH_FRAMES, LINGER, STALL_LIMIT};
+use crate::actors::gateway::messages::{Throttle, Underway};
+use crate::protocol::outbox::Outbox;
+
+/// An outbox of no more is freed where it stands: that takes a fraction of a millisecond.
+const FEW_BYTES: usize = 256 * 1024;
+
+/// The outgoing side of one client; one thread, so plain cells do.
+pub(super) struct Outgoing {
+    outbox: RefCell<Outbox>,
+    /// Topic messages that have to be encoded first.
+    pub(super) encoding: RefCell<Encoding>,
+    /// Messages whose publishers wait until they have been offered to the socket.
+    underway: RefCell<Vec<Underway>>,
+    /// The writer waits for its turn.
+    in_line: Cell<bool>,
+    /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
+    singly: Cell<bool>,
+    /// Since when responses have been waiting without a break.
+    responses_since: Cell<Option<Instant>>,
+    news: Notify,
+    /// When the connection was made.
+    since: Instant,
+    /// Bytes of responses in the outbox, for the registry to look at.
+    pub(super) backlog: Arc<AtomicUsize>,
+    gauges: Arc<Gauges>,
+    account: Arc<Account>,
+}
+
+impl Outgoing {
+    /// Nothing waits.
+    pub(super) fn new(gauges: Arc<Gauges>, account: Arc<Account>) -> Rc<Self> {
+        Rc::new(Self {
+            outbox: RefCell::new(Outbox::new()),
+            encoding: RefCell::default(),
+            underway: RefCell::default(),
+            in_line: Cell::new(false),
+            singly: Cell::new(false),
+            responses_since: Cell::new(None),
+            news: Notify::new(),
+            since: Instant::now(),
+            backlog: Arc::default(),
+            gauges,
+            account,
+        })
+    }
+
+    // ---- putting in -------------------------------------------------------------------------------------------------
+
+    /// Adds a topic message, or a series of them, that is ready to be sent.
+    pub(super) fn push(&self, topic: &Arc<str>, frame: Bytes) {
+        let mut outbox = self.outbox.borrow_mut();
+        let before = outbox.dropped();
+        let now = self.now(&outbox);
+        outbox.push(topic, frame, now.into_std());
+        let dropped = outbox.dropped() - before;
+        if outbox.is_throttled() {
+            // It may be held back, and the writer has to know until when.
+            self.tell();
+        }
+        drop(outbox);
+        self.count_dropped(dropped);
+    }
+
+    /// Adds a response or a status; messages of `superseded` topics that throttling still holds back are discarded,
+    /// being older.
+    pub(super) fn push_response(&self, frame: Bytes, superseded: &[&str]) {
+        let mut outbox = self.outbox.borrow_mut();
+        if outbox.response_bytes() == 0 {
+            self.responses_since.set(Some(Instant::now()));
+        }
+        outbox.push_response(frame, superseded);
+    }
+
+    /// Sets how a topic is throttled, or forgets the topic.
+    pub(super) fn configure(&self, topic: &Arc<str>, throttle: Option<Throttle>) {
+        let mut outbox = self.outbox.borrow_mut();
+        match throttle {
+            Some(Throttle {
+                interval,
+                queue_length,
+            }) => outbox.set_throttle(topic, Some((interval, queue_length))),
+            None => outbox.forget(topic),
+        }
+        self.tell();
+    }
+
+    /// Keeps a message's publisher waiting until the message has been offered to the socket.
+    pub(super) fn hold(&self, underway: Option<Underway>) {
+        self.underway.borrow_mut().extend(underway);
+    }
+
+    /// Whether each frame is written by itself.
+    pub(super) fn set_singly(&self, singly: bool) {
+        self.singly.set(singly);
+    }
+
+    /// So many topic messages had to go.
+    pub(super) fn count_dropped(&self, dropped: u64) {
+        if dropped > 0 {
+            self.gauges.add_dropped(dropped);
+        }
+    }
+
+    // ---- taking out -------------------------------------------------------------------------------------------------
+
+    /// Moves what is written next into `batch`.
+    pub(super) fn take(&self, batch: &mut Vec<Bytes>) {
+        let mut outbox = self.outbox.borrow_mut();
+        let now = self.now(&outbox).into_std();
+        // Clients that end no line take what one read gives them for one frame.
+        let frames = if self.singly.get() { 1 } else { BATCH_FRAMES };
+        outbox.take_batch(now, frames, BATCH_BYTES, batch);
+    }
+
+    /// So many bytes of what was taken have been written.
+    pub(super) fn written(&self, bytes: usize) {
+        let mut outbox = self.outbox.borrow_mut();
+        outbox.written(bytes);
+        if outbox.response_bytes() == 0 {
+            self.responses_since.set(None);
+        }
+    }
+
+    /// When a message that is held back is due, if there is one.
+    pub(super) fn next_release(&self) -> Option<Instant> {
+        let release = self.outbox.borrow_mut().next_release();
+        release.map(Instant::from_std)
+    }
+
+    /// How many bytes of topic messages are written next; `None` where a response waits, or nothing.
+    pub(super) fn topics_alone(&self) -> Option<usize> {
+        let outbox = self.outbox.borrow();
+        let alone = !outbox.is_empty() && !outbox.has_responses();
+        alone.then(|| outbox.topic_bytes().min(BATCH_BYTES))
+    }
+
+    /// Whether there is nothing to be written now.
+    pub(super) fn is_empty(&self) -> bool {
+        self.outbox.borrow().is_empty()
+    }
+
+    /// Whether a response waits.
+    pub(super) fn has_responses(&self) -> bool {
+        self.outbox.borrow().has_responses()
+    }
+
+    /// Bytes of the responses that have not been written, their places included.
+    pub(super) fn response_cost(&self) -> usize {
+        self.outbox.borrow().response_cost()
+    }
+
+    /// Bytes of topic messages that wait.
+    pub(super) fn topic_bytes(&self) -> usize {
+        self.outbox.borrow().topic_bytes()
+    }
+
+    /// Until when a client that has taken nothing since `last_byte` is borne with: while responses wait, or while it
+    /// is finishing.
+    pub(super) fn patience(&self, last_byte: Instant, is_finishing: bool) -> Option<Instant> {
+        match self.responses_since.get() {
+            Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
+            None => is_finishing.then(|| last_byte + LINGER),
+        }
+    }
+
+    // ---- news -------------------------------------------------------------------------------------------------------
+
+    /// Wakes the writer.
+    pub(super) fn tell(&self) {
+        self.news.notify_one();
+    }
+
+    /// Waits until `holds` does, or until the writer is woken for another reason.
+    pub(super) async fn news(&self, holds: impl Fn() -> bool) {
+        let seen = poll_fn(|_| {
+            if holds() {
+                Poll::Ready(())
+            } else {
+                Poll::Pending
+            }
+        });
+        tokio::select! {
+            biased;
+            () = seen => {}
+            () = self.news.notified() => {}
+        }
+    }
+
+    /// Waits in line for `turn`, while a response does not wait; publishers wait as well.
+    pub(super) async fn stand_in_line(&self, turn: impl Future<Output = ()>) {
+        self.in_line.set(true);
+        let line = InLine(self);
+        tokio::pin!(turn);
+        while !self.has_responses() {
+            tokio::select! {
+                biased;
+                () = &mut turn => break,
+                () = self.news(|| self.has_responses()) => {}
+            }
+        }
+        drop(line);
+    }
+
+    /// The actor has handled its messages and the writer has done what it could: counts what is left, and lets
+    /// publishers go on.
+    pub(super) fn settle(&self) {
+        self.recount();
+        if !self.in_line.get() {
+            self.underway.borrow_mut().clear();
+        }
+    }
+
+    // ---- memory -----------------------------------------------------------------------------------------------------
+
+    /// Tells what waits now. Responses are in the account already, each by itself.
+    fn recount(&self) {
+        let outbox = self.outbox.borrow();
+        let (count, bytes) = self.encoding.borrow().size();
+        self.backlog
+            .store(outbox.response_cost(), Ordering::Relaxed);
+        self.account
+            .queue(outbox.topic_count() + count, outbox.topic_bytes() + bytes);
+    }
+
+    /// Gives up what is asked for when all clients together hold too much: topic messages as often as need be, and
+    /// ends once it is the connection; gives how many bytes it held.
+    pub(super) async fn gives_way(&self) -> usize {
+        while !self.account.asked().await {
+            let mut outbox = self.outbox.borrow_mut();
+            let before = outbox.dropped();
+            outbox.keep_topics(MESSAGES_LEFT);
+            let unencoded = self.encoding.borrow_mut().keep(0);
+            let dropped = outbox.dropped() - before + unencoded;
+            drop(outbox);
+            self.count_dropped(dropped);
+            self.recount();
+            self.account.gave_messages();
+        }
+        self.account.held()
+    }
+
+    /// Forgets what waits for the client.
+    pub(super) fn empty(&self) {
+        self.encoding.borrow_mut().keep(0);
+        self.recount();
+        let freed = self.account.freeing();
+        let waiting = self.outbox.take();
+        self.recount();
+        free_elsewhere((waiting, freed));
+    }
+
+    /// The time, which is looked at for throttling alone.
+    fn now(&self, outbox: &Outbox) -> Instant {
+        if outbox.is_throttled() {
+            Instant::now()
+        } else {
+            self.since
+        }
+    }
+}
+
+impl Drop for Outgoing {
+    fn drop(&mut self) {
+        let outbox = std::mem::take(self.outbox.get_mut());
+        if outbox.response_cost() + outbox.topic_bytes() > FEW_BYTES {
+            let freed = self.account.freeing();
+            self.account.queue(0, 0);
+            free_elsewhere((outbox, freed));
+        }
+    }
+}
+
+/// While this is there, the writer waits for its turn.
+struct InLine<'a>(&'a Outgoing);
+
+impl Drop for InLine<'_> {
+    fn drop(&mut self) {
+        self.0.in_line.set(false);
+    }
+}

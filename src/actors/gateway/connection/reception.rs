@@ -1,0 +1,331 @@
+//! The course of a connection: by its first bytes it is refused, served over HTTP, or spoken with.
+//!
+//! **Invariant:** nothing of what a client sends is read as JSON before its opening is decided, and what has been
+//! read by then is not lost.
+
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::time::{Instant, sleep, sleep_until, timeout};
+
+use super::admission::{LockedOut, unlock};
+use super::gate::Gate;
+use super::reader::discard;
+use super::shared::Shared;
+use super::transport::{CHUNK, Plain};
+use super::unfinished::First;
+use crate::actors::ConnectionId;
+use crate::actors::gateway::ends::Ends;
+use crate::actors::gateway::limits::{FRAME_TIME, HEAD_TIME, LINGER};
+use crate::actors::gateway::messages::{Connect, Disconnect, Finish, Outlets, Refused};
+use crate::protocol::messages::{self, Level};
+use crate::protocol::op::token::Token;
+#[cfg(feature = "web")]
+use crate::protocol::wire::frame::Foreign;
+use crate::protocol::wire::frame::{FrameReader, Opening, opening};
+#[cfg(feature = "web")]
+use crate::web::{response::HttpResponse, response::HttpStatus, serve};
+
+/// Everything that the course of a connection needs.
+pub(super) struct Reception {
+    pub(super) shared: Rc<Shared>,
+    pub(super) finish: Recipient<Finish>,
+    pub(super) gate: Arc<Gate>,
+    pub(super) ends: Ends,
+}
+
+/// How a client has opened the conversation.
+enum Greeting {
+    /// It speaks JSON, if anything.
+    Json,
+    /// It sends an HTTP request that is answered.
+    #[cfg(feature = "web")]
+    Web,
+    /// It speaks another protocol, or not in time; holds the error for it.
+    Foreign(String),
+    /// The runtime has ended the connection first.
+    Finished,
+}
+
+/// How a client is served.
+enum Verdict {
+    /// It is spoken with; what has been read of it so far is in here.
+    Json(FrameReader),
+    /// Its request is answered.
+    #[cfg(feature = "web")]
+    Web(serve::Served),
+    /// It is refused: not at once, if it has tried a token that is not ours.
+    Refused { farewell: Farewell, is_guess: bool },
+    /// There is nobody left to serve.
+    Gone,
+}
+
+/// The last words to a client that is not served.
+enum Farewell {
+    /// A sentence, in a status.
+    Status(String),
+    /// Over HTTP.
+    #[cfg(feature = "web")]
+    Answer(HttpResponse),
+}
+
+impl Reception {
+    /// Serves a client, or tells it why not; returns when nothing can be sent any more.
+    pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets)
+    where
+        S: AsyncRead + AsyncWrite + Unpin + 'static,
+    {
+        let mut first = First::with_room(CHUNK, &self.shared.account);
+        let admitted = match &self.gate.token {
+            None => None,
+            // Nothing is asked of the registry for a client that has not shown the token.
+            Some(token) => match self.admit(token, &mut stream, &mut first).await {
+                Some(verdict) => Some(verdict),
+                None => return,
+            },
+        };
+        let id = match self.connect(outlets).await {
+            Ok(id) => id,
+            Err(why) => return self.refuse(&mut stream, &why.to_string()).await,
+        };
+        let verdict = match admitted {
+            Some(verdict) => verdict,
+            None => self.examine(&mut stream, &mut first, None).await,
+        };
+        self.serve(stream, id, first, verdict).await;
+    }
+
+    /// Has the client show the token, and gives what is to be done about it then. Who does not show it in time, or
+    /// has waited longest of too many, is closed.
+    async fn admit<S>(&self, token: &Token, stream: &mut S, first: &mut First) -> Option<Verdict>
+    where
+        S: AsyncRead + AsyncWrite + Unpin,
+    {
+        let place = self.gate.admission.unauthenticated.take();
+        let due = Instant::now() + HEAD_TIME;
+        // A client that has sent the token gets in, also where the place is lost in the same moment.
+        let verdict = tokio::select! {
+            biased;
+            verdict = self.examine(stream, first, Some((token, due))) => verdict,
+            () = place.lost() => {
+                turn_away(stream, &first.bytes).await;
+                return None;
+            }
+        };
+        match verdict {
+            Verdict::Gone => None,
+            Verdict::Refused { farewell, is_guess } => {
+                tokio::select! {
+                    () = self.dismiss(stream, farewell, is_guess) => {}
+                    () = place.lost() => {}
+                }
+                None
+            }
+            admitted => Some(admitted),
+        }
+    }
+
+    /// Tells a client that has not shown the token why it is not let in: later, the more wrong ones came from its
+    /// address.
+    async fn dismiss<S>(&self, stream: &mut S, farewell: Farewell, is_guess: bool)
+    where
+        S: AsyncRead + AsyncWrite + Unpin,
+    {
+        if is_guess {
+            let Some(wait) = self.gate.admission.guesses.wait(self.ends.peer.ip()) else {
+                return sleep(HEAD_TIME).await;
+            };
+            sleep(wait).await;
+        }
+        match farewell {
+            Farewell::Status(why) => self.refuse(stream, &why).await,
+            #[cfg(feature = "web")]
+            Farewell::Answer(response) => serve::answer(stream, &response).await,
+        }
+    }
+
+    /// Makes the client known.
+    async fn connect(&self, outlets: Outlets) -> Result<ConnectionId, Refused> {
+        let answer = self.shared.registry.send(Connect(outlets)).await;
+        let id = answer.unwrap_or(Err(Refused::Closed))?;
+        self.shared.id.set(Some(id));
+        Ok(id)
+    }
+
+    /// Reads until it is clear what is to be done about the client; `locked` is the token that it has to show, and
+    /// until when.
+    async fn examine<S>(
+        &self,
+        stream: &mut S,
+        first: &mut First,
+        locked: Option<(&Token, Instant)>,
+    ) -> Verdict
+    where
+        S: AsyncRead + AsyncWrite + Unpin,
+    {
+        let due = locked.map(|(_, due)| due);
+        match self.greet(stream, first, due).await {
+            Greeting::Json => match locked {
+                None => Verdict::Json(FrameReader::new()),
+                Some((token, due)) => match unlock(token, stream, first, due).await {
+                    Ok(frames) => Verdict::Json(frames),
+                    Err(why) => Verdict::Refused {
+                        farewell: Farewell::Status(why.to_string()),
+                        is_guess: why == LockedOut::Wrong,
+                    },
+                },
+            },
+            #[cfg(feature = "web")]
+            Greeting::Web => {
+                let due = due.unwrap_or_else(|| Instant::now() + HEAD_TIME);
+                let (door, admission) = (&self.gate.door, &self.gate.admission);
+                // A place is taken by a head that did not come whole.
+                let lost = async { admission.heads.take().lost().await };
+                let received = tokio::select! {
+                    biased;
+                    received = serve::receive(stream, &mut first.bytes, door, self.ends.local, due) => received,
+                    () = lost, if locked.is_none() => {
+                        Some(Err(HttpResponse::text(HttpStatus::RequestTimeout, CROWDED).into()))
+                    }
+                };
+                match received {
+                    Some(Ok(outcome)) => Verdict::Web(outcome),
+                    Some(Err(refused)) => Verdict::Refused {
+                        farewell: Farewell::Answer(refused.response),
+                        is_guess: refused.is_guess,
+                    },
+                    None => Verdict::Gone,
+                }
+            }
+            Greeting::Foreign(why) => Verdict::Refused {
+                farewell: Farewell::Status(why),
+                is_guess: false,
+            },
+            Greeting::Finished => {
+                let _ = timeout(LINGER, stream.shutdown()).await;
+                Verdict::Gone
+            }
+        }
+    }
+
+    /// Does what is to be done about a client that the registry knows.
+    async fn serve<S>(self, mut stream: S, id: ConnectionId, first: First, verdict: Verdict)
+    where
+        S: AsyncRead + AsyncWrite + Unpin + 'static,
+    {
+        match verdict {
+            Verdict::Json(frames) => self.serve_json(stream, id, frames, first).await,
+            #[cfg(feature = "web")]
+            Verdict::Web(outcome) => self.serve_web(stream, id, outcome, first).await,
+            Verdict::Refused { farewell, .. } => match farewell {
+                Farewell::Status(why) => {
+                    let _ = self.shared.registry.send(Disconnect(id)).await;
+                    self.refuse(&mut stream, &why).await;
+                }
+                #[cfg(feature = "web")]
+                Farewell::Answer(response) => serve::answer(&mut stream, &response).await,
+            },
+            Verdict::Gone => {}
+        }
+    }
+
+    /// Speaks JSON over the plain stream.
+    async fn serve_json<S>(&self, stream: S, id: ConnectionId, frames: FrameReader, first: First)
+    where
+        S: AsyncRead + AsyncWrite + Unpin + 'static,
+    {
+        let (input, output) = tokio::io::split(stream);
+        let reader = self.reader(id, frames, first.unfinished);
+        self.talk(reader, Plain(input), Plain(output), first.bytes)
+            .await;
+    }
+
+    /// Reads until the first bytes tell what the client speaks. A client that ends before that spoke JSON, if anything.
+    /// One that is silent may stay so, unless it has something to show until `due`; one that has begun what may
+    /// become a request has to go on.
+    async fn greet<S: AsyncRead + Unpin>(
+        &self,
+        stream: &mut S,
+        first: &mut First,
+        due: Option<Instant>,
+    ) -> Greeting {
+        let mut deadline = due;
+        loop {
+            let read = tokio::select! {
+                biased;
+                () = self.shared.finished() => return Greeting::Finished,
+                // A few bytes decide: there is room for them.
+                read = stream.read_buf(&mut first.bytes) => read,
+                () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
+                    return Greeting::Foreign(match due {
+                        Some(_) => LockedOut::TooLate.to_string(),
+                        None => "what this connection began with did not go on".to_owned(),
+                    });
+                }
+            };
+            if read.unwrap_or(0) == 0 {
+                return Greeting::Json;
+            }
+            match opening(&first.bytes) {
+                Opening::Undecided => {
+                    let may_be_foreign = !first.bytes.trim_ascii_start().starts_with(b"{");
+                    let time = if may_be_foreign {
+                        HEAD_TIME
+                    } else {
+                        FRAME_TIME
+                    };
+                    if !first.bytes.trim_ascii().is_empty() {
+                        deadline.get_or_insert_with(|| Instant::now() + time);
+                    }
+                }
+                Opening::Json => return Greeting::Json,
+                #[cfg(feature = "web")]
+                Opening::Foreign(Foreign::Http) if first.bytes.starts_with(b"GET ") => {
+                    return Greeting::Web;
+                }
+                Opening::Foreign(foreign) => {
+                    return Greeting::Foreign(foreign.explanation().to_owned());
+                }
+            }
+        }
+    }
+
+    /// Tells a client why it is not served, and swallows what it sends so that it can read that.
+    async fn refuse<S: AsyncRead + AsyncWrite + Unpin>(&self, stream: &mut S, why: &str) {
+        let status = messages::status(Level::Error, why, None);
+        let tell = async {
+            stream.write_all(&status).await?;
+            stream.shutdown().await
+        };
+        if let Ok(Ok(())) = timeout(LINGER, tell).await {
+            discard(Plain(stream)).await;
+        }
+    }
+}
+
+/// The response to a browser that has waited longest of too many to complete its request.
+#[cfg(feature = "web")]
+const CROWDED: &str = "the head of the request was not complete when too many others came";
+
+/// Closes a client that has waited longest of too many to show its token, and tells it why if it takes that at once.
+async fn turn_away<S: AsyncWrite + Unpin>(stream: &mut S, first: &[u8]) {
+    let why = LockedOut::Crowded.to_string();
+    let farewell = match opening(first) {
+        #[cfg(feature = "web")]
+        Opening::Foreign(Foreign::Http) => {
+            let response = HttpResponse::text(HttpStatus::Unavailable, &why);
+            [response.head().as_bytes(), response.body()]
+                .concat()
+                .into()
+        }
+        _ => messages::status(Level::Error, &why, None),
+    };
+    let tell = async {
+        stream.write_all(&farewell).await?;
+        stream.shutdown().await
+    };
+    let _ = timeout(Duration::ZERO, tell).await;
+}

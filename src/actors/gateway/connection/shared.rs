@@ -1,0 +1,173 @@
+//! The shared state of one connection: who the client is, what goes out to it, its computations, and how the
+//! connection ends.
+//!
+//! **Invariant:** nothing that borrows a cell here waits while it does.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::sync::Notify;
+
+use super::outgoing::Outgoing;
+use crate::actors::ConnectionId;
+use crate::actors::gateway::budget::{Account, Share};
+use crate::actors::gateway::gauges::Gauges;
+use crate::actors::gateway::limits::{MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING};
+use crate::actors::gateway::messages::Request;
+use crate::actors::gateway::registry::Registry;
+
+/// The state that the actor, its writer and the reading task share; one thread, so plain cells do.
+pub(super) struct Shared {
+    /// Who the client is, once the registry knows it.
+    pub(super) id: Cell<Option<ConnectionId>>,
+    pub(super) registry: Addr<Registry>,
+    /// Counts the memory that the client makes the program hold.
+    pub(super) account: Arc<Account>,
+    pub(super) outgoing: Rc<Outgoing>,
+    computations: RefCell<Computations>,
+    /// Something was written or computed: the reader may go on.
+    pub(super) room: Notify,
+    /// Notified when the client loses its place to one that comes.
+    pub(super) displaced: Arc<Notify>,
+    /// Nothing more is read; what is queued is still sent.
+    finishing: Cell<bool>,
+    /// How the connection ends.
+    pub(super) ending: Cell<Ending>,
+}
+
+/// How a connection ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ending {
+    /// The client or the runtime has finished.
+    Orderly,
+    /// The client speaks something else, or is one too many: a status says so, and its input is swallowed.
+    Refused,
+    /// The client held the most when all clients together held too much.
+    CutOff,
+}
+
+/// Why it is cut off.
+pub(super) const HELD_MOST: &str =
+    "memory: this connection held the most when all clients together held too much";
+
+/// The heavy calls of one connection: one runs, some wait.
+#[derive(Default)]
+struct Computations {
+    waiting: VecDeque<(Request, Share)>,
+    /// The memory of the request that runs, if one does.
+    running: Option<Share>,
+}
+
+impl Shared {
+    /// Nothing waits, nothing is begun.
+    pub(super) fn new(registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
+        let account = gauges.memory().open();
+        Self {
+            id: Cell::new(None),
+            registry,
+            outgoing: Outgoing::new(gauges, Arc::clone(&account)),
+            account,
+            computations: RefCell::default(),
+            room: Notify::new(),
+            displaced: Arc::default(),
+            finishing: Cell::new(false),
+            ending: Cell::new(Ending::Orderly),
+        }
+    }
+
+    /// Refuses the client: it gets this status, and nothing that it sends is looked at any more.
+    pub(super) fn refuse(&self, status: Bytes) {
+        self.ending.set(Ending::Refused);
+        self.outgoing.push_response(status, &[]);
+        self.outgoing.tell();
+    }
+
+    /// Whether the client has been refused.
+    pub(super) fn is_refused(&self) -> bool {
+        self.ending.get() == Ending::Refused
+    }
+
+    /// The client may be read: neither its responses nor its computations pile up.
+    pub(super) fn may_read(&self) -> bool {
+        self.may_compute() && self.computations.borrow().waiting.len() < MAX_COMPUTATIONS_WAITING
+    }
+
+    /// Another computation may start: its response would not come on top of too many.
+    fn may_compute(&self) -> bool {
+        self.outgoing.response_cost() <= MAX_RESPONSES_WAITING
+    }
+
+    /// So many bytes are on their way to the client: there may be room again.
+    pub(super) fn written(&self, bytes: usize) {
+        self.outgoing.written(bytes);
+        self.room.notify_one();
+        self.start_computation();
+    }
+
+    /// Queues a heavy call behind the connection's others.
+    pub(super) fn enqueue_computation(&self, request: Request, share: Share) {
+        let mut computations = self.computations.borrow_mut();
+        computations.waiting.push_back((request, share));
+        drop(computations);
+        self.start_computation();
+    }
+
+    /// The computation that ran has been answered.
+    pub(super) fn end_computation(&self) {
+        self.computations.borrow_mut().running = None;
+        self.start_computation();
+        self.room.notify_one();
+    }
+
+    /// Starts the next computation if none runs and its response would find room.
+    fn start_computation(&self) {
+        let mut computations = self.computations.borrow_mut();
+        if computations.running.is_some() || computations.waiting.is_empty() || !self.may_compute()
+        {
+            return;
+        }
+        if let Some((request, share)) = computations.waiting.pop_front() {
+            computations.running = Some(share);
+            self.registry.do_send(request);
+        }
+    }
+
+    /// Whether a computation runs or waits.
+    pub(super) fn is_computing(&self) -> bool {
+        let computations = self.computations.borrow();
+        computations.running.is_some() || !computations.waiting.is_empty()
+    }
+
+    /// Nobody waits for the computations any more.
+    pub(super) fn abandon_computations(&self) {
+        self.computations.take();
+    }
+
+    /// Nothing more is read; what is queued is sent.
+    pub(super) fn finish(&self) {
+        self.finishing.set(true);
+        self.outgoing.tell();
+        self.room.notify_one();
+    }
+
+    /// Whether nothing more is read.
+    pub(super) fn is_finishing(&self) -> bool {
+        self.finishing.get()
+    }
+
+    /// Whether nothing more is read, computed or encoded.
+    pub(super) fn is_done(&self) -> bool {
+        self.is_finishing() && !self.is_computing() && !self.outgoing.is_encoding()
+    }
+
+    /// Waits until nothing more is read.
+    pub(super) async fn finished(&self) {
+        while !self.is_finishing() {
+            self.outgoing.news(|| self.is_finishing()).await;
+        }
+    }
+}

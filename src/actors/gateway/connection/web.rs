@@ -1,0 +1,377 @@
+//! HTTP and WebSocket clients: a request is answered and that is all, or the stream becomes a WebSocket and its
+//! client is one like any other.
+//!
+//! A WebSocket message is a frame. What is asked of the protocol beside that is done here: both sides of the stream
+//! keep sharing one socket, for reading a ping means writing a pong; a peer that shows no sign of life is given up.
+//!
+//! **Invariant:** over WebSocket no status is sent before the client has asked for such.
+
+use std::cell::{Cell, RefCell};
+use std::future::poll_fn;
+use std::io;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::time::Duration;
+
+use bytes::{Bytes, BytesMut};
+use futures_util::{SinkExt, StreamExt};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::time::{Instant, sleep_until};
+use tokio_tungstenite::WebSocketStream;
+use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::error::{CapacityError, Error};
+use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, OpCode};
+use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
+use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
+
+use super::reception::Reception;
+use super::shared::{Ending, HELD_MOST, Shared};
+use super::transport::{Inbound, Outbound, read_some};
+use super::unfinished::{First, Unfinished};
+use super::watched::Watched;
+use crate::actors::ConnectionId;
+use crate::actors::gateway::budget::Share;
+use crate::actors::gateway::messages::Request;
+use crate::protocol::limits::MAX_FRAME;
+use crate::protocol::op::{Op, Verbosity};
+use crate::protocol::wire::frame::FrameReader;
+use crate::web::{message, serve};
+
+/// How often a peer is asked for a sign of life: often enough for whatever between us forgets silent connections.
+pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
+/// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong: that can
+/// be a long way behind in a full pipe.
+pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
+/// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
+/// seen to take it.
+const FRAGMENT: usize = 64 * 1024;
+/// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
+/// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
+const WRITE_BUFFER: usize = 2 * FRAGMENT;
+/// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
+const READ_BUFFER: usize = 8 * 1024;
+
+impl Reception {
+    /// Does what a client has asked for over HTTP; `behind` came after its request.
+    pub(super) async fn serve_web<S>(
+        self,
+        mut stream: S,
+        id: ConnectionId,
+        outcome: serve::Served,
+        behind: First,
+    ) where
+        S: AsyncRead + AsyncWrite + Unpin + 'static,
+    {
+        let (answers, files) = (&self.gate.admission.answers, &self.gate.admission.files);
+        let place = match &outcome {
+            serve::Served::Report(..) => files.take(),
+            _ => answers.take(),
+        };
+        let make_room = || place.displace();
+        let is_socket = tokio::select! {
+            biased;
+            () = self.shared.finished() => false,
+            is_socket = serve::respond(&mut stream, outcome, &self.gate.door, make_room) => is_socket,
+            () = place.lost() => false,
+        };
+        drop(place);
+        if !is_socket {
+            return;
+        }
+        let quiet = Request {
+            from: id,
+            id: None,
+            op: Op::SetLevel(Verbosity::NONE),
+        };
+        let _ = self.shared.registry.send(quiet).await;
+        let unfinished = Unfinished::new(&self.shared.account);
+        let unsent = self.shared.account.take(0);
+        let link = Link::open(stream, &behind.bytes, unfinished, unsent).await;
+        let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
+        let output = Output {
+            link,
+            shared: Rc::clone(&self.shared),
+            unfinished: None,
+        };
+        let reader = self.reader(id, FrameReader::of_messages(), behind.unfinished);
+        self.talk(reader, input, output, BytesMut::new()).await;
+    }
+}
+
+/// Both halves share this; one thread, so plain cells do.
+struct Link<S> {
+    socket: RefCell<WebSocketStream<Watched<S>>>,
+    /// When the peer last sent or took a byte.
+    life: Rc<Cell<Instant>>,
+    /// The peer is to be asked for a sign of life.
+    ping_is_due: Cell<bool>,
+    /// Why the connection ends, for the peer to know.
+    farewell: Cell<(CloseCode, &'static str)>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
+    /// Takes a stream on which the handshake has been made; `behind` came after it.
+    async fn open(stream: S, behind: &[u8], unfinished: Unfinished, unsent: Share) -> Rc<Self> {
+        let life = Rc::new(Cell::new(Instant::now()));
+        let watched = Watched::new(stream, Rc::clone(&life), unfinished, unsent);
+        let config = WebSocketConfig::default()
+            .read_buffer_size(READ_BUFFER)
+            .write_buffer_size(FRAGMENT)
+            .max_write_buffer_size(WRITE_BUFFER)
+            .max_message_size(Some(MAX_FRAME))
+            .max_frame_size(Some(MAX_FRAME));
+        let role = Role::Server;
+        let socket =
+            WebSocketStream::from_partially_read(watched, behind.to_vec(), role, Some(config));
+        Rc::new(Self {
+            socket: RefCell::new(socket.await),
+            life,
+            ping_is_due: Cell::new(false),
+            farewell: Cell::new((CloseCode::Away, "shutting down")),
+        })
+    }
+
+    /// The next message; `None` once the connection is closed.
+    async fn next(&self) -> Option<Result<Message, Error>> {
+        poll_fn(|cx| {
+            let mut socket = self.socket.borrow_mut();
+            socket.get_mut().begin_turn();
+            socket.poll_next_unpin(cx)
+        })
+        .await
+    }
+
+    /// Puts a message where [`Link::flush`] finds it; `None` if the peer is gone.
+    fn put(&self, message: Message) -> Option<()> {
+        self.socket.borrow_mut().start_send_unpin(message).ok()
+    }
+
+    /// Waits until all that was put there has been written; `None` if the peer is gone.
+    async fn flush(&self) -> Option<()> {
+        poll_fn(|cx| self.socket.borrow_mut().poll_flush_unpin(cx))
+            .await
+            .ok()
+    }
+}
+
+/// The receiving half.
+struct Input<S> {
+    link: Rc<Link<S>>,
+    shared: Rc<Shared>,
+    next_ping: Instant,
+    /// Since when a sign of life has been waited for.
+    asked: Option<Instant>,
+    /// When the last read ended.
+    read_until: Instant,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
+    fn new(link: Rc<Link<S>>, shared: Rc<Shared>) -> Self {
+        let now = Instant::now();
+        Self {
+            link,
+            shared,
+            next_ping: now + PING_INTERVAL,
+            asked: None,
+            read_until: now,
+        }
+    }
+
+    /// The next message; an error if the peer shows no sign of life.
+    async fn next(&mut self) -> io::Result<Option<Result<Message, Error>>> {
+        loop {
+            let pong_due = self.asked.map(|asked| asked + PONG_TIME);
+            let late = self.link.socket.borrow().get_ref().late();
+            let due = pong_due.into_iter().chain(late).min();
+            let wake = due.map_or(self.next_ping, |due| due.min(self.next_ping));
+            tokio::select! {
+                biased;
+                message = self.link.next() => return Ok(message),
+                () = sleep_until(wake) => self.look_for_life()?,
+            }
+        }
+    }
+
+    /// A message is complete.
+    fn take(&self, message: &[u8], chunk: &mut BytesMut) {
+        message::append_line(message, chunk);
+        self.link.socket.borrow_mut().get_mut().complete();
+    }
+
+    fn look_for_life(&mut self) -> io::Result<()> {
+        let now = Instant::now();
+        let late = self.link.socket.borrow().get_ref().late();
+        if late.is_some_and(|late| late <= now) {
+            self.link.farewell.set((CloseCode::Policy, TOO_SLOW));
+            self.shared.ending.set(Ending::Refused);
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        if let Some(asked) = self.asked {
+            if self.link.life.get() > asked {
+                self.asked = None;
+            } else if now >= asked + PONG_TIME {
+                self.link.farewell.set((CloseCode::Away, "no sign of life"));
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+        }
+        if now >= self.next_ping {
+            self.next_ping = now + PING_INTERVAL;
+            self.asked.get_or_insert(now);
+            self.link.ping_is_due.set(true);
+            self.shared.outgoing.tell();
+        }
+        Ok(())
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
+    async fn read(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
+        // While nothing was read, no sign of life could be seen.
+        let unread = self.read_until.elapsed();
+        self.read_until = Instant::now();
+        self.asked = self.asked.map(|asked| asked + unread);
+        self.link.socket.borrow_mut().get_mut().read_on(unread);
+        let before = chunk.len();
+        while chunk.len() == before {
+            match self.next().await? {
+                Some(Ok(Message::Text(text))) => self.take(text.as_bytes(), chunk),
+                Some(Ok(Message::Binary(bytes))) => self.take(&bytes, chunk),
+                // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
+                // it.
+                Some(Ok(control)) => {
+                    let mut socket = self.link.socket.borrow_mut();
+                    socket.get_mut().control(control.len());
+                }
+                // The peer has closed, and takes no answers any more.
+                None => return Err(io::ErrorKind::ConnectionAborted.into()),
+                Some(Err(error)) => {
+                    self.link.farewell.set(farewell(&error));
+                    self.shared.ending.set(Ending::Refused);
+                    return Err(io::ErrorKind::InvalidData.into());
+                }
+            }
+        }
+        self.read_until = Instant::now();
+        Ok(chunk.len() - before)
+    }
+
+    async fn swallow(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
+        let link = &self.link;
+        poll_fn(|cx| {
+            let mut socket = link.socket.borrow_mut();
+            socket.get_mut().begin_turn();
+            let mut reading = std::pin::pin!(read_some(socket.get_mut(), chunk));
+            reading.as_mut().poll(cx)
+        })
+        .await
+    }
+}
+
+/// The reason given where a message takes longer than `FRAME_TIME`.
+const TOO_SLOW: &str = "a message that has begun must be complete within a minute";
+
+/// The reason given where a peer has broken a rule.
+fn farewell(error: &Error) -> (CloseCode, &'static str) {
+    match error {
+        Error::Capacity(CapacityError::MessageTooLong { .. }) => {
+            (CloseCode::Size, "a message has at most 4 MiB")
+        }
+        Error::Utf8(_) => (CloseCode::Invalid, "a text message is UTF-8"),
+        _ => (CloseCode::Protocol, "not as RFC 6455 has it"),
+    }
+}
+
+/// The sending half.
+struct Output<S> {
+    link: Rc<Link<S>>,
+    shared: Rc<Shared>,
+    /// The kind of message that the next write goes on with, if it does not begin one.
+    unfinished: Option<Data>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
+    const END_IS_ANSWERED: bool = true;
+
+    async fn write(&mut self, frames: &[Bytes]) -> Option<usize> {
+        // Pongs that wait would take the room of what is put there.
+        self.link.flush().await?;
+        let mut written = 0;
+        for frame in frames {
+            let room = FRAGMENT.saturating_sub(written);
+            if written > 0 && frame.len() > room {
+                break;
+            }
+            let kind = self.unfinished.unwrap_or_else(|| kind_of(frame));
+            let (piece, is_last) = first_piece(frame, kind == Data::Text, room);
+            written += piece.len();
+            let is_whole = piece.len() == frame.len();
+            let opcode = match self.unfinished {
+                Some(_) => Data::Continue,
+                None => kind,
+            };
+            self.unfinished = (!is_last).then_some(kind);
+            let payload = match piece.strip_suffix(b"\n") {
+                Some(line) if is_last && kind == Data::Text => piece.slice_ref(line),
+                _ => piece,
+            };
+            let part = Frame::message(payload, OpCode::Data(opcode), is_last);
+            self.link.put(Message::Frame(part))?;
+            if !is_whole {
+                break;
+            }
+        }
+        self.link.flush().await?;
+        Some(written)
+    }
+
+    async fn tend(&mut self) -> Option<()> {
+        if !self.link.ping_is_due.take() {
+            return Some(());
+        }
+        self.link.flush().await?;
+        self.link.put(Message::Ping(Bytes::new()))?;
+        self.link.flush().await
+    }
+
+    async fn end(&mut self) -> io::Result<()> {
+        let (code, why) = if self.shared.ending.get() == Ending::CutOff {
+            (CloseCode::Again, HELD_MOST)
+        } else {
+            self.link.farewell.get()
+        };
+        let reason = Utf8Bytes::from_static(why);
+        let gone = || io::Error::from(io::ErrorKind::ConnectionAborted);
+        let close = Message::Close(Some(CloseFrame { code, reason }));
+        self.link.flush().await.ok_or_else(gone)?;
+        self.link.put(close).ok_or_else(gone)?;
+        self.link.flush().await.ok_or_else(gone)?;
+        if !self.shared.is_refused() {
+            return Ok(());
+        }
+        // Nothing that it sends is looked at any more, a close frame included: the stream's own end has to do.
+        poll_fn(|cx| Pin::new(self.link.socket.borrow_mut().get_mut()).poll_shutdown(cx)).await
+    }
+}
+
+/// How a frame goes out: JSON begins with a brace, CBOR never does.
+fn kind_of(frame: &Bytes) -> Data {
+    if frame.first() == Some(&b'{') {
+        Data::Text
+    } else {
+        Data::Binary
+    }
+}
+
+/// As much of a frame as there is room for in one WebSocket frame, and whether a message ends there. A text may be
+/// several messages, one per line.
+fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
+    let offered = frame.slice(..frame.len().min(room));
+    if !is_text {
+        let is_last = offered.len() == frame.len();
+        return (offered, is_last);
+    }
+    match offered.iter().position(|&byte| byte == b'\n') {
+        Some(end) => (offered.slice(..=end), true),
+        None => (offered, false),
+    }
+}

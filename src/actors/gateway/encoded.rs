@@ -1,0 +1,120 @@
+//! A topic message in the form that some of its subscribers have asked for.
+//!
+//! **Invariant:** it is made once, whoever asked for it, and not before one of them has room for it; what takes long
+//! is made on another thread.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytes::Bytes;
+use serde_json::Value;
+use tokio::sync::OnceCell;
+
+use super::aside::{Errand, aside};
+use super::budget::Memory;
+use crate::protocol::messages;
+use crate::protocol::op::{Compression, Encoding};
+use crate::protocol::ros::cbor;
+use crate::protocol::wire::{fragments, series};
+
+/// Longest message, or series of them, that is encoded where it is heard: in all the forms that there may be it takes
+/// a fraction of a millisecond.
+const SHORT: usize = 4 * 1024;
+
+/// A message, or a series of them, in one form, each message by itself: whoever keeps one keeps none of the others in
+/// memory.
+pub struct Encoded {
+    /// The topic, as the subscribers spell it.
+    spelling: Arc<str>,
+    plain: Bytes,
+    encoding: Encoding,
+    /// The type of the topic's messages, where it matters and is known.
+    type_name: Option<Box<str>>,
+    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    fragmented: Arc<AtomicU64>,
+    /// Counts what is made.
+    memory: Memory,
+    made: OnceCell<Vec<Bytes>>,
+}
+
+impl Encoded {
+    pub(super) fn new(
+        spelling: &Arc<str>,
+        plain: Bytes,
+        encoding: Encoding,
+        type_name: Option<&str>,
+        (fragmented, memory): (&Arc<AtomicU64>, &Memory),
+    ) -> Self {
+        let is_binary = encoding.compression != Compression::None;
+        Self {
+            spelling: Arc::clone(spelling),
+            plain,
+            encoding,
+            type_name: type_name.filter(|_| is_binary).map(Into::into),
+            fragmented: Arc::clone(fragmented),
+            memory: memory.clone(),
+            made: OnceCell::new(),
+        }
+    }
+
+    /// How long it is as it came, in bytes.
+    pub(super) fn plain_length(&self) -> usize {
+        self.plain.len()
+    }
+
+    /// The messages, if they have been made, or are so short that they can be at once.
+    pub(super) fn at_hand(&self) -> Option<&[Bytes]> {
+        if !self.made.initialized() && self.plain.len() <= SHORT {
+            // Somebody else may just be at it, which is as good.
+            let _ = self.made.set(self.make());
+        }
+        self.made.get().map(Vec::as_slice)
+    }
+
+    /// The messages, once they have been made.
+    pub(super) async fn messages(self: &Arc<Self>) -> &[Bytes] {
+        let make = || async {
+            let this = Arc::clone(self);
+            let made = aside(Errand::Writing, move || this.make()).await;
+            made.unwrap_or_default()
+        };
+        self.made.get_or_init(make).await
+    }
+
+    fn make(&self) -> Vec<Bytes> {
+        let all = self.plain.len();
+        let singly = series::messages(self.plain.clone());
+        singly
+            .filter_map(|message| {
+                let is_counted = message.len() == all;
+                let encoded = self.encode(&message)?;
+                Some(match encoded {
+                    Some(encoded) => self.memory.count(encoded),
+                    None if is_counted => message,
+                    None => self.memory.count(Bytes::copy_from_slice(&message)),
+                })
+            })
+            .collect()
+    }
+
+    /// One message: `None` where it can't be written so, `Some(None)` where it stays as it is.
+    #[allow(clippy::option_option, reason = "one is dropped, the other is not")]
+    fn encode(&self, plain: &Bytes) -> Option<Option<Bytes>> {
+        let spelling = &*self.spelling;
+        let type_name = self.type_name.as_deref();
+        if self.encoding.compression == Compression::None {
+            let size = self.encoding.fragment_size;
+            return Some(size.filter(|size| plain.len() > *size).map(|size| {
+                let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
+                fragments::split(plain, size, &format!("pendularm:{number}"))
+            }));
+        }
+        let msg = messages::message_text(spelling, plain);
+        let msg: Value = serde_json::from_slice(msg).ok()?;
+        let bytes = match self.encoding.compression {
+            Compression::CborRaw => cbor::publish_raw(spelling, type_name?, &msg)?,
+            _ => cbor::publish(spelling, type_name, &msg),
+        };
+        Some(Some(Bytes::from(bytes)))
+    }
+}

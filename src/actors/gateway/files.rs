@@ -1,0 +1,105 @@
+//! Open files: as many as all clients need, or as many clients as there are files for.
+//!
+//! Every client is an open file. A process usually may have 1,024 of them and is allowed to ask for more. Where it is
+//! not, fewer clients are served: one too many must find a file to read why with.
+//!
+//! **Invariant:** the clients that are served never need all files that there may be.
+
+use super::connection::gate::MAX_UNAUTHENTICATED;
+use super::limits::MAX_CONNECTIONS;
+
+/// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a
+/// report, and the clients that are just being refused for being too many.
+pub const OTHER_FILES: usize = 32;
+/// Asked for beyond that, so that many clients can be refused at once.
+const REFUSED_AT_ONCE: usize = 480;
+
+/// How many connections there can be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// Clients that are served.
+    pub clients: usize,
+    /// Connections, besides, that have not shown the token yet.
+    pub unauthenticated: usize,
+}
+
+/// Raises the limit of open files as far as is needed and allowed, and gives how many connections there can be: all
+/// that are wanted, or fewer, which is logged.
+#[must_use]
+pub fn make_room(asks_token: bool) -> Room {
+    let wanted = MAX_CONNECTIONS + MAX_UNAUTHENTICATED + OTHER_FILES + REFUSED_AT_ONCE;
+    // It is never lowered.
+    match rlimit::increase_nofile_limit(wanted as u64) {
+        Ok(files) => {
+            let files = usize::try_from(files).unwrap_or(usize::MAX);
+            let room = room_with(files, asks_token);
+            let clients = room.clients;
+            if clients < MAX_CONNECTIONS {
+                tracing::warn!(
+                    files,
+                    clients,
+                    "few files may be open, so few clients are served"
+                );
+            }
+            room
+        }
+        Err(error) => {
+            tracing::warn!(%error, "the limit of open files is unknown");
+            room_with(usize::MAX, asks_token)
+        }
+    }
+}
+
+/// Counts the places that there are where so many files may be open: at least one client. Where files are few, those
+/// without the token have half of them.
+#[must_use]
+pub fn room_with(files: usize, asks_token: bool) -> Room {
+    let files = files.saturating_sub(OTHER_FILES);
+    let unauthenticated = if asks_token {
+        (files / 2).clamp(1, MAX_UNAUTHENTICATED)
+    } else {
+        0
+    };
+    Room {
+        clients: (files - unauthenticated.min(files)).clamp(1, MAX_CONNECTIONS),
+        unauthenticated,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clients_with(files: usize) -> usize {
+        room_with(files, false).clients
+    }
+
+    #[test]
+    fn there_are_files_for_every_client_that_is_served() {
+        assert_eq!(clients_with(usize::MAX), MAX_CONNECTIONS);
+        assert_eq!(clients_with(MAX_CONNECTIONS + OTHER_FILES), MAX_CONNECTIONS);
+        assert_eq!(clients_with(1024), 1024 - OTHER_FILES);
+        assert_eq!(clients_with(40), 8);
+        assert_eq!(clients_with(3), 1);
+    }
+
+    #[test]
+    fn there_are_files_for_those_without_the_token_too() {
+        for (files, clients, unauthenticated) in [
+            (usize::MAX, MAX_CONNECTIONS, MAX_UNAUTHENTICATED),
+            (
+                1024,
+                1024 - OTHER_FILES - MAX_UNAUTHENTICATED,
+                MAX_UNAUTHENTICATED,
+            ),
+            (64, 16, 16),
+            (3, 1, 1),
+        ] {
+            let room = room_with(files, true);
+            assert_eq!(
+                (room.clients, room.unauthenticated),
+                (clients, unauthenticated)
+            );
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! Counters that one node writes and another reports: what `/diagnostics` says about the gateway, and work whose
+//! absence is to be shown. What clients hold is counted beside them.
+//!
+//! The arm publishes `/diagnostics` from its own thread; asking the registry once a second would make the gateway part
+//! of the arm's timing, so the gateway keeps these numbers where the arm can read them.
+//!
+//! **Invariant:** the counters are statistics: only by what clients hold anything is decided.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::budget::Memory;
+
+/// Numbers about the runtime, shared by reference.
+#[derive(Debug, Default)]
+pub struct Gauges {
+    connections: AtomicU64,
+    messages_dropped: AtomicU64,
+    error_estimates: AtomicU64,
+    memory: Memory,
+}
+
+impl Gauges {
+    /// Counters at zero, beside memory of one's own.
+    #[must_use]
+    pub fn with(memory: Memory) -> Self {
+        Self {
+            memory,
+            ..Self::default()
+        }
+    }
+
+    /// Counts what clients hold.
+    #[must_use]
+    pub fn memory(&self) -> &Memory {
+        &self.memory
+    }
+
+    /// Clients connected now.
+    #[must_use]
+    pub fn connections(&self) -> u64 {
+        self.connections.load(Ordering::Relaxed)
+    }
+
+    /// Topic messages that full outboxes have dropped since the start.
+    #[must_use]
+    pub fn messages_dropped(&self) -> u64 {
+        self.messages_dropped.load(Ordering::Relaxed)
+    }
+
+    /// Estimates of the arm's local error made since the start: none without a subscriber.
+    #[must_use]
+    pub fn error_estimates(&self) -> u64 {
+        self.error_estimates.load(Ordering::Relaxed)
+    }
+
+    /// Counts one estimate.
+    pub fn add_estimate(&self) {
+        self.error_estimates.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Sets the number of clients connected.
+    pub fn set_connections(&self, connections: u64) {
+        self.connections.store(connections, Ordering::Relaxed);
+    }
+
+    /// Adds newly dropped topic messages.
+    pub fn add_dropped(&self, messages: u64) {
+        self.messages_dropped.fetch_add(messages, Ordering::Relaxed);
+    }
+}

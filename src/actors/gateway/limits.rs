@@ -1,0 +1,57 @@
+//! Limits that several parts of the gateway keep.
+//!
+//! **Invariant:** nothing of the gateway is imported here, so that every part of it can import this.
+
+use std::time::Duration;
+
+/// Clients at once; each costs a few kilobytes at rest and at most its outbox under load. Fewer where fewer files may
+/// be open.
+pub const MAX_CONNECTIONS: usize = 1024;
+/// While more bytes of responses than this wait, the client is not read and none of its computations starts.
+pub const MAX_RESPONSES_WAITING: usize = 32 * 1024 * 1024;
+/// Subscriptions (topic and id) of one connection.
+pub const MAX_SUBSCRIPTIONS: usize = 1024;
+/// Different `fragment_size`s among the subscriptions to a topic: a message is cut up once for each of them.
+pub const MAX_FRAGMENT_SIZES: usize = 16;
+/// Topics that one connection advertises.
+pub const MAX_ADVERTISED: usize = 1024;
+/// Services that one connection provides.
+pub const MAX_PROVIDED: usize = 256;
+/// Calls of one connection that wait for clients to answer.
+pub const MAX_WAITING_CALLS: usize = 256;
+/// How long a provider may take when its caller does not say.
+pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
+/// Bytes of a registration, beside three times its name: its places in the tables.
+pub const REGISTRATION_BYTES: usize = 1024;
+/// Bytes of a call that waits for a client, beside its `id` and its name: its entry, and its timer.
+pub const CALL_BYTES: usize = 1024;
+/// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
+/// answers to its own calls) is refused: it has not been read for long then, but others would go on.
+pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
+/// How long a request may take from its first bytes to the end of its head, and how long a client may take from
+/// connecting to its token: as much as a slow line needs, too little to hold a place for.
+pub const HEAD_TIME: Duration = Duration::from_secs(5);
+/// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
+/// end of the stream itself may take.
+pub const LINGER: Duration = Duration::from_secs(5);
+/// A client that takes no byte for so long while responses wait is disconnected.
+pub const STALL_LIMIT: Duration = Duration::from_secs(20);
+/// How long a frame may take from its first byte to its last; one that is longer than a frame may be, and is skipped,
+/// as long again for every such length. Longer than the slowest line needs that anybody would steer an arm by.
+pub const FRAME_TIME: Duration = Duration::from_secs(60);
+/// How long a client that has stopped sending is owed the responses that are not ready yet: longer than other clients
+/// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
+pub const RESPONSES_OWED: Duration = Duration::from_secs(15);
+/// Bytes offered in one write: after that much the other connections have a turn.
+pub(super) const BATCH_BYTES: usize = 256 * 1024;
+/// Frames in one write.
+pub(super) const BATCH_FRAMES: usize = 64;
+/// Frames of a chunk for which nobody stands in line: more than a client has under way that waits for responses.
+pub(super) const FREE_FRAMES: usize = 32;
+/// Pieces of messages are looked at so long after they have become too old.
+pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
+/// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.
+pub const MAX_COMPUTATIONS_WAITING: usize = 16;
+/// A frame of no more bytes is read where it comes, which takes a fraction of a millisecond whatever the bytes are; a
+/// longer one on another thread.
+pub const READ_HERE: usize = 64 * 1024;

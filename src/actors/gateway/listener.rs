@@ -1,0 +1,149 @@
+//! Accepts clients and gives each its connection actor.
+//!
+//! **Invariant:** an error of `accept` (too many open files, a client gone already) never ends the listening and never
+//! spins.
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use socket2::{SockRef, TcpKeepalive};
+use tokio::net::{TcpListener, TcpStream};
+
+use super::connection::Connection;
+use super::connection::gate::Gate;
+use super::ends::Ends;
+use super::gauges::Gauges;
+use super::registry::Registry;
+
+/// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
+const BACKOFF: Duration = Duration::from_millis(50);
+/// A client's machine from which nothing has come for so long is asked whether it is still there: seldom enough to cost
+/// nothing, often enough for a router between us to keep the connection in mind.
+pub const KEEPALIVE_IDLE: Duration = Duration::from_secs(60);
+/// Time between two such questions, and how many may go unanswered: half a minute without a network is no reason to go.
+pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(15);
+/// See [`KEEPALIVE_INTERVAL`].
+pub const KEEPALIVE_PROBES: u32 = 4;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The actor that owns one listening socket.
+pub struct Listener {
+    socket: Arc<TcpListener>,
+    registry: Addr<Registry>,
+    gauges: Arc<Gauges>,
+    gate: Arc<Gate>,
+}
+
+impl Listener {
+    /// A listener on a socket that is bound already; nothing is asked of its clients first.
+    #[must_use]
+    pub fn new(socket: TcpListener, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
+        Self::behind(Arc::default(), socket, registry, gauges)
+    }
+
+    /// A listener whose clients come through a gate.
+    #[must_use]
+    pub fn behind(
+        gate: Arc<Gate>,
+        socket: TcpListener,
+        registry: Addr<Registry>,
+        gauges: Arc<Gauges>,
+    ) -> Self {
+        Self {
+            socket: Arc::new(socket),
+            registry,
+            gauges,
+            gate,
+        }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// No more clients are accepted. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct StopListening;
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl Actor for Listener {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        let accepting = accept(
+            Arc::clone(&self.socket),
+            self.registry.clone(),
+            Arc::clone(&self.gauges),
+            Arc::clone(&self.gate),
+        );
+        ctx.spawn(accepting.into_actor(self));
+    }
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Handler<StopListening> for Listener {
+    type Result = ();
+
+    fn handle(&mut self, _: StopListening, ctx: &mut Context<Self>) {
+        ctx.stop();
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+async fn accept(
+    socket: Arc<TcpListener>,
+    registry: Addr<Registry>,
+    gauges: Arc<Gauges>,
+    gate: Arc<Gate>,
+) {
+    // Told once, not twenty times a second.
+    let mut failing = false;
+    loop {
+        match socket.accept().await {
+            Ok((stream, peer)) => {
+                if std::mem::take(&mut failing) {
+                    tracing::info!("clients are accepted again");
+                }
+                if let Err(error) = prepare(&stream) {
+                    tracing::debug!(%peer, %error, "a socket option refused");
+                }
+                tracing::debug!(%peer, "client connected");
+                let local = stream.local_addr().unwrap_or(Ends::default().local);
+                let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
+                let ends = Ends { local, peer };
+                Connection::start_behind(Arc::clone(&gate), ends, stream, registry, gauges);
+            }
+            Err(error) => {
+                if !std::mem::replace(&mut failing, true) {
+                    tracing::warn!(%error, "cannot accept a client; trying again and again");
+                }
+                actix_rt::time::sleep(BACKOFF).await;
+            }
+        }
+    }
+}
+
+fn prepare(stream: &TcpStream) -> std::io::Result<()> {
+    // Small frames must not wait for one another's acknowledgements.
+    stream.set_nodelay(true)?;
+    // Over raw TCP nothing else tells a silent client from one whose machine is gone.
+    let keepalive = TcpKeepalive::new()
+        .with_time(KEEPALIVE_IDLE)
+        .with_interval(KEEPALIVE_INTERVAL)
+        .with_retries(KEEPALIVE_PROBES);
+    SockRef::from(stream).set_tcp_keepalive(&keepalive)
+}
+
+/// Binds a TCP socket in the present runtime.
+///
+/// # Errors
+/// The operating system's, for instance when the port is in use.
+pub async fn bind(address: SocketAddr) -> std::io::Result<TcpListener> {
+    TcpListener::bind(address).await
+}

@@ -1,0 +1,223 @@
+//! The messages between connections, the registry and the nodes.
+//!
+//! **Invariant:** the registry has one mailbox, and so has each connection: what one sender sends takes effect in the
+//! order sent.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::time::Duration;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::sync::{Notify, oneshot};
+
+use super::budget::Account;
+use super::encoded::Encoded;
+use crate::actors::ConnectionId;
+pub use crate::actors::node::{Feedback, Publish, Respond};
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Op;
+use crate::protocol::ros::rosapi::Census;
+use crate::protocol::wire::payload::Payload;
+
+/// A new client. From its connection; the answer is its id.
+#[derive(Message)]
+#[rtype(result = "Result<ConnectionId, Refused>")]
+pub struct Connect(pub Outlets);
+
+/// The ways to a connection; one mailbox behind all of them, so order is kept between them.
+#[derive(Clone)]
+pub struct Outlets {
+    /// Topic messages.
+    pub deliver: Recipient<Deliver>,
+    /// Responses, statuses and forwarded calls.
+    pub respond: Recipient<Response>,
+    /// Throttling of topics.
+    pub configure: Recipient<Configure>,
+    /// The end.
+    pub finish: Recipient<Finish>,
+    /// Set when the client is gone: heavy computations for it stop.
+    pub gone: Arc<AtomicBool>,
+    /// Bytes of responses that wait to be written; kept by the connection.
+    pub backlog: Arc<AtomicUsize>,
+    /// Counts the memory that the client makes the program hold.
+    pub account: Arc<Account>,
+    /// Notified when the client loses its place to one that comes.
+    pub displaced: Arc<Notify>,
+}
+
+/// Why a client was not taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Refused {
+    /// The limit is reached, which this is.
+    #[error("too many connections: this runtime serves {0} clients at once")]
+    Full(usize),
+    /// The runtime is ending.
+    #[error("shutting down")]
+    Closed,
+}
+
+/// The client's stream has ended; frames that came before may still wait. From its connection: it only waits now, and
+/// where all places are taken, the oldest such client gives way to one that comes.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Ended(pub ConnectionId);
+
+/// The client has stopped sending: all that it registered is withdrawn. From its connection; the receiver, if there is
+/// one, ends when the calls that it made have been answered.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Retire(pub ConnectionId);
+
+/// The client is gone: all that it registered is withdrawn. From its connection; repeating is harmless.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Disconnect(pub ConnectionId);
+
+/// One op of a client. From its connection, which waits for [`Handled`] before it reads on.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct Request {
+    /// The client.
+    pub from: ConnectionId,
+    /// The frame's `id`, if it had one.
+    pub id: Option<Payload>,
+    /// Its request.
+    pub op: Op,
+}
+
+/// The op has been routed. Its effect may be still to come, in a node or at the subscribers' sockets: a receiver ends
+/// when it has.
+#[derive(MessageResponse, Default)]
+pub struct Handled {
+    node: Option<oneshot::Receiver<()>>,
+    subscribers: Option<oneshot::Receiver<()>>,
+}
+
+impl Handled {
+    /// Nothing is still to come.
+    #[must_use]
+    pub fn at_once() -> Self {
+        Self::default()
+    }
+
+    /// The op has gone to a node, or to a client that provides a service.
+    #[must_use]
+    pub const fn by_node(effect: oneshot::Receiver<()>) -> Self {
+        Self {
+            node: Some(effect),
+            subscribers: None,
+        }
+    }
+
+    /// The op's message has also gone to subscribers, if there is a receiver.
+    #[must_use]
+    pub fn and_by_subscribers(self, effect: Option<oneshot::Receiver<()>>) -> Self {
+        Self {
+            subscribers: effect,
+            ..self
+        }
+    }
+
+    /// Whether a node has yet to perform the op.
+    #[must_use]
+    pub const fn is_with_a_node(&self) -> bool {
+        self.node.is_some()
+    }
+
+    /// Waits until the op has taken effect.
+    pub async fn effect(self) {
+        for effect in [self.node, self.subscribers].into_iter().flatten() {
+            // The sender is dropped, never used: its end is the news.
+            let _ = effect.await;
+        }
+    }
+}
+
+/// Which topics and services clients have. From `rosapi`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Census")]
+pub struct TakeCensus;
+
+/// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct RefuseCalls(pub &'static str);
+
+/// Every connection sends what it has and ends. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct FinishAll;
+
+// ---- from the registry to a connection ------------------------------------------------------------------------------
+
+/// A topic message for this client, or several, one behind the other. From the registry; may be dropped, oldest
+/// first, when the client is slow.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub struct Deliver {
+    /// The topic, for throttling.
+    pub topic: Arc<str>,
+    /// The message or messages, shared by all subscribers.
+    pub frames: Frames,
+    /// Dropped once the message has been offered to the client's socket, if its publisher waits for that.
+    pub underway: Option<Underway>,
+}
+
+/// Shared by the deliveries of a client's message: its publisher goes on when the last of them is dropped.
+pub type Underway = Arc<oneshot::Sender<()>>;
+
+/// Topic messages as a subscriber wants them.
+#[derive(Clone)]
+pub enum Frames {
+    /// A whole frame, or a [series](crate::protocol::wire::series) of them.
+    Plain(Bytes),
+    /// Frames in another form, made when the client has room. Where throttling keeps only so many, the others but the
+    /// first need not come.
+    Encoded(Arc<Encoded>, Option<usize>),
+}
+
+impl Frames {
+    /// How long they are as they came, in bytes.
+    pub(super) fn plain_length(&self) -> usize {
+        match self {
+            Self::Plain(frame) => frame.len(),
+            Self::Encoded(encoded, _) => encoded.plain_length(),
+        }
+    }
+}
+
+/// A response, a status, or a call forwarded to this client as a provider. From the registry; never dropped.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub struct Response {
+    /// The whole frame.
+    pub frame: Bytes,
+    /// The service that it answers, if it is the runtime's own.
+    pub service: Option<Service>,
+}
+
+/// How a topic is throttled for this client; `None` once it is not subscribed. From the registry.
+#[derive(Message, Clone)]
+#[rtype(result = "()")]
+pub struct Configure {
+    /// The topic.
+    pub topic: Arc<str>,
+    /// The smallest of the subscriptions' values.
+    pub throttle: Option<Throttle>,
+}
+
+/// The throttling that a connection's subscriptions to one topic ask for together: the smallest of each value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Throttle {
+    /// Least time between two deliveries; zero is no limit.
+    pub interval: Duration,
+    /// How many messages may be held back, newest kept; at least 1.
+    pub queue_length: usize,
+}
+
+/// Send what is queued, then end. From the registry when the runtime ends, and from the reader at the end of the
+/// stream.
+#[derive(Message, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct Finish;

@@ -1,0 +1,118 @@
+//! Actions: a goal goes to the node that pursues it; the client hears of it under its own id.
+//!
+//! **Invariant:** a goal that is refused here is answered by one `action_result`.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+use tokio::sync::oneshot;
+
+use super::refusal::Refusal;
+use super::state::Registry;
+use crate::actors::ConnectionId;
+use crate::actors::gateway::messages::{Deliver, Frames, Handled};
+use crate::actors::node::Feedback;
+use crate::actors::ros::follower::{ActionRequest, Canceller, Follower};
+use crate::actors::wire::Route;
+use crate::protocol::catalog::Action;
+use crate::protocol::messages::Level;
+use crate::protocol::names;
+use crate::protocol::op::ActionGoal;
+use crate::protocol::wire::payload::Payload;
+
+impl Registry {
+    /// Sends a goal to the node that pursues it.
+    pub(super) fn send_action_goal(
+        &mut self,
+        from: ConnectionId,
+        id: Option<Payload>,
+        goal: ActionGoal,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let Some(client) = self.clients.get(&from) else {
+            return Handled::at_once();
+        };
+        let id_bytes = id.as_ref().map_or(0, Payload::allocated);
+        let share = client
+            .outlets
+            .account
+            .take(size_of::<Follower>() + goal.action.len() + id_bytes);
+        let follower = Follower {
+            respond: ctx.address().recipient(),
+            feedback: ctx.address().recipient(),
+            connection: from,
+            action: Arc::from(goal.action.as_str()),
+            id,
+            wants_feedback: goal.feedback,
+            share,
+        };
+        let node = match self.pursuer(&goal) {
+            Ok(node) => node,
+            Err(why) => {
+                follower.refuse(&why.to_string());
+                return Handled::at_once();
+            }
+        };
+        let (done, ended) = oneshot::channel();
+        node(ActionRequest::Goal {
+            arguments: goal.args,
+            follower,
+            done,
+        });
+        Handled::by_node(ended)
+    }
+
+    /// Ends a goal of the same client.
+    pub(super) fn cancel_action_goal(
+        &mut self,
+        from: ConnectionId,
+        id: Option<Payload>,
+        action: &str,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let node = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
+        let Some(node) = node else {
+            let why = Refusal::NoAction(action.to_owned()).to_string();
+            self.send_status(from, Level::Error, &why, id.as_ref());
+            return Handled::at_once();
+        };
+        let (done, ended) = oneshot::channel();
+        node(ActionRequest::Cancel {
+            from: Canceller {
+                respond: ctx.address().recipient(),
+                connection: from,
+                id,
+            },
+            done,
+        });
+        Handled::by_node(ended)
+    }
+
+    fn pursuer(&self, goal: &ActionGoal) -> Result<&Route<ActionRequest>, Refusal> {
+        if let Some(why) = self.closed {
+            return Err(Refusal::Closed(why));
+        }
+        let unknown = || Refusal::NoAction(goal.action.clone());
+        let action = Action::from_name(&goal.action).ok_or_else(unknown)?;
+        match &goal.type_name {
+            Some(name) if !names::same_type(name, action.type_name()) => {
+                Err(Refusal::ActionType(action.type_name()))
+            }
+            _ => self.nodes.actions.get(&action).ok_or_else(unknown),
+        }
+    }
+}
+
+impl Handler<Feedback> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, feedback: Feedback, _: &mut Context<Self>) {
+        if let Some(client) = self.clients.get(&feedback.connection) {
+            client.outlets.deliver.do_send(Deliver {
+                topic: feedback.action,
+                frames: Frames::Plain(self.count(feedback.frame)),
+                underway: None,
+            });
+        }
+    }
+}

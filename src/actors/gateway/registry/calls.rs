@@ -1,0 +1,153 @@
+//! Calls: to the node or the client that serves them, and the responses of clients back to their callers.
+//!
+//! **Invariant:** every call has one response.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use tokio::time::{Instant, sleep_until};
+
+use super::refusal::Refusal;
+use super::services::{Forwarded, Services, TimedOut};
+use super::state::{Origin, Registry};
+use crate::actors::gateway::limits::{CALL_BYTES, DEFAULT_TIMEOUT, MAX_BACKLOG, MAX_WAITING_CALLS};
+use crate::actors::gateway::messages::Handled;
+use crate::actors::wire::{Caller, ServiceCall};
+use crate::protocol::catalog::Service;
+use crate::protocol::messages;
+use crate::protocol::names;
+use crate::protocol::op::{Arguments, CallService};
+use crate::protocol::wire::payload::Payload;
+
+impl Registry {
+    /// Sends a call to the node or the client that serves it; whatever fails is the call's one response.
+    pub(super) fn call(
+        &mut self,
+        origin: Origin,
+        call: CallService,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let own = Service::from_name(&call.service);
+        let refusal = if let Some(why) = self.closed {
+            Err(Refusal::Closed(why))
+        } else if let Some(service) = own {
+            match self.nodes.services.get(&service) {
+                Some(node) => {
+                    let name = call.service.into_boxed_str();
+                    let registry = ctx.address().recipient();
+                    let (caller, ended) = Caller::new(
+                        registry,
+                        origin.from,
+                        service,
+                        name,
+                        origin.id,
+                        Arc::clone(&client.outlets.gone),
+                    );
+                    node(ServiceCall {
+                        service,
+                        arguments: call.args,
+                        caller: caller.within(Arc::clone(&client.outlets.account)),
+                    });
+                    return Handled::by_node(ended);
+                }
+                None => Err(Refusal::NotServed(call.service.clone())),
+            }
+        } else {
+            self.forward(&origin, &call, ctx)
+        };
+        if let Err(why) = refusal {
+            self.send_response(origin.from, &call.service, origin.id.as_ref(), &why);
+        }
+        Handled::at_once()
+    }
+
+    /// Passes a call on to the client that provides the service.
+    fn forward(
+        &mut self,
+        origin: &Origin,
+        call: &CallService,
+        ctx: &mut Context<Self>,
+    ) -> Result<(), Refusal> {
+        let service = call.service.as_str();
+        let provider = self
+            .services
+            .provider(&names::absolute(service))
+            .cloned()
+            .and_then(|provider| Some((self.clients.get(&provider.connection)?, provider)));
+        let Some((client, provider)) = provider else {
+            return Err(Refusal::NoProvider(service.to_owned()));
+        };
+        if matches!(call.args, Arguments::Neither(_)) {
+            return Err(Refusal::BadArguments);
+        }
+        if self.services.waiting_for(origin.from) >= MAX_WAITING_CALLS {
+            return Err(Refusal::TooManyWaiting);
+        }
+        if client.backlog() > MAX_BACKLOG {
+            return Err(Refusal::ProviderBusy(service.to_owned()));
+        }
+        let number = self.services.next_call();
+        let frame = messages::call(
+            &provider.spelling,
+            &Services::call_id(number),
+            call.args.payload(),
+        );
+        let Some(caller) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        let account = &caller.outlets.account;
+        client.send(frame);
+        let id_bytes = origin.id.as_ref().map_or(0, Payload::allocated);
+        let share = account.take(CALL_BYTES / 2 + id_bytes + 2 * service.len());
+        let of_timer = account.take(CALL_BYTES / 2);
+        let registry = ctx.address();
+        let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
+        let timer = actix_rt::spawn(async move {
+            let _share = of_timer;
+            sleep_until(deadline).await;
+            registry.do_send(TimedOut(number));
+        });
+        self.services.remember(
+            number,
+            Forwarded {
+                caller: origin.from,
+                id: origin.id.clone(),
+                provider: provider.connection,
+                service: service.into(),
+                deadline,
+                timer: timer.abort_handle(),
+                _share: share,
+            },
+        );
+        Ok(())
+    }
+
+    /// A provider's answer goes back under the caller's own id.
+    pub(super) fn complete(
+        &mut self,
+        origin: &Origin,
+        service: &str,
+        encode: impl FnOnce(&str, Option<&Payload>) -> Bytes,
+    ) -> Result<(), Refusal> {
+        let call = self
+            .services
+            .complete(origin.id.as_ref(), service, origin.from)
+            .ok_or_else(|| Refusal::StaleCall(service.to_owned()))?;
+        let Some(caller) = self.clients.get(&call.caller) else {
+            return Ok(());
+        };
+        if caller.backlog() > MAX_BACKLOG {
+            let why = Refusal::CallerBusy(call.service.to_string());
+            self.answer_forwarded(&call, &why);
+            return Ok(());
+        }
+        let frame = encode(&call.service, call.id.as_ref());
+        caller.send(frame);
+        self.note_answered(call.caller);
+        Ok(())
+    }
+}

@@ -1,0 +1,130 @@
+//! Which topics and services clients have, kept in order of their names, so that telling it costs no search.
+//!
+//! **Invariant:** a topic stands here as long as a client advertises it or subscribes to it, and no longer.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
+
+/// How a client uses a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Use {
+    Advertised,
+    Subscribed,
+}
+
+/// The tallies. Names are shared with whoever asks for them: a list of thousands costs no copies.
+#[derive(Default)]
+pub(super) struct Tally {
+    topics: BTreeMap<Arc<str>, Users>,
+    services: BTreeMap<Arc<str>, Option<Arc<str>>>,
+}
+
+/// Who uses a topic.
+#[derive(Default)]
+struct Users {
+    publishers: usize,
+    subscribers: usize,
+    /// As the first that named one has it.
+    type_name: Option<Arc<str>>,
+}
+
+impl Users {
+    fn count(&mut self, how: Use) -> &mut usize {
+        match how {
+            Use::Advertised => &mut self.publishers,
+            Use::Subscribed => &mut self.subscribers,
+        }
+    }
+}
+
+impl Tally {
+    /// A client has begun to use a topic.
+    pub(super) fn add(&mut self, topic: &str, how: Use, type_name: Option<&str>) {
+        if !self.topics.contains_key(topic) {
+            self.topics.insert(topic.into(), Users::default());
+        }
+        if let Some(users) = self.topics.get_mut(topic) {
+            *users.count(how) += 1;
+            if users.type_name.is_none() {
+                users.type_name = type_name.map(Into::into);
+            }
+        }
+    }
+
+    /// A client has ceased to use a topic in this way.
+    pub(super) fn remove(&mut self, topic: &str, how: Use) {
+        let Some(users) = self.topics.get_mut(topic) else {
+            debug_assert!(false, "{topic} was not counted");
+            return;
+        };
+        let count = users.count(how);
+        *count = count.saturating_sub(1);
+        if users.publishers == 0 && users.subscribers == 0 {
+            self.topics.remove(topic);
+        }
+    }
+
+    /// The type of a topic that clients use, if one has named it.
+    pub(super) fn type_of(&self, topic: &str) -> Option<&str> {
+        self.topics.get(topic)?.type_name.as_deref()
+    }
+
+    /// A client provides a service.
+    pub(super) fn provide(&mut self, service: &str, type_name: Option<&str>) {
+        self.services
+            .insert(service.into(), type_name.map(Into::into));
+    }
+
+    /// Nobody provides it any more.
+    pub(super) fn withdraw(&mut self, service: &str) {
+        self.services.remove(service);
+    }
+
+    /// All that there is, up to the limit of what is listed.
+    pub(super) fn take(&self) -> Census {
+        let topics = self.topics.iter().take(MAX_LISTED);
+        let services = self.services.iter().take(MAX_LISTED);
+        Census {
+            topics: topics
+                .map(|(name, users)| ListedTopic {
+                    name: Arc::clone(name),
+                    type_name: users.type_name.clone(),
+                    published: users.publishers > 0,
+                    subscribed: users.subscribers > 0,
+                })
+                .collect(),
+            services: services
+                .map(|(name, type_name)| ListedService {
+                    name: Arc::clone(name),
+                    type_name: type_name.clone(),
+                })
+                .collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn so_many_topics_and_services_are_listed_and_no_more() {
+        let mut tally = Tally::default();
+        for n in 0..=MAX_LISTED {
+            tally.add(&format!("/{n:05}"), Use::Advertised, None);
+            tally.provide(&format!("/{n:05}"), None);
+        }
+        let census = tally.take();
+        assert_eq!(
+            (census.topics.len(), census.services.len()),
+            (MAX_LISTED, MAX_LISTED)
+        );
+        tally.remove("/00000", Use::Advertised);
+        assert_eq!(
+            &*tally.take().topics[MAX_LISTED - 1].name,
+            format!("/{MAX_LISTED:05}")
+        );
+    }
+}

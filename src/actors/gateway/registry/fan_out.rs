@@ -1,0 +1,136 @@
+//! How a message reaches everybody who subscribes: once encoded for each spelling of the topic and each encoding
+//! asked for.
+//!
+//! **Invariant:** without subscribers nothing is encoded, and all subscribers who asked for the same share the same
+//! bytes.
+
+use std::sync::Arc;
+
+use bytes::Bytes;
+use tokio::sync::oneshot;
+
+use super::state::Registry;
+use super::topics::Subscriber;
+use crate::actors::ConnectionId;
+use crate::actors::gateway::encoded::Encoded;
+use crate::actors::gateway::messages::{Deliver, Frames, Underway};
+use crate::protocol::catalog::Topic;
+use crate::protocol::messages;
+use crate::protocol::names;
+use crate::protocol::op::{Compression, Encoding};
+use crate::protocol::wire::series;
+
+/// Paces a client that publishes: it goes on when its message has been offered to the socket of every subscriber.
+#[derive(Default)]
+pub(super) struct Pace(Option<(Underway, oneshot::Receiver<()>)>);
+
+impl Pace {
+    /// Goes with the message to a subscriber.
+    fn underway(&mut self) -> Underway {
+        let (underway, _) = self.0.get_or_insert_with(|| {
+            let (underway, end) = oneshot::channel();
+            (Arc::new(underway), end)
+        });
+        Arc::clone(underway)
+    }
+
+    /// Ends when the message is underway to nobody any more; `None` if it never was.
+    pub(super) fn end(self) -> Option<oneshot::Receiver<()>> {
+        self.0.map(|(_, end)| end)
+    }
+}
+
+impl Registry {
+    /// Delivers a message, or a series of them, to everybody who subscribes to `topic`, an absolute name, under
+    /// whichever spelling; `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait, which a
+    /// node can't.
+    pub(super) fn fan_out(
+        &self,
+        topic: &str,
+        mut pace: Option<&mut Pace>,
+        encode: impl Fn(&str) -> Bytes,
+    ) {
+        for spelling in names::spellings(topic) {
+            let Some((name, subscribers)) = self.topics.subscribers(spelling) else {
+                continue;
+            };
+            let plain = self.count(encode(spelling));
+            let is_series = series::first_message(&plain) < plain.len();
+            let mut made: Vec<(Encoding, Arc<Encoded>)> = Vec::new();
+            for subscriber in subscribers {
+                let encoding = subscriber.encoding;
+                // Some messages of a series may not be wanted.
+                let is_apart = is_series && subscriber.newest.is_some();
+                let frames = if !is_apart && is_sent_plain(encoding, &plain) {
+                    Frames::Plain(plain.clone())
+                } else {
+                    let known = made.iter().find(|(one, _)| *one == encoding);
+                    let encoded = if let Some((_, encoded)) = known {
+                        Arc::clone(encoded)
+                    } else {
+                        let encoded = Arc::new(self.encoded(name, plain.clone(), encoding));
+                        made.push((encoding, Arc::clone(&encoded)));
+                        encoded
+                    };
+                    Frames::Encoded(encoded, subscriber.newest)
+                };
+                let underway = pace.as_deref_mut().map(Pace::underway);
+                deliver(subscriber, name, frames, underway);
+            }
+        }
+    }
+
+    /// A latched topic's last message, to a subscriber who came after it.
+    pub(super) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
+        let latched =
+            Topic::from_name(spelling).and_then(|topic| Some((topic, self.latched.get(&topic)?)));
+        let subscriber = self
+            .topics
+            .subscribers(spelling)
+            .and_then(|(_, all)| all.iter().find(|one| one.connection == to));
+        if let (Some((topic, frame)), Some(subscriber)) = (latched, subscriber) {
+            let plain = messages::respelled(topic.name(), spelling, frame);
+            let frames = if is_sent_plain(subscriber.encoding, &plain) {
+                Frames::Plain(plain)
+            } else {
+                let encoded = self.encoded(spelling, plain, subscriber.encoding);
+                Frames::Encoded(Arc::new(encoded), subscriber.newest)
+            };
+            deliver(subscriber, spelling, frames, None);
+        }
+    }
+
+    /// The type of a topic's messages, if anybody has said it.
+    pub(super) fn type_of(&self, topic: &str) -> Option<&str> {
+        match Topic::from_name(topic) {
+            Some(topic) => Some(topic.type_name()),
+            None => self.tally.type_of(&names::absolute(topic)),
+        }
+    }
+
+    /// A JSON frame, or a series of them, in another encoding.
+    fn encoded(&self, spelling: &Arc<str>, plain: Bytes, encoding: Encoding) -> Encoded {
+        let type_name = self.type_of(spelling);
+        let counters = (&self.fragmented, self.gauges.memory());
+        Encoded::new(spelling, plain, encoding, type_name, counters)
+    }
+
+    /// A message to be delivered counts once, until the last copy is gone.
+    pub(super) fn count(&self, frame: Bytes) -> Bytes {
+        self.gauges.memory().count(frame)
+    }
+}
+
+/// Whether frames are sent as they are to whoever has asked for `encoding`.
+fn is_sent_plain(encoding: Encoding, plain: &Bytes) -> bool {
+    let size = encoding.fragment_size;
+    encoding.compression == Compression::None && size.is_none_or(|size| plain.len() <= size)
+}
+
+fn deliver(subscriber: &Subscriber, topic: &Arc<str>, frames: Frames, underway: Option<Underway>) {
+    subscriber.outlet.do_send(Deliver {
+        topic: Arc::clone(topic),
+        frames,
+        underway,
+    });
+}

@@ -1,0 +1,194 @@
+//! The registry: every client, topic and service; fans published topics out to subscribed connections, and routes
+//! calls.
+//!
+//! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
+
+mod actions;
+mod calls;
+mod census;
+mod fan_out;
+mod nodes;
+mod ops;
+mod refusal;
+mod services;
+mod state;
+mod topics;
+
+use actix::prelude::*;
+use tokio::sync::oneshot;
+
+pub use self::nodes::{Attach, Nodes};
+use self::refusal::Refusal;
+use self::services::TimedOut;
+use self::state::Client;
+pub use self::state::Registry;
+use super::messages::{
+    Connect, Disconnect, Ended, Finish, FinishAll, Handled, RefuseCalls, Refused, Request, Retire,
+    TakeCensus,
+};
+use crate::actors::ConnectionId;
+use crate::actors::node::{Publish, Respond};
+use crate::protocol::messages as frames;
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl Actor for Registry {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Handler<Attach> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
+        self.nodes = nodes;
+    }
+}
+
+impl Handler<Connect> for Registry {
+    type Result = Result<ConnectionId, Refused>;
+
+    fn handle(&mut self, Connect(outlets): Connect, _: &mut Context<Self>) -> Self::Result {
+        if self.closed.is_some() {
+            return Err(Refused::Closed);
+        }
+        if self.clients.len() >= self.max_connections {
+            self.displace();
+        }
+        if self.clients.len() >= self.max_connections {
+            return Err(Refused::Full(self.max_connections));
+        }
+        self.connections_made += 1;
+        let id = ConnectionId(self.connections_made);
+        self.clients.insert(id, Client::new(outlets));
+        self.gauges.set_connections(self.clients.len() as u64);
+        Ok(id)
+    }
+}
+
+impl Handler<Ended> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Ended(id): Ended, _: &mut Context<Self>) {
+        if self.clients.contains_key(&id) {
+            self.ended.insert(id);
+        }
+    }
+}
+
+impl Handler<Retire> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
+        self.withdraw(id);
+        if self.services.waiting_for(id) == 0 {
+            return Handled::at_once();
+        }
+        let (answered, all_answered) = oneshot::channel();
+        if let Some(client) = self.clients.get_mut(&id) {
+            client.answered = Some(answered);
+        }
+        Handled::by_node(all_answered)
+    }
+}
+
+impl Handler<Disconnect> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
+        self.forget(id);
+    }
+}
+
+impl Handler<Request> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+        if !self.clients.contains_key(&request.from) {
+            return Handled::at_once();
+        }
+        self.perform(request, ctx)
+    }
+}
+
+impl Handler<Publish> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
+        let name = topic.name();
+        if !self.topics.has_subscribers(name) {
+            return;
+        }
+        let frame = frame.write();
+        self.fan_out(name, None, |spelling| {
+            frames::respelled(name, spelling, &frame)
+        });
+        if topic.is_latched() {
+            self.latched.insert(topic, frame);
+        }
+    }
+}
+
+impl Handler<Respond> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
+        if let Some(client) = self.clients.get(&respond.connection)
+            && respond
+                .status
+                .is_none_or(|level| client.verbosity.wants(level))
+        {
+            let frame = respond.frame.write();
+            if respond.service.is_some() {
+                // A `Caller` has counted it.
+                client.pass(frame, respond.service);
+            } else {
+                client.send(frame);
+            }
+        }
+    }
+}
+
+impl Handler<TakeCensus> for Registry {
+    type Result = MessageResult<TakeCensus>;
+
+    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(self.tally.take())
+    }
+}
+
+impl Handler<RefuseCalls> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, RefuseCalls(why): RefuseCalls, _: &mut Context<Self>) {
+        self.closed = Some(why);
+        for call in self.services.take_all() {
+            self.answer_forwarded(&call, &Refusal::Closed(why));
+        }
+    }
+}
+
+impl Handler<FinishAll> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
+        // Oldest first: the order is the same in every run.
+        let mut clients: Vec<_> = self.clients.iter().collect();
+        clients.sort_unstable_by_key(|(id, _)| **id);
+        for (_, client) in clients {
+            client.outlets.finish.do_send(Finish);
+        }
+    }
+}
+
+impl Handler<TimedOut> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, TimedOut(number): TimedOut, _: &mut Context<Self>) {
+        if let Some(call) = self.services.take(number) {
+            let why = Refusal::TimedOut(call.service.to_string());
+            self.answer_forwarded(&call, &why);
+        }
+    }
+}

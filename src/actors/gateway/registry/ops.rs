@@ -1,0 +1,360 @@
+//! The rosbridge ops, in the order of the protocol's table, but for calls and actions.
+//!
+//! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
+
+use std::sync::Arc;
+
+use actix::prelude::*;
+use tokio::sync::oneshot;
+
+use super::census::Use;
+use super::fan_out::Pace;
+use super::refusal::Refusal;
+use super::services::Provider;
+use super::state::{Origin, Registry};
+use super::topics::{Subscription, throttle_of};
+use crate::actors::ConnectionId;
+use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS};
+use crate::actors::gateway::messages::{Configure, Handled, Request};
+use crate::actors::wire::TopicMessage;
+use crate::protocol::catalog::{Direction, Service, Topic, types};
+use crate::protocol::limits::MAX_NAME;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::names;
+use crate::protocol::op::{Compression, Op, Subscribe};
+use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::series::Series;
+
+impl Registry {
+    /// Performs one op of a client that is known.
+    pub(super) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+        let origin = Origin {
+            from: request.from,
+            id: request.id,
+        };
+        let refusal = match request.op {
+            Op::Publish { topic, msg, heard } => {
+                return self.publish(origin, &topic, &msg, heard, ctx);
+            }
+            Op::PublishLines(lines) => return self.publish_lines(origin.from, &lines),
+            Op::CallService(call) => return self.call(origin, call, ctx),
+            Op::SendActionGoal(goal) => {
+                return self.send_action_goal(origin.from, origin.id, goal, ctx);
+            }
+            Op::CancelActionGoal { action } => {
+                return self.cancel_action_goal(origin.from, origin.id, &action, ctx);
+            }
+            Op::Advertise { topic, type_name } => {
+                self.advertise(&origin, &topic, type_name.as_deref())
+            }
+            Op::Unadvertise { topic } => {
+                self.unadvertise(&origin, &topic);
+                Ok(())
+            }
+            Op::Subscribe(subscribe) => self.subscribe(&origin, &subscribe),
+            Op::Unsubscribe { topic } => {
+                self.unsubscribe(&origin, &topic);
+                Ok(())
+            }
+            Op::AdvertiseService { service, type_name } => {
+                self.advertise_service(&origin, &service, type_name.as_deref())
+            }
+            Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
+            Op::SetLevel(verbosity) => {
+                if let Some(client) = self.clients.get_mut(&origin.from) {
+                    client.verbosity = verbosity;
+                }
+                Ok(())
+            }
+            // Pieces are put together before they get here; a token is asked for before, and where nothing is asked,
+            // anything shown will do.
+            Op::Fragment(_) | Op::Auth { .. } => Ok(()),
+            Op::ServiceResponse {
+                service,
+                values,
+                result,
+                status,
+            } => {
+                let status = status.unwrap_or_default();
+                self.complete(&origin, &service, |service, id| {
+                    messages::response_raw(service, id, &values, result, &status)
+                })
+            }
+        };
+        if let Err(why) = refusal {
+            self.send_status(
+                origin.from,
+                Level::Error,
+                &why.to_string(),
+                origin.id.as_ref(),
+            );
+        }
+        Handled::at_once()
+    }
+
+    fn advertise(
+        &mut self,
+        origin: &Origin,
+        topic: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        refuse_runtime_topic(topic)?;
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        let new = !client.advertised.contains_key(topic);
+        if new && client.advertised.len() >= MAX_ADVERTISED {
+            return Err(Refusal::TooManyAdvertised);
+        }
+        let bytes = topic.len() + type_name.map_or(0, str::len);
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        if new {
+            let share = client.register(bytes);
+            client.advertised.insert(topic.into(), share);
+            self.tally.add(topic, Use::Advertised, type_name);
+        }
+        if let Some(topic) = Topic::from_name(topic) {
+            client.withdrawn.remove(&topic);
+        }
+        Ok(())
+    }
+
+    fn unadvertise(&mut self, origin: &Origin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        let topic = &*names::absolute(topic);
+        if client.advertised.remove(topic).is_some() {
+            self.tally.remove(topic, Use::Advertised);
+        }
+        if let Some(topic) = Topic::from_name(topic).filter(|topic| is_listened_to(*topic)) {
+            client.withdrawn.insert(topic);
+        }
+    }
+
+    /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
+    fn publish(
+        &mut self,
+        origin: Origin,
+        topic: &str,
+        msg: &Payload,
+        heard: Option<Payload>,
+        ctx: &mut Context<Self>,
+    ) -> Handled {
+        if let Err(why) = refuse_runtime_topic(topic) {
+            self.send_status(
+                origin.from,
+                Level::Error,
+                &why.to_string(),
+                origin.id.as_ref(),
+            );
+            return Handled::at_once();
+        }
+        let topic = &*names::absolute(topic);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Handled::at_once();
+        };
+        let listener = Topic::from_name(topic)
+            .filter(|topic| is_listened_to(*topic) && !client.withdrawn.contains(topic))
+            .and_then(|topic| self.nodes.listeners.get(&topic));
+        if listener.is_none() && !client.advertised.contains_key(topic) {
+            return Handled::at_once();
+        }
+        let mut pace = Pace::default();
+        self.fan_out(topic, Some(&mut pace), |spelling| {
+            messages::publish_raw(spelling, msg)
+        });
+        let Some(listener) = listener else {
+            return Handled::at_once().and_by_subscribers(pace.end());
+        };
+        let (done, ended) = oneshot::channel();
+        listener(TopicMessage {
+            msg: heard.unwrap_or_else(|| msg.clone()),
+            respond: ctx.address().recipient(),
+            connection: origin.from,
+            id: origin.id,
+            done,
+        });
+        Handled::by_node(ended).and_by_subscribers(pace.end())
+    }
+
+    /// Delivers messages of a client as they are, if it advertises the topic.
+    fn publish_lines(&self, from: ConnectionId, lines: &Series) -> Handled {
+        let topic = &*lines.topic;
+        let mut pace = Pace::default();
+        let client = self.clients.get(&from);
+        if client.is_some_and(|client| client.advertised.contains_key(topic)) {
+            self.fan_out(topic, Some(&mut pace), |spelling| {
+                messages::respelled(topic, spelling, &lines.frames)
+            });
+        }
+        Handled::at_once().and_by_subscribers(pace.end())
+    }
+
+    fn subscribe(&mut self, origin: &Origin, subscribe: &Subscribe) -> Result<(), Refusal> {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let held: usize = client.subscriptions.values().map(Vec::len).sum();
+        let topic = subscribe.topic.as_str();
+        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
+        if id.as_ref().is_some_and(|id| id.len() > MAX_NAME) {
+            return Err(Refusal::LongSubscriptionId(MAX_NAME));
+        }
+        let known = client
+            .subscriptions
+            .get(topic)
+            .is_some_and(|all| all.iter().any(|one| one.id == id));
+        if !known && held >= MAX_SUBSCRIPTIONS {
+            return Err(Refusal::TooManySubscriptions);
+        }
+        let absolute = names::absolute(topic);
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
+            if type_name.and_then(types::find).is_none() {
+                return Err(Refusal::UnknownType);
+            }
+        }
+        let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
+        let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
+        let size = match subscribe.encoding.fragment_size {
+            Some(size) => {
+                let shared = self.topics.share_size(&absolute, size);
+                Some(shared.ok_or(Refusal::TooManySizes)?)
+            }
+            None => None,
+        };
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let share = client.register(topic.len() + bytes);
+        let first = !self.topics.has_subscribers(&absolute);
+        let (name, new) = self
+            .topics
+            .add(topic, origin.from, client.outlets.deliver.clone());
+        if new {
+            let type_name = subscribe.type_name.as_deref();
+            self.tally.add(&absolute, Use::Subscribed, type_name);
+        }
+        let subscriptions = client.subscriptions.entry(name.clone()).or_default();
+        subscriptions.retain(|one| one.id != id);
+        subscriptions.push(Subscription {
+            id,
+            throttle: subscribe.throttle,
+            queue_length: subscribe.queue_length,
+            encoding: subscribe.encoding,
+            _size: size,
+            _share: share,
+        });
+        let throttle = throttle_of(subscriptions);
+        self.topics.configure(&name, origin.from, subscriptions);
+        let shared = Arc::clone(&name);
+        client.outlets.configure.do_send(Configure {
+            topic: name,
+            throttle,
+        });
+        // The status leaves before the first message: the topic's owner hears of the subscriber after it.
+        let msg = format!("subscribed to {topic}");
+        self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
+        if first {
+            self.tell_owner(topic, true);
+        } else if new {
+            self.deliver_latched(&shared, origin.from);
+        }
+        Ok(())
+    }
+
+    fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return;
+        };
+        let Some((name, _)) = client.subscriptions.get_key_value(topic) else {
+            return;
+        };
+        let name = name.clone();
+        let mut left = client.subscriptions.remove(topic).unwrap_or_default();
+        match &origin.id {
+            None => left.clear(),
+            Some(id) => left.retain(|one| one.id.as_deref() != Some(id.get())),
+        }
+        let throttle = throttle_of(&left);
+        client.outlets.configure.do_send(Configure {
+            topic: name.clone(),
+            throttle,
+        });
+        if left.is_empty() {
+            self.drop_subscriber(&name, origin.from);
+        } else {
+            self.topics.configure(&name, origin.from, &left);
+            client.subscriptions.insert(name, left);
+        }
+    }
+
+    fn advertise_service(
+        &mut self,
+        origin: &Origin,
+        spelling: &str,
+        type_name: Option<&str>,
+    ) -> Result<(), Refusal> {
+        if Service::from_name(spelling).is_some() {
+            return Err(Refusal::RuntimeService(spelling.to_owned()));
+        }
+        let service = &*names::absolute(spelling);
+        let Some(client) = self.clients.get(&origin.from) else {
+            return Ok(());
+        };
+        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains_key(service) {
+            return Err(Refusal::TooManyProvided);
+        }
+        let Some(client) = self.clients.get_mut(&origin.from) else {
+            return Ok(());
+        };
+        let share = client.register(spelling.len() + type_name.map_or(0, str::len));
+        client.provided.insert(service.into(), share);
+        if let Some(before) = self
+            .services
+            .provider(service)
+            .map(|provider| provider.connection)
+            .filter(|&one| one != origin.from)
+            && let Some(before) = self.clients.get_mut(&before)
+        {
+            before.provided.remove(service);
+        }
+        let provider = Provider {
+            connection: origin.from,
+            spelling: spelling.into(),
+        };
+        self.services.provide(service, provider);
+        self.tally.provide(service, type_name);
+        let msg = format!("advertised service {spelling}");
+        self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
+        Ok(())
+    }
+
+    fn unadvertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
+        let name = &*names::absolute(service);
+        if !self.withdraw_service(name, origin.from) {
+            return Err(Refusal::NotProvider(service.to_owned()));
+        }
+        if let Some(client) = self.clients.get_mut(&origin.from) {
+            client.provided.remove(name);
+        }
+        Ok(())
+    }
+}
+
+/// Topics that the runtime alone publishes are not for clients.
+fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
+    match Topic::from_name(topic) {
+        Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
+        _ => Ok(()),
+    }
+}
+
+/// Whether the runtime itself subscribes to the topic.
+fn is_listened_to(topic: Topic) -> bool {
+    topic.direction() == Direction::Subscribed
+}

@@ -1,0 +1,62 @@
+//! Why the registry refuses an op or a call: the sentences that clients read.
+//!
+//! **Invariant:** every sentence begins with the field it is about, or names the service.
+
+use crate::actors::gateway::limits::{
+    MAX_ADVERTISED, MAX_BACKLOG, MAX_FRAGMENT_SIZES, MAX_PROVIDED, MAX_SUBSCRIPTIONS,
+    MAX_WAITING_CALLS,
+};
+
+/// An op or a call that changed nothing.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub(super) enum Refusal {
+    #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
+    RuntimeTopic(String),
+    #[error("topic: a connection advertises at most {MAX_ADVERTISED} topics")]
+    TooManyAdvertised,
+    #[error("topic: a connection holds at most {MAX_SUBSCRIPTIONS} subscriptions")]
+    TooManySubscriptions,
+    #[error(
+        "fragment_size: the subscribers of a topic have asked for {MAX_FRAGMENT_SIZES} different sizes; \
+         ask for one of those, or for none"
+    )]
+    TooManySizes,
+    #[error(
+        "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
+    )]
+    UnknownType,
+    #[error("id: a subscription's id has at most {0} bytes")]
+    LongSubscriptionId(usize),
+    #[error("service: {0} is provided by the runtime itself")]
+    RuntimeService(String),
+    #[error("service: a connection provides at most {MAX_PROVIDED} services")]
+    TooManyProvided,
+    #[error("service: this connection does not provide {0}")]
+    NotProvider(String),
+    #[error("id: no call of {0} with this id waits for this connection")]
+    StaleCall(String),
+    #[error("args must be an object or an array")]
+    BadArguments,
+    #[error("no provider for service {0}")]
+    NoProvider(String),
+    #[error("the provider of {0} is gone")]
+    ProviderGone(String),
+    #[error("timeout: the provider of {0} did not answer in time")]
+    TimedOut(String),
+    #[error("the provider of {0} does not read: more than {MAX_BACKLOG} bytes wait for it")]
+    ProviderBusy(String),
+    #[error(
+        "the answer of {0} was discarded: more than {MAX_BACKLOG} bytes wait for this connection"
+    )]
+    CallerBusy(String),
+    #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
+    TooManyWaiting,
+    #[error("action: no action is called {0}")]
+    NoAction(String),
+    #[error("action_type must be {0}")]
+    ActionType(&'static str),
+    #[error("{0} is not served by this runtime")]
+    NotServed(String),
+    #[error("{0}")]
+    Closed(&'static str),
+}

@@ -1,0 +1,266 @@
+//! The registry's state: its clients, topics, services and nodes, and what several of its rooms do with them.
+//!
+//! **Invariant:** what a client has registered stands here as long as the client, and no longer.
+
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use bytes::Bytes;
+use tokio::sync::oneshot;
+
+use super::census::{Tally, Use};
+use super::nodes::Nodes;
+use super::refusal::Refusal;
+use super::services::{Forwarded, Services};
+use super::topics::{Subscription, Topics};
+use crate::actors::ConnectionId;
+use crate::actors::gateway::budget::Share;
+use crate::actors::gateway::gauges::Gauges;
+use crate::actors::gateway::limits::{MAX_CONNECTIONS, REGISTRATION_BYTES};
+use crate::actors::gateway::messages::{Outlets, Response};
+use crate::actors::node::Interest;
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::{self as frames, Level};
+use crate::protocol::names;
+use crate::protocol::op::Verbosity;
+use crate::protocol::wire::payload::Payload;
+
+/// The registry actor.
+pub struct Registry {
+    pub(super) clients: HashMap<ConnectionId, Client>,
+    pub(super) topics: Topics,
+    pub(super) services: Services,
+    pub(super) nodes: Nodes,
+    /// The last message of each latched topic that has subscribers.
+    pub(super) latched: HashMap<Topic, Bytes>,
+    /// Messages that went out in fragments so far: their numbers make the fragments' ids.
+    pub(super) fragmented: Arc<AtomicU64>,
+    /// Counts what clients use and provide, for those who ask what there is.
+    pub(super) tally: Tally,
+    pub(super) gauges: Arc<Gauges>,
+    /// Clients that have stopped sending: the oldest gives way where all places are taken.
+    pub(super) ended: BTreeSet<ConnectionId>,
+    /// Clients at once.
+    pub(super) max_connections: usize,
+    pub(super) connections_made: u64,
+    /// Why no call is taken any more, once the runtime is ending.
+    pub(super) closed: Option<&'static str>,
+}
+
+/// One client, as the registry knows it.
+pub(super) struct Client {
+    pub(super) outlets: Outlets,
+    /// Topics, each with what it takes.
+    pub(super) advertised: HashMap<Box<str>, Share>,
+    /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
+    /// dropped until it advertises again.
+    pub(super) withdrawn: HashSet<Topic>,
+    /// In order of their names: the topics' owners hear of its going in that order.
+    pub(super) subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
+    pub(super) provided: HashMap<Box<str>, Share>,
+    /// Which statuses it wants.
+    pub(super) verbosity: Verbosity,
+    /// Dropped once no call of this client waits any more, if it has stopped sending.
+    pub(super) answered: Option<oneshot::Sender<()>>,
+}
+
+impl Registry {
+    /// A registry without nodes; they come with [`Attach`](super::Attach).
+    #[must_use]
+    pub fn new(gauges: Arc<Gauges>) -> Self {
+        Self {
+            clients: HashMap::new(),
+            topics: Topics::default(),
+            services: Services::default(),
+            nodes: Nodes::default(),
+            latched: HashMap::new(),
+            fragmented: Arc::default(),
+            tally: Tally::default(),
+            gauges,
+            ended: BTreeSet::new(),
+            max_connections: MAX_CONNECTIONS,
+            connections_made: 0,
+            closed: None,
+        }
+    }
+
+    /// The same for at most so many clients at once.
+    #[must_use]
+    pub fn serving_at_most(self, max_connections: usize) -> Self {
+        Self {
+            max_connections,
+            ..self
+        }
+    }
+}
+
+impl Client {
+    pub(super) fn new(outlets: Outlets) -> Self {
+        Self {
+            outlets,
+            advertised: HashMap::new(),
+            withdrawn: HashSet::new(),
+            subscriptions: BTreeMap::new(),
+            provided: HashMap::new(),
+            verbosity: Verbosity::ALL,
+            answered: None,
+        }
+    }
+
+    /// Sends a status, a forwarded call or another client's response.
+    pub(super) fn send(&self, frame: Bytes) {
+        self.respond(frame, None);
+    }
+
+    /// Sends a response, of one of the runtime's own services if there is one given.
+    pub(super) fn respond(&self, frame: Bytes, service: Option<Service>) {
+        self.pass(self.outlets.account.count(frame), service);
+    }
+
+    /// The same with one that has been counted already.
+    pub(super) fn pass(&self, frame: Bytes, service: Option<Service>) {
+        self.outlets.respond.do_send(Response { frame, service });
+    }
+
+    /// Takes what a registration costs whose names have so many bytes.
+    pub(super) fn register(&self, bytes: usize) -> Share {
+        self.outlets.account.take(REGISTRATION_BYTES + 3 * bytes)
+    }
+
+    /// Bytes of responses that it has not taken yet.
+    pub(super) fn backlog(&self) -> usize {
+        self.outlets.backlog.load(Ordering::Relaxed)
+    }
+}
+
+impl Registry {
+    /// Withdraws all that a client has registered, and fails the calls that wait for it as provider.
+    pub(super) fn withdraw(&mut self, id: ConnectionId) {
+        let Some(client) = self.clients.get_mut(&id) else {
+            return;
+        };
+        let advertised = std::mem::take(&mut client.advertised);
+        let subscriptions = std::mem::take(&mut client.subscriptions);
+        let provided = std::mem::take(&mut client.provided);
+        for topic in advertised.keys() {
+            self.tally.remove(topic, Use::Advertised);
+        }
+        for topic in subscriptions.keys() {
+            self.drop_subscriber(topic, id);
+        }
+        for service in provided.keys() {
+            self.withdraw_service(service, id);
+        }
+        for call in self.services.take_provided_by(id) {
+            let why = Refusal::ProviderGone(call.service.to_string());
+            self.answer_forwarded(&call, &why);
+        }
+    }
+
+    /// Forgets a client and all that there was for it.
+    pub(super) fn forget(&mut self, id: ConnectionId) {
+        self.withdraw(id);
+        self.services.forget_caller(id);
+        self.ended.remove(&id);
+        if let Some(client) = self.clients.remove(&id) {
+            client.outlets.gone.store(true, Ordering::Relaxed);
+            self.gauges.set_connections(self.clients.len() as u64);
+        }
+    }
+
+    /// Has the oldest client that has stopped sending give way, if there is one.
+    pub(super) fn displace(&mut self) {
+        let Some(oldest) = self.ended.first().copied() else {
+            return;
+        };
+        tracing::debug!(connection = oldest.0, "has lost its place");
+        if let Some(client) = self.clients.get(&oldest) {
+            client.outlets.displaced.notify_one();
+        }
+        self.forget(oldest);
+    }
+
+    /// Takes `connection` off a topic's list, and tells the topic's owner when that was the last one.
+    pub(super) fn drop_subscriber(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+        let name = names::absolute(topic);
+        self.topics.remove(topic, connection);
+        self.tally.remove(&name, Use::Subscribed);
+        if !self.topics.has_subscribers(&name) {
+            if let Some(topic) = Topic::from_name(topic) {
+                self.latched.remove(&topic);
+            }
+            self.topics.forget_sizes(&name);
+            self.tell_owner(topic, false);
+        }
+    }
+
+    /// Withdraws a service by its absolute name, if `connection` is its provider; true if it was.
+    pub(super) fn withdraw_service(&mut self, service: &str, connection: ConnectionId) -> bool {
+        let provided = self.services.withdraw(service, connection);
+        if provided {
+            self.tally.withdraw(service);
+        }
+        provided
+    }
+
+    pub(super) fn tell_owner(&self, topic: &str, wanted: bool) {
+        if let Some(topic) = Topic::from_name(topic)
+            && let Some(owner) = self.nodes.publishers.get(&topic)
+        {
+            owner.do_send(Interest { topic, wanted });
+        }
+    }
+
+    pub(super) fn send_status(
+        &self,
+        to: ConnectionId,
+        level: Level,
+        msg: &str,
+        id: Option<&Payload>,
+    ) {
+        if level == Level::Error {
+            tracing::debug!(connection = to.0, why = msg, "refused");
+        }
+        if let Some(client) = self.clients.get(&to)
+            && client.verbosity.wants(level)
+        {
+            client.send(frames::status(level, msg, id));
+        }
+    }
+
+    /// Fails a forwarded call.
+    pub(super) fn answer_forwarded(&mut self, call: &Forwarded, why: &Refusal) {
+        self.send_response(call.caller, &call.service, call.id.as_ref(), why);
+        self.note_answered(call.caller);
+    }
+
+    /// A call of `caller` has been answered: if it was the last one, a client that has stopped sending may go.
+    pub(super) fn note_answered(&mut self, caller: ConnectionId) {
+        if self.services.waiting_for(caller) == 0
+            && let Some(client) = self.clients.get_mut(&caller)
+        {
+            client.answered = None;
+        }
+    }
+
+    /// Answers a call with `result: false`.
+    pub(super) fn send_response(
+        &self,
+        to: ConnectionId,
+        service: &str,
+        id: Option<&Payload>,
+        why: &Refusal,
+    ) {
+        if let Some(client) = self.clients.get(&to) {
+            let frame = frames::failure(service, id, &why.to_string());
+            client.respond(frame, Service::from_name(service));
+        }
+    }
+}
+
+/// Who sent the frame that is being performed, and its `id`.
+pub(super) struct Origin {
+    pub(super) from: ConnectionId,
+    pub(super) id: Option<Payload>,
+}

@@ -1,0 +1,151 @@
+//! Who subscribes to what: the registry's table of topics.
+//!
+//! **Invariant:** a connection stands at most once under a topic, however often it subscribed.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::{Arc, Weak};
+use std::time::Duration;
+
+use actix::prelude::*;
+
+use crate::actors::ConnectionId;
+use crate::actors::gateway::budget::Share;
+use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
+use crate::actors::gateway::messages::{Deliver, Throttle};
+use crate::protocol::names;
+use crate::protocol::op::Encoding;
+
+/// One `subscribe` of a connection to a topic; `id` tells several of them apart.
+#[derive(Debug)]
+pub(super) struct Subscription {
+    pub(super) id: Option<Box<str>>,
+    pub(super) throttle: Duration,
+    pub(super) queue_length: usize,
+    pub(super) encoding: Encoding,
+    /// Keeps its `fragment_size` among those that the topic has.
+    pub(super) _size: Option<Arc<usize>>,
+    /// Its share of the account.
+    pub(super) _share: Share,
+}
+
+/// A connection under a topic.
+pub(super) struct Subscriber {
+    pub(super) connection: ConnectionId,
+    pub(super) outlet: Recipient<Deliver>,
+    /// The encoding that its subscriptions come to.
+    pub(super) encoding: Encoding,
+    /// Where some of its messages are held back or left out: how many of the newest are kept.
+    pub(super) newest: Option<usize>,
+}
+
+/// The smallest of each value over a connection's subscriptions to one topic; `None` for none.
+pub(super) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
+    let queue_lengths = subscriptions.iter().map(|one| one.queue_length.max(1));
+    Some(Throttle {
+        interval: subscriptions.iter().map(|one| one.throttle).min()?,
+        queue_length: queue_lengths.min()?,
+    })
+}
+
+/// The encoding that a connection's subscriptions to one topic come to.
+fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
+    let all = subscriptions.iter().map(|one| one.encoding);
+    all.reduce(Encoding::merged).unwrap_or_default()
+}
+
+/// Every topic that somebody subscribes to, by the spelling that the subscriber used.
+#[derive(Default)]
+pub(super) struct Topics {
+    subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
+    /// By absolute name: the `fragment_size`s in use, for as long as a subscription has them.
+    sizes: HashMap<Box<str>, Vec<Weak<usize>>>,
+}
+
+impl Topics {
+    /// Adds a subscriber under its spelling of the topic. Gives the spelling, shared, and whether that is new to this
+    /// subscriber.
+    pub(super) fn add(
+        &mut self,
+        topic: &str,
+        connection: ConnectionId,
+        outlet: Recipient<Deliver>,
+    ) -> (Arc<str>, bool) {
+        let name = self
+            .subscribers
+            .get_key_value(topic)
+            .map_or_else(|| Arc::from(topic), |(name, _)| Arc::clone(name));
+        let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
+        let new = !subscribers.iter().any(|one| one.connection == connection);
+        if new {
+            subscribers.push(Subscriber {
+                connection,
+                outlet,
+                encoding: Encoding::default(),
+                newest: None,
+            });
+        }
+        (name, new)
+    }
+
+    /// A `fragment_size` to be kept by the subscription that asks for it; `None` if the topic of that absolute name
+    /// has as many others as it may have.
+    pub(super) fn share_size(&mut self, topic: &str, size: usize) -> Option<Arc<usize>> {
+        let sizes = self.sizes.entry(topic.into()).or_default();
+        sizes.retain(|one| one.strong_count() > 0);
+        let known = sizes.iter().filter_map(Weak::upgrade);
+        if let Some(known) = known.into_iter().find(|one| **one == size) {
+            return Some(known);
+        }
+        if sizes.len() >= MAX_FRAGMENT_SIZES {
+            return None;
+        }
+        let size = Arc::new(size);
+        sizes.push(Arc::downgrade(&size));
+        Some(size)
+    }
+
+    /// Nobody subscribes to the topic of that absolute name any more.
+    pub(super) fn forget_sizes(&mut self, topic: &str) {
+        self.sizes.remove(topic);
+    }
+
+    /// Sets how a subscriber's messages are written, by what its subscriptions come to.
+    pub(super) fn configure(
+        &mut self,
+        topic: &Arc<str>,
+        connection: ConnectionId,
+        subscriptions: &[Subscription],
+    ) {
+        let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
+        for subscriber in subscribers.filter(|one| one.connection == connection) {
+            subscriber.encoding = encoding_of(subscriptions);
+            let throttle = throttle_of(subscriptions);
+            let held = throttle.filter(|throttle| !throttle.interval.is_zero());
+            subscriber.newest = held.map(|throttle| throttle.queue_length);
+        }
+    }
+
+    /// Removes a subscriber.
+    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+        let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
+            return;
+        };
+        entry.get_mut().retain(|one| one.connection != connection);
+        if entry.get().is_empty() {
+            entry.remove();
+        }
+    }
+
+    /// Whether anybody subscribes to the topic of that absolute name, under whichever spelling.
+    pub(super) fn has_subscribers(&self, topic: &str) -> bool {
+        names::spellings(topic).any(|spelling| self.subscribers.contains_key(spelling))
+    }
+
+    /// A spelling, shared, and those who subscribed with it, if there are any.
+    pub(super) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
+        self.subscribers
+            .get_key_value(topic)
+            .map(|(name, list)| (name, list.as_slice()))
+    }
+}

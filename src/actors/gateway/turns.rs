@@ -1,0 +1,127 @@
+//! Turns: where many have much to do at once, a few of them go on each time around.
+//!
+//! One thread serves every client, and a light call passes it some eight times on its way. Were each of two hundred
+//! clients that send all they can, or each of a thousand subscribers of a message, to go on every time around, the
+//! call would wait for all of them eight times. So a reader with a whole chunk or many frames at hand stands in one
+//! line, and a writer in another once much has been written of late.
+//!
+//! **Invariant:** between two looks at what else there is to do, each line lets only so many go on, first come, first
+//! served.
+
+use std::cell::{Cell, RefCell};
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use tokio::sync::oneshot;
+
+use super::limits::BATCH_BYTES;
+
+/// Readers that go on each time around: with a fraction of a millisecond for a chunk, or for an op of the gateway's
+/// own, about one together.
+const READERS_AT_A_TIME: usize = 4;
+/// Writers that go on each time around: a fraction of a millisecond. Fewer if together they have [`BATCH_BYTES`] to
+/// write.
+const WRITERS_AT_A_TIME: usize = 32;
+/// Writes, the longer ones counting several times, for which nobody stands in line until the line has been worked
+/// through once: about a millisecond's.
+const FREE_WRITES: usize = 256;
+/// Bytes of a message that count as another write.
+const LONG: usize = 4096;
+
+/// A line of this thread.
+struct Line {
+    at_a_time: usize,
+    /// How many may go on without standing in line, and how many of these still may.
+    free: usize,
+    left: Cell<usize>,
+    /// Each with the bytes that it is going to write.
+    waiting: RefCell<VecDeque<(usize, oneshot::Sender<()>)>>,
+    /// Whether there is a task at work.
+    at_work: Cell<bool>,
+}
+
+thread_local! {
+    static READERS: Rc<Line> = Rc::new(Line::new(READERS_AT_A_TIME, 0));
+    static WRITERS: Rc<Line> = Rc::new(Line::new(WRITERS_AT_A_TIME, FREE_WRITES));
+}
+
+/// Waits until it is this reader's turn.
+pub(super) async fn read() {
+    READERS.with(Rc::clone).turn(0).await;
+}
+
+/// Whether a client may be written so many bytes at once; otherwise its writer waits for [`write()`].
+pub(super) fn may_write(bytes: usize) -> bool {
+    WRITERS.with(Rc::clone).take(1 + bytes / LONG)
+}
+
+/// Waits until it is the turn of this writer, which has so many bytes to write.
+pub(super) async fn write(bytes: usize) {
+    WRITERS.with(Rc::clone).turn(bytes).await;
+}
+
+impl Line {
+    const fn new(at_a_time: usize, free: usize) -> Self {
+        Self {
+            at_a_time,
+            free,
+            left: Cell::new(free),
+            waiting: RefCell::new(VecDeque::new()),
+            at_work: Cell::new(false),
+        }
+    }
+
+    /// Takes some of what is free; false if there is not enough of it, and then nothing is left.
+    fn take(self: Rc<Self>, cost: usize) -> bool {
+        let left = self.left.get().checked_sub(cost);
+        self.left.set(left.unwrap_or(0));
+        self.work();
+        left.is_some()
+    }
+
+    /// Has the task work through the line, and make free again what has been taken.
+    fn work(self: Rc<Self>) {
+        if !self.at_work.replace(true) {
+            actix_rt::spawn(Work(self).run());
+        }
+    }
+
+    async fn turn(self: Rc<Self>, bytes: usize) {
+        let (go, goes) = oneshot::channel();
+        self.waiting.borrow_mut().push_back((bytes, go));
+        self.work();
+        // Where the task has ended before its time, the runtime that it ran in is ending too.
+        let _ = goes.await;
+    }
+}
+
+/// The task; where it ends before its time, with the runtime that it ran in, nobody waits in vain.
+struct Work(Rc<Line>);
+
+impl Drop for Work {
+    fn drop(&mut self) {
+        self.0.at_work.set(false);
+        self.0.left.set(self.0.free);
+        self.0.waiting.take();
+    }
+}
+
+impl Work {
+    async fn run(self) {
+        let line = &self.0;
+        loop {
+            let (mut going, mut bytes) = (0, 0);
+            while going < line.at_a_time && bytes < BATCH_BYTES {
+                let Some((wanted, next)) = line.waiting.borrow_mut().pop_front() else {
+                    return;
+                };
+                // One that has ended meanwhile takes no turn.
+                if next.send(()).is_ok() {
+                    going += 1;
+                    bytes += wanted;
+                }
+            }
+            tokio::task::yield_now().await;
+        }
+    }
+}

@@ -1,0 +1,7 @@
+//! The nodes by which a client of ROS finds its way: rosapi, rosout, and the follower of goals.
+//!
+//! **Invariant:** these nodes hold no state of the arm; they ask for it.
+
+pub mod follower;
+pub mod rosapi;
+pub mod rosout;

@@ -1,0 +1,249 @@
+//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the arm.
+//!
+//! Parameters are read and set by the arm's own questions: the same checks, the same words.
+//!
+//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the arm.
+
+mod messages;
+mod wire;
+
+use actix::prelude::*;
+
+pub use self::messages::{
+    Change, DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted,
+    NotSet, ParameterValue, SetParam, Unknown,
+};
+use crate::actors::arm::sim::{
+    ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
+};
+use crate::actors::gateway::aside::{Errand, aside};
+use crate::actors::gateway::messages::TakeCensus;
+use crate::actors::node::{Call, Reply, Unserved, ask};
+use crate::protocol::catalog::Node;
+use crate::protocol::op::fields::Rejections;
+use crate::protocol::ros::parameters::Parameter;
+use crate::protocol::ros::urdf;
+
+/// Topics and services of clients beyond which an answer may list more than can be written in a turn.
+const MANY: usize = 64;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `rosapi` beside an arm of `N` links.
+pub struct Rosapi<const N: usize> {
+    registry: Recipient<TakeCensus>,
+    arm: ArmParameters<N>,
+}
+
+/// The arm, as far as its parameters and its time are concerned.
+#[derive(Clone)]
+pub struct ArmParameters<const N: usize> {
+    /// Gravity, masses and lengths.
+    pub params: Recipient<Call<SetParams<N>>>,
+    /// Gains.
+    pub gains: Recipient<Call<SetGains<N>>>,
+    /// Method and timestep.
+    pub integrator: Recipient<Call<SetIntegrator>>,
+    /// Time.
+    pub time: Recipient<SimulationTime>,
+}
+
+impl<const N: usize> ArmParameters<N> {
+    /// The ways to this arm.
+    #[must_use]
+    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
+        Self {
+            params: arm.clone().recipient(),
+            gains: arm.clone().recipient(),
+            integrator: arm.clone().recipient(),
+            time: arm.clone().recipient(),
+        }
+    }
+}
+
+impl<const N: usize> Rosapi<N> {
+    /// A node that asks the registry who is there and the arm for its values.
+    #[must_use]
+    pub fn new(registry: Recipient<TakeCensus>, arm: ArmParameters<N>) -> Self {
+        Self { registry, arm }
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for Rosapi<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<Look>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<Look>, ctx: &mut Context<Self>) {
+        let Call {
+            ask: look,
+            mut reply,
+        } = call;
+        let census = self.registry.send(TakeCensus);
+        let answered = async move {
+            let census = census.await.unwrap_or_default();
+            let is_long = census.entries() > MANY;
+            let answer = move || {
+                let mut pieces = reply.answer_in_pieces(Listing { look, census });
+                while !pieces.advance() {}
+            };
+            if is_long {
+                aside(Errand::Writing, answer).await;
+            } else {
+                answer();
+            }
+        };
+        ctx.spawn(answered.into_actor(self));
+    }
+}
+
+impl<const N: usize> Handler<Call<GetTime>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<GetTime>, ctx: &mut Context<Self>) {
+        let mut reply = call.reply;
+        let time = self.arm.time.send(SimulationTime).into_actor(self);
+        ctx.spawn(time.map(move |time, _, _| match time {
+            Ok(time) => reply.answer(time),
+            Err(_) => reply.refuse(no_arm()),
+        }));
+    }
+}
+
+impl<const N: usize> Handler<Call<GetParam<N>>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<GetParam<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        let Some(parameter) = ask.parameter else {
+            let default = ask.default;
+            return reply.answer(Err(Unknown { default }));
+        };
+        let value = value(parameter, self.arm.clone()).into_actor(self);
+        ctx.spawn(value.map(|value, _, _| give(reply, value.map(Ok))));
+    }
+}
+
+impl<const N: usize> Handler<Call<SetParam<N>>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<SetParam<N>>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        let change = match ask.change {
+            Ok(change) => change,
+            Err(why) => return reply.answer(Err(why)),
+        };
+        let rejected = change_parameter(change, self.arm.clone()).into_actor(self);
+        ctx.spawn(rejected.map(|rejected, _, _| {
+            let outcome = rejected.map(|rejected| {
+                if rejected.is_empty() {
+                    Ok(())
+                } else {
+                    Err(NotSet::Rejected(rejected))
+                }
+            });
+            give(reply, outcome);
+        }));
+    }
+}
+
+impl<const N: usize> Handler<Call<HasParam>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, mut call: Call<HasParam>, _: &mut Context<Self>) {
+        call.reply.answer(call.ask.parameter.is_some());
+    }
+}
+
+impl<const N: usize> Handler<Call<DeleteParam>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, mut call: Call<DeleteParam>, _: &mut Context<Self>) {
+        call.reply.answer(match call.ask.parameter {
+            Some(_) => NotDeleted::Fixed,
+            None => NotDeleted::Unknown,
+        });
+    }
+}
+
+impl<const N: usize> Handler<Call<GetParamNames>> for Rosapi<N> {
+    type Result = ();
+
+    fn handle(&mut self, mut call: Call<GetParamNames>, _: &mut Context<Self>) {
+        call.reply
+            .answer(Parameter::ALL.map(Parameter::full_name).to_vec());
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+fn no_arm() -> Unserved {
+    Unserved::NoAnswer(Node::ArmSim.name())
+}
+
+/// Passes on what has come of a question to the arm.
+fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
+    match answer {
+        Ok(answer) => reply.answer(answer),
+        Err(_) => reply.refuse(no_arm()),
+    }
+}
+
+/// The present value of a parameter.
+async fn value<const N: usize>(
+    parameter: Parameter,
+    arm: ArmParameters<N>,
+) -> Result<ParameterValue<N>, Unserved> {
+    use ParameterValue::{Number, Numbers, Text};
+    Ok(match parameter {
+        Parameter::Gravity
+        | Parameter::Masses
+        | Parameter::Lengths
+        | Parameter::RobotDescription => {
+            let arm = ask(&arm.params, SetParams::default()).await?.values;
+            match parameter {
+                Parameter::Gravity => Number(arm.gravity()),
+                Parameter::Masses => Numbers(*arm.masses()),
+                Parameter::Lengths => Numbers(*arm.lengths()),
+                _ => Text(urdf::describe(
+                    &joint_names::<N>(),
+                    arm.lengths(),
+                    arm.masses(),
+                )),
+            }
+        }
+        Parameter::Kp | Parameter::Ki | Parameter::Kd => {
+            let gains = ask(&arm.gains, SetGains::default()).await?.values;
+            match parameter {
+                Parameter::Kp => Numbers(gains.kp),
+                Parameter::Ki => Numbers(gains.ki),
+                _ => Numbers(gains.kd),
+            }
+        }
+        Parameter::Integrator | Parameter::Timestep => {
+            let integrator = ask(&arm.integrator, SetIntegrator::default()).await?.values;
+            match parameter {
+                Parameter::Integrator => Text(integrator.method.name().to_owned()),
+                _ => Number(integrator.timestep),
+            }
+        }
+    })
+}
+
+/// Has the arm change a parameter; gives what was not taken.
+async fn change_parameter<const N: usize>(
+    change: Change<N>,
+    arm: ArmParameters<N>,
+) -> Result<Rejections, Unserved> {
+    Ok(match change {
+        Change::Params(params) => ask(&arm.params, params).await?.rejected,
+        Change::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
+        Change::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
+    })
+}

@@ -1,0 +1,95 @@
+//! `/rosout`: the runtime's own warnings and errors, for whoever subscribes.
+//!
+//! **Invariant:** without subscribers no warning is even noted.
+
+use actix::prelude::*;
+use tokio::sync::mpsc;
+
+use crate::actors::arm::sim::SimulationTime;
+use crate::actors::node::{Interest, Publish};
+use crate::actors::wire::Nodes;
+use crate::logging::{self, Warning};
+use crate::protocol::catalog::Topic;
+use crate::protocol::messages::scene::LogMessage;
+use crate::protocol::messages::{self, Stamp};
+
+/// Warnings that may wait to be published; what does not fit is in the log alone.
+const MAX_WAITING: usize = 64;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The part of the gateway that publishes warnings.
+pub struct Rosout {
+    clock: Recipient<SimulationTime>,
+    publish: Recipient<Publish>,
+    /// Ends with the last subscriber.
+    listening: Option<SpawnHandle>,
+}
+
+impl Rosout {
+    /// Publishes warnings with the time that `clock` tells.
+    #[must_use]
+    pub fn new(clock: Recipient<SimulationTime>, publish: Recipient<Publish>) -> Self {
+        Self {
+            clock,
+            publish,
+            listening: None,
+        }
+    }
+
+    /// Enters the topic into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        let node = address.clone().recipient();
+        nodes.publishers.insert(Topic::Rosout, node);
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl Actor for Rosout {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl Handler<Interest> for Rosout {
+    type Result = ();
+
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
+        if let Some(listening) = self.listening.take() {
+            ctx.cancel_future(listening);
+        }
+        if !interest.wanted {
+            return logging::hear_warnings(None);
+        }
+        let (warnings, mut heard) = mpsc::channel(MAX_WAITING);
+        logging::hear_warnings(Some(warnings));
+        let (clock, publish) = (self.clock.clone(), self.publish.clone());
+        let report = async move {
+            while let Some(warning) = heard.recv().await {
+                // Without an arm there is no time.
+                let time = clock.send(SimulationTime).await.unwrap_or_default();
+                publish.do_send(encode(&warning, time));
+            }
+        };
+        self.listening = Some(ctx.spawn(report.into_actor(self)));
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+fn encode(warning: &Warning, time: f64) -> Publish {
+    let message = LogMessage {
+        stamp: Stamp::from_seconds(time),
+        level: warning.level,
+        name: warning.node,
+        msg: &warning.text,
+        file: warning.file,
+        function: "",
+        line: warning.line,
+    };
+    Publish {
+        topic: Topic::Rosout,
+        frame: messages::publish(Topic::Rosout.name(), &message).into(),
+    }
+}

@@ -1,0 +1,166 @@
+//! Rigid-body dynamics of a planar n-link arm of uniform rods.
+//!
+//! `M(q) q̈ + C(q, q̇) q̇ + G(q) = τ`, angles in rad, counter-clockwise, relative to the previous link; gravity along
+//! -y.
+//!
+//! | symbol | name | shape, unit | function |
+//! | --- | --- | --- | --- |
+//! | M | mass matrix, symmetric, positive definite | n×n, kg m² | [`mass_matrix`] |
+//! | C q̇ | Coriolis and centrifugal effort | n, N m | [`coriolis`] |
+//! | G | gravity load, gradient of the potential energy | n, N m | [`gravity_load`] |
+//!
+//! In the angles of the links to the horizontal, `φ_i = q_1 + … + q_i` with unit vectors `u_i = (cos φ_i, sin φ_i)`,
+//! the Lagrangian is
+//!
+//! `L = ½ Σ_ij μ_ij l_i l_j (u_i · u_j) φ̇_i φ̇_j - g Σ_i γ_i l_i sin φ_i`
+//!
+//! where `γ_i = m_i/2 + m_{i+1} + … + m_n`, `μ_ij = γ_max(i,j)` for `i ≠ j`, and `μ_ii = m_i/3 + m_{i+1} + … + m_n`.
+//! Since `φ̇_i` is the sum of the first `i` joint rates, the effort about joint `i` is the sum of the efforts about the
+//! links `i…n`: joint-space terms are sums over outer links of the terms of this Lagrangian.
+//!
+//! **Invariant:** one derivation for every n; no branch on the number of links. Source: Spong, Hutchinson
+//! and Vidyasagar, *Robot Modeling and Control* (2006), ch. 7.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
+)]
+
+mod articulated_body;
+
+pub use articulated_body::forward_dynamics;
+
+use super::arm::{Arm, State};
+use super::trig;
+use glam::DVec2;
+
+/// Mass matrix `M(q)` \[kg m²\] at joint positions `q` \[rad\].
+#[must_use]
+pub fn mass_matrix<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [[f64; N]; N] {
+    let u = directions(q);
+    // Joint i moves the links a >= i, joint j the links b >= j. Summed for i >= j only, so that M is symmetric to the
+    // bit.
+    let entry = |i: usize, j: usize| -> f64 {
+        let row = |a: usize| {
+            (j..N)
+                .map(|b| coupling(arm, a, b) * u[a].dot(u[b]))
+                .sum::<f64>()
+        };
+        (i..N).map(row).sum()
+    };
+    std::array::from_fn(|i| std::array::from_fn(|j| entry(i.max(j), i.min(j))))
+}
+
+/// Coriolis and centrifugal effort `C(q, q̇) q̇` \[N m\] at joint positions `q` \[rad\] and rates `qd` \[rad/s\].
+#[must_use]
+pub fn coriolis<const N: usize>(arm: &Arm<N>, q: &[f64; N], qd: &[f64; N]) -> [f64; N] {
+    let u = directions(q);
+    let rate = running_sum(qd);
+    outer_sum(std::array::from_fn(|i| {
+        (0..N)
+            .map(|j| coupling(arm, i, j) * u[j].perp_dot(u[i]) * rate[j] * rate[j])
+            .sum()
+    }))
+}
+
+/// Gravity load `G(q)` \[N m\]: the effort that holds the arm still at joint positions `q` \[rad\].
+#[must_use]
+pub fn gravity_load<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> [f64; N] {
+    let u = directions(q);
+    outer_sum(std::array::from_fn(|i| weight_moment(arm, i) * u[i].x))
+}
+
+/// The effort `τ` \[N m\] that gives the joint accelerations `qdd` \[rad/s²\] at `q` \[rad\], `qd` \[rad/s\].
+#[must_use]
+pub fn inverse_dynamics<const N: usize>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    qd: &[f64; N],
+    qdd: &[f64; N],
+) -> [f64; N] {
+    let u = directions(q);
+    let rate = running_sum(qd);
+    let acceleration = running_sum(qdd);
+    outer_sum(std::array::from_fn(|i| {
+        let inertial: f64 = (0..N)
+            .map(|j| {
+                let turning = u[i].dot(u[j]) * acceleration[j];
+                let centripetal = u[j].perp_dot(u[i]) * rate[j] * rate[j];
+                coupling(arm, i, j) * (turning + centripetal)
+            })
+            .sum();
+        inertial + weight_moment(arm, i) * u[i].x
+    }))
+}
+
+/// Kinetic energy \[J\] at joint positions `q` \[rad\] and rates `qd` \[rad/s\]; a sum of squares, so never negative.
+#[must_use]
+pub fn kinetic_energy<const N: usize>(arm: &Arm<N>, q: &[f64; N], qd: &[f64; N]) -> f64 {
+    let u = directions(q);
+    let rate = running_sum(qd);
+    let mut joint = DVec2::ZERO;
+    let mut energy = 0.0;
+    for i in 0..N {
+        let half = 0.5 * arm.lengths()[i] * rate[i] * u[i].perp();
+        let centre = joint + half;
+        // A rod has m v²/2 of the centre of mass, and (m l²/12) φ̇²/2 = m (l φ̇/2)²/6 about it.
+        energy += arm.masses()[i] * (0.5 * centre.length_squared() + half.length_squared() / 6.0);
+        joint = centre + half;
+    }
+    energy
+}
+
+/// Potential energy \[J\] at joint positions `q` \[rad\], zero with the whole arm along the x axis.
+#[must_use]
+pub fn potential_energy<const N: usize>(arm: &Arm<N>, q: &[f64; N]) -> f64 {
+    let u = directions(q);
+    (0..N).map(|i| weight_moment(arm, i) * u[i].y).sum()
+}
+
+/// Kinetic plus potential energy \[J\].
+#[must_use]
+pub fn energy<const N: usize>(arm: &Arm<N>, state: &State<N>) -> f64 {
+    kinetic_energy(arm, &state.position, &state.velocity) + potential_energy(arm, &state.position)
+}
+
+/// `μ_ij l_i l_j` \[kg m²\].
+pub(crate) fn coupling<const N: usize>(arm: &Arm<N>, i: usize, j: usize) -> f64 {
+    let outer = i.max(j);
+    let own = arm.masses()[outer] / if i == j { 3.0 } else { 2.0 };
+    (own + arm.rods[outer].beyond) * arm.lengths()[i] * arm.lengths()[j]
+}
+
+/// `g γ_i l_i` \[N m\].
+pub(crate) fn weight_moment<const N: usize>(arm: &Arm<N>, i: usize) -> f64 {
+    arm.gravity() * (0.5 * arm.masses()[i] + arm.rods[i].beyond) * arm.lengths()[i]
+}
+
+/// Unit vectors along the links. Rotations are composed joint by joint: the sum of wound joint angles would lose
+/// the digits that their sines and cosines still have.
+fn directions<const N: usize>(q: &[f64; N]) -> [DVec2; N] {
+    let (sin, cos) = trig::sin_cos(q);
+    let mut direction = DVec2::X;
+    std::array::from_fn(|i| {
+        direction = DVec2::new(cos[i], sin[i]).rotate(direction);
+        direction
+    })
+}
+
+/// Rates (or accelerations) of the links from those of the joints: `y_i = x_1 + … + x_i`.
+fn running_sum<const N: usize>(x: &[f64; N]) -> [f64; N] {
+    let mut sum = 0.0;
+    x.map(|x| {
+        sum += x;
+        sum
+    })
+}
+
+/// Efforts about the joints from those about the links: `y_i = x_i + … + x_n`.
+fn outer_sum<const N: usize>(mut x: [f64; N]) -> [f64; N] {
+    let mut sum = 0.0;
+    for x in x.iter_mut().rev() {
+        sum += *x;
+        *x = sum;
+    }
+    x
+}

@@ -1,0 +1,333 @@
+//! The command line and the environment, each option once.
+//!
+//! Pure: arguments and variables are handed in, and what the program is to do comes back as a value. `clap` reads the
+//! arguments and lays out the help; the values are read here, so that an option and its variable follow one rule.
+//!
+//! An option wins over its variable, which is then not looked at; an empty variable counts as unset.
+//!
+//! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
+
+mod links;
+mod plan;
+#[cfg(feature = "report")]
+mod report;
+mod setting;
+mod usage;
+#[cfg(feature = "web")]
+mod web;
+
+use std::ffi::OsString;
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+
+use clap::builder::{OsStringValueParser, StyledStr};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{Arg, Command};
+use tracing::level_filters::LevelFilter;
+
+pub use self::links::Links;
+pub use self::plan::PlanOptions;
+use self::setting::{Given, LaunchOption, given};
+pub use self::usage::{Origin, UsageError};
+#[cfg(feature = "web")]
+pub use self::web::WebOptions;
+use crate::protocol::op::token::Token;
+#[cfg(feature = "report")]
+use crate::report::ReportOptions;
+
+/// Where the runtime listens unless an option says otherwise; bound here, it listens on `[::1]` too.
+pub const DEFAULT_BIND: SocketAddr =
+    SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 1), 9095));
+
+/// The log levels by name, from silent to everything.
+const LEVELS: [(&str, LevelFilter); 6] = [
+    ("off", LevelFilter::OFF),
+    ("error", LevelFilter::ERROR),
+    ("warn", LevelFilter::WARN),
+    ("info", LevelFilter::INFO),
+    ("debug", LevelFilter::DEBUG),
+    ("trace", LevelFilter::TRACE),
+];
+
+/// The features of this build, as the version shows them.
+const BUILD: &str = if cfg!(feature = "web") {
+    concat!(env!("CARGO_PKG_VERSION"), " (web)")
+} else {
+    concat!(env!("CARGO_PKG_VERSION"), " (without web)")
+};
+
+#[cfg(feature = "web")]
+const DOORS: &str = "\
+This build has the web feature: the port speaks rosbridge JSON over TCP and over WebSocket, and serves a page \
+over HTTP.";
+#[cfg(not(feature = "web"))]
+const DOORS: &str = "\
+This build is without the web feature: the port speaks rosbridge JSON over TCP, and neither WebSocket nor HTTP.";
+
+const AFTER_HELP: &str = "\
+An option wins over its environment variable; an empty variable counts as unset.
+Exit status: 0 after SIGINT or SIGTERM, 2 for a bad option or variable, 1 for any other failure.";
+
+const LINKS: LaunchOption = LaunchOption {
+    option: "links",
+    variable: "ARM_SIM_LINKS",
+    value: "N",
+    about: "Number of links of the arm, 2 or 3",
+    default: "2",
+    is_switch: false,
+};
+
+const BIND: LaunchOption = LaunchOption {
+    option: "bind",
+    variable: "ARM_SIM_BIND",
+    value: "ADDRESS",
+    about: "Address and port to listen on, loopback unless there is a token; port 0 takes a free one",
+    default: "127.0.0.1:9095",
+    is_switch: false,
+};
+
+const SEED: LaunchOption = LaunchOption {
+    option: "seed",
+    variable: "ARM_SIM_SEED",
+    value: "N",
+    about: "Makes the targets of timed trials repeatable",
+    default: "a new seed at every start",
+    is_switch: false,
+};
+
+const LOG: LaunchOption = LaunchOption {
+    option: "log",
+    variable: "ARM_SIM_LOG",
+    value: "LEVEL",
+    about: "What is logged to standard error: off, error, warn, info, debug or trace",
+    default: "info",
+    is_switch: false,
+};
+
+const TOKEN: LaunchOption = LaunchOption {
+    option: "token",
+    variable: "ARM_SIM_TOKEN",
+    value: "TOKEN",
+    about: "What every client has to show, 16 characters at least; who may list this machine's processes \
+            sees it, so better use the variable",
+    default: "none",
+    is_switch: false,
+};
+
+/// All of them, in the order of the help.
+const SETTINGS: &[&LaunchOption] = &[
+    &LINKS,
+    &BIND,
+    &SEED,
+    &LOG,
+    &TOKEN,
+    #[cfg(feature = "web")]
+    &web::ALLOW_HOST,
+    #[cfg(feature = "web")]
+    &web::ALLOW_ORIGIN,
+    #[cfg(feature = "web")]
+    &web::STRICT_ORIGIN,
+    #[cfg(feature = "web")]
+    &web::REPORT,
+];
+
+/// Everything that is chosen at launch.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Options {
+    /// How many links the arm has.
+    pub links: Links,
+    /// Where to listen: a loopback address, or any if there is a token; port 0 takes a free one.
+    pub bind: SocketAddr,
+    /// Whether `bind` is [`DEFAULT_BIND`], which brings `[::1]` with it.
+    pub is_default_bind: bool,
+    /// The seed of the random targets of timed trials; a new one at every start if absent.
+    pub seed: Option<u64>,
+    /// The log level.
+    pub log: LevelFilter,
+    /// The token that every client has to show, if there is one.
+    pub token: Option<Token>,
+    /// About the web door.
+    #[cfg(feature = "web")]
+    pub web: WebOptions,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            links: Links::default(),
+            bind: DEFAULT_BIND,
+            is_default_bind: true,
+            seed: None,
+            log: LevelFilter::INFO,
+            token: None,
+            #[cfg(feature = "web")]
+            web: WebOptions::default(),
+        }
+    }
+}
+
+/// The request of the command line.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Parsed {
+    /// To serve clients, with these options.
+    Serve(Options),
+    /// To plan method and timestep for an allowed error.
+    Plan(PlanOptions),
+    /// To make the study's report.
+    #[cfg(feature = "report")]
+    Report(ReportOptions),
+    /// To show this text on standard output, and no more: the help or the version.
+    Show(String),
+}
+
+impl Options {
+    /// Reads the arguments, the program's name first, and for each option that is not among them its variable.
+    ///
+    /// # Errors
+    /// [`UsageError`] for the first argument, option or variable that is not as it should be.
+    pub fn parse<I, T, E>(arguments: I, environment: E) -> Result<Parsed, UsageError>
+    where
+        I: IntoIterator<Item = T>,
+        T: Into<OsString> + Clone,
+        E: Fn(&str) -> Option<OsString>,
+    {
+        let matches = match command().try_get_matches_from(arguments) {
+            Ok(matches) => matches,
+            Err(error) => return explained(&error),
+        };
+        if let Some((name, given)) = matches.subcommand() {
+            // An option of serving means nothing to a subcommand.
+            if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
+                return Err(UsageError::UnknownArgument {
+                    argument: format!("--{}", stray.option),
+                });
+            }
+            return match name {
+                #[cfg(feature = "report")]
+                report::NAME => Ok(Parsed::Report(report::read(given))),
+                _ => plan::read(given).map(Parsed::Plan),
+            };
+        }
+        let given = |setting: &LaunchOption| given(setting, &matches, &environment);
+        let token = given(&TOKEN).map(read_token).transpose()?;
+        let bind = given(&BIND)
+            .map(|bind| read_bind(bind, token.is_some()))
+            .transpose()?
+            .unwrap_or(DEFAULT_BIND);
+        Ok(Parsed::Serve(Self {
+            links: given(&LINKS)
+                .map(read_links)
+                .transpose()?
+                .unwrap_or_default(),
+            bind,
+            is_default_bind: bind == DEFAULT_BIND,
+            seed: given(&SEED).map(read_seed).transpose()?,
+            log: given(&LOG)
+                .map(read_log)
+                .transpose()?
+                .unwrap_or(LevelFilter::INFO),
+            token,
+            #[cfg(feature = "web")]
+            web: WebOptions::read(given)?,
+        }))
+    }
+}
+
+/// The command line as `clap` is to read it. The values stay unread, and the variables unknown to it.
+fn command() -> Command {
+    let options = SETTINGS.iter().map(|setting| {
+        let LaunchOption {
+            option,
+            variable,
+            value,
+            about,
+            default,
+            is_switch,
+        } = **setting;
+        let arg = Arg::new(option)
+            .long(option)
+            .value_name(value)
+            .value_parser(OsStringValueParser::new())
+            .help(StyledStr::from(format!(
+                "{about} [env: {variable}] [default: {default}]"
+            )));
+        if is_switch {
+            arg.num_args(0..=1)
+                .require_equals(true)
+                .default_missing_value("true")
+        } else {
+            arg
+        }
+    });
+    let command = Command::new(env!("CARGO_PKG_NAME"))
+        .version(BUILD)
+        .about(env!("CARGO_PKG_DESCRIPTION"))
+        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
+        .args(options)
+        .disable_help_subcommand(true)
+        .subcommand(plan::command());
+    #[cfg(feature = "report")]
+    let command = command.subcommand(report::command());
+    command
+}
+
+/// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
+fn explained(error: &clap::Error) -> Result<Parsed, UsageError> {
+    let context = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => text.clone(),
+        _ => String::new(),
+    };
+    // The argument as the user gave it, and the option as the help shows it, share this place.
+    let argument = match error.kind() {
+        ErrorKind::InvalidSubcommand => context(ContextKind::InvalidSubcommand),
+        _ => context(ContextKind::InvalidArg),
+    };
+    Err(match error.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
+            return Ok(Parsed::Show(error.to_string()));
+        }
+        ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand => {
+            UsageError::UnknownArgument { argument }
+        }
+        ErrorKind::InvalidValue => UsageError::MissingValue { option: argument },
+        ErrorKind::ArgumentConflict => UsageError::Repeated { option: argument },
+        ErrorKind::TooManyValues => UsageError::UnexpectedValue {
+            option: argument,
+            value: context(ContextKind::InvalidValue),
+        },
+        kind => UsageError::Arguments { kind },
+    })
+}
+
+fn read_links(Given { origin, value }: Given) -> Result<Links, UsageError> {
+    match value.as_str() {
+        "2" => Ok(Links::Two),
+        "3" => Ok(Links::Three),
+        _ => Err(UsageError::Links { origin, value }),
+    }
+}
+
+fn read_token(Given { origin, value }: Given) -> Result<Token, UsageError> {
+    Token::new(&value).map_err(|why| UsageError::Token { origin, why })
+}
+
+/// With a token to ask for, any address will do.
+fn read_bind(Given { origin, value }: Given, has_token: bool) -> Result<SocketAddr, UsageError> {
+    match value.parse::<SocketAddr>() {
+        Ok(address) if address.ip().is_loopback() || has_token => Ok(address),
+        Ok(_) => Err(UsageError::NotLoopback { origin, value }),
+        Err(_) => Err(UsageError::Bind { origin, value }),
+    }
+}
+
+fn read_seed(Given { origin, value }: Given) -> Result<u64, UsageError> {
+    value
+        .parse()
+        .map_err(|_| UsageError::Seed { origin, value })
+}
+
+fn read_log(Given { origin, value }: Given) -> Result<LevelFilter, UsageError> {
+    let known = LEVELS.iter().find(|(name, _)| *name == value);
+    known
+        .map(|(_, level)| *level)
+        .ok_or(UsageError::Log { origin, value })
+}

@@ -1,0 +1,225 @@
+//! The rows of the catalog's tables: fields, message types, topics and services, each written in one expression.
+//!
+//! **Invariant:** a row is a constant: nothing of the catalog is made or changed while the program runs.
+
+use super::node::Node;
+
+/// One field of a message, a request or a response.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Field {
+    /// Its key.
+    pub name: &'static str,
+    /// Its type as ROS writes it: `float64`, `float64[]`, `bool`, `string`, `uint64`, `pkg/msg/Type`. ROS does not know
+    /// `float64[][]`, one array per sample.
+    pub kind: &'static str,
+    /// Its unit, empty where it has none. `SI` where it differs from joint to joint or depends on the controller.
+    pub unit: &'static str,
+    /// Whether a request must have it. In messages and responses every field is there.
+    pub required: bool,
+}
+
+/// How often a field's type is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Count {
+    /// Once.
+    One,
+    /// Any number of times: `float64[]`.
+    Any,
+}
+
+impl Field {
+    /// The field's type without brackets, and how often it is there.
+    #[must_use]
+    pub fn element(&self) -> (&'static str, Count) {
+        match self.kind.strip_suffix("[]") {
+            Some(kind) => (kind, Count::Any),
+            None => (self.kind, Count::One),
+        }
+    }
+}
+
+/// A field that a request must have, or any field of a message or a response.
+pub(super) const fn required(name: &'static str, kind: &'static str, unit: &'static str) -> Field {
+    Field {
+        name,
+        kind,
+        unit,
+        required: true,
+    }
+}
+
+/// A field that a request may leave out.
+pub(super) const fn optional(name: &'static str, kind: &'static str, unit: &'static str) -> Field {
+    Field {
+        required: false,
+        ..required(name, kind, unit)
+    }
+}
+
+/// A message type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Type {
+    /// Its name, as ROS writes it: `std_msgs/msg/Header`.
+    pub name: &'static str,
+    /// Its fields, in the order of the definition.
+    pub fields: &'static [Field],
+    /// Its constants.
+    pub constants: &'static [Constant],
+}
+
+/// A named value of a type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Constant {
+    /// `WARN`.
+    pub name: &'static str,
+    /// `byte`.
+    pub kind: &'static str,
+    /// `30`.
+    pub value: &'static str,
+}
+
+/// A constant of type `byte`.
+pub(super) const fn byte(name: &'static str, value: &'static str) -> Constant {
+    Constant {
+        name,
+        kind: "byte",
+        value,
+    }
+}
+
+/// A message type without constants.
+pub(super) const fn message(name: &'static str, fields: &'static [Field]) -> Type {
+    Type {
+        name,
+        fields,
+        constants: &[],
+    }
+}
+
+impl Type {
+    /// The same type with constants.
+    pub(super) const fn constants(self, constants: &'static [Constant]) -> Self {
+        Self { constants, ..self }
+    }
+}
+
+/// Who sends on a topic.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Direction {
+    /// The runtime publishes; clients subscribe, and may neither advertise nor publish.
+    Published,
+    /// The runtime subscribes; anybody may publish, without an advertisement too.
+    Subscribed,
+}
+
+/// A row of the table of topics.
+pub(super) struct TopicEntry {
+    pub(super) name: &'static str,
+    pub(super) owner: Node,
+    pub(super) message: Type,
+    pub(super) direction: Direction,
+    pub(super) latched: bool,
+}
+
+/// A topic that the runtime publishes.
+pub(super) const fn published(
+    name: &'static str,
+    owner: Node,
+    type_name: &'static str,
+    fields: &'static [Field],
+) -> TopicEntry {
+    TopicEntry {
+        name,
+        owner,
+        message: message(type_name, fields),
+        direction: Direction::Published,
+        latched: false,
+    }
+}
+
+/// A topic to which the runtime subscribes.
+pub(super) const fn subscribed(
+    name: &'static str,
+    owner: Node,
+    type_name: &'static str,
+    fields: &'static [Field],
+) -> TopicEntry {
+    TopicEntry {
+        direction: Direction::Subscribed,
+        ..published(name, owner, type_name, fields)
+    }
+}
+
+impl TopicEntry {
+    /// A new subscriber gets the last message.
+    pub(super) const fn latched(self) -> Self {
+        Self {
+            latched: true,
+            ..self
+        }
+    }
+
+    /// The topic's type has constants.
+    pub(super) const fn constants(self, constants: &'static [Constant]) -> Self {
+        Self {
+            message: self.message.constants(constants),
+            ..self
+        }
+    }
+}
+
+/// A row of the tables of services.
+pub(super) struct ServiceEntry {
+    pub(super) name: &'static str,
+    pub(super) type_name: &'static str,
+    pub(super) owner: Node,
+    pub(super) request: &'static [Field],
+    pub(super) response: &'static [Field],
+    pub(super) is_computation: bool,
+    pub(super) is_all_or_nothing: bool,
+}
+
+/// A service with nothing in its request and nothing in its response.
+pub(super) const fn service(
+    name: &'static str,
+    type_name: &'static str,
+    owner: Node,
+) -> ServiceEntry {
+    ServiceEntry {
+        name,
+        type_name,
+        owner,
+        request: &[],
+        response: &[],
+        is_computation: false,
+        is_all_or_nothing: false,
+    }
+}
+
+impl ServiceEntry {
+    /// The fields of a request, in the order of a positional `args` array.
+    pub(super) const fn request(self, request: &'static [Field]) -> Self {
+        Self { request, ..self }
+    }
+
+    /// The fields of a response, in the order in which they are written.
+    pub(super) const fn response(self, response: &'static [Field]) -> Self {
+        Self { response, ..self }
+    }
+
+    /// The service is a pure computation, which may answer late and out of order.
+    pub(super) const fn computation(self) -> Self {
+        Self {
+            is_computation: true,
+            ..self
+        }
+    }
+
+    /// One bad field rejects the whole request.
+    pub(super) const fn all_or_nothing(self) -> Self {
+        Self {
+            is_all_or_nothing: true,
+            ..self
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! THE list: every node, topic, service and action of the runtime, with its name, type, direction, owner and fields.
+//!
+//! The registry, the tables of docs/protocol.md and the tests are checked against it; nothing else spells
+//! `/joint_states`. Fields stand in documented order, which is the order in which a positional `args` array is read.
+//!
+//! **Invariant:** each thing is one row of one table. What is listed is served, and what is served is listed: the
+//! compiler asks, since a table is an enum.
+
+mod actions;
+mod entry;
+mod node;
+pub mod rosapi;
+mod services;
+mod table;
+mod topics;
+pub mod types;
+
+pub use actions::Action;
+pub use entry::{Direction, Field};
+pub use node::Node;
+pub use rosapi::Rosapi;
+pub use services::Service;
+pub(in crate::protocol) use table::table;
+pub use topics::Topic;

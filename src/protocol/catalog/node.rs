@@ -1,0 +1,33 @@
+//! The nodes: one row each.
+//!
+//! **Invariant:** a name stands here without a slash; whoever shows it adds one.
+
+use super::table::table;
+
+table! {
+    /// A node of the runtime, by the name that introspection shows.
+    pub enum Node of &'static str {
+        /// The arm: dynamics, integrator and controller in one loop.
+        ArmSim = "arm_sim",
+        /// Inverse kinematics.
+        Ik = "ik",
+        /// Drives the arm to a goal.
+        IkAction = "ik_action",
+        /// Timed trials.
+        IkTrial = "ik_trial",
+        /// Predictions and offline runs.
+        Study = "study",
+        /// The rosbridge side: connections and registry.
+        Gateway = "gateway",
+        /// Tells what there is.
+        Rosapi = "rosapi",
+    }
+}
+
+impl Node {
+    /// The node's name, without a slash.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.entry()
+    }
+}

@@ -1,0 +1,11 @@
+//! The limits of the wire that several rooms keep.
+//!
+//! **Invariant:** nothing is imported here, so that every room can import this one.
+
+/// Longest frame, in bytes without the newline: a 3-link trajectory has under 1 KiB, an expression of 1 MB has to pass.
+pub const MAX_FRAME: usize = 4 * 1024 * 1024;
+/// Deepest nesting of objects and arrays, the frame itself included: ROS messages need fewer than ten levels.
+pub const MAX_NESTING: usize = 128;
+/// Longest topic or service name, and id of a subscription or a goal, in bytes: they are kept, and a goal's comes
+/// back 60 times a second.
+pub const MAX_NAME: usize = 1024;

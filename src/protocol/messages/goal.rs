@@ -1,0 +1,119 @@
+//! Messages of the nodes `ik`, `ik_action` and `ik_trial`: solutions, feedback, results, the status of a trial, and the
+//! trajectory that carries a goal's setpoint.
+//!
+//! **Invariant:** the fields are the catalog's, in its order; whatever is not there to be told is `null`, except a
+//! target's `phi`, which is left out.
+
+use serde::Serialize;
+use serde_json::value::{RawValue, to_raw_value};
+
+use crate::protocol::messages::{Header, JointTrajectory, JointTrajectoryPoint, Stamp};
+
+/// A place for the end effector.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TargetMessage {
+    /// \[m\].
+    pub x: f64,
+    /// \[m\].
+    pub y: f64,
+    /// Orientation of the last link \[rad\], where one was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phi: Option<f64>,
+}
+
+/// `values` of `/ik/solve`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SolutionValues<'a> {
+    /// Joint positions \[rad\], each in (-π, π].
+    pub positions: &'a [f64],
+}
+
+/// `values` of `/ik_action/send_goal`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct GoalValues<'a> {
+    /// Names the goal in feedback, result and cancellation.
+    pub goal_id: &'a str,
+}
+
+/// `values` of `/ik_trial/start`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TrialValues {
+    /// Simulation time that a trial lasts \[s\].
+    pub duration: f64,
+    /// \[m\].
+    pub epsilon: f64,
+    /// \[s\].
+    pub success_hold: f64,
+}
+
+/// A message of `/ik_action/feedback`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct IkFeedback<'a> {
+    /// The goal.
+    pub goal_id: &'a str,
+    /// A place for the end effector.
+    pub target: TargetMessage,
+    /// The setpoint that the goal commanded \[rad\].
+    pub positions: &'a [f64],
+    /// Distance between end effector and target \[m\].
+    pub distance_remaining: f64,
+    /// Simulation time since the goal's start \[s\].
+    pub elapsed: f64,
+}
+
+/// A message of `/ik_action/result`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct IkResult<'a> {
+    /// The goal.
+    pub goal_id: &'a str,
+    /// `reached` or `preempted`.
+    pub outcome: &'a str,
+    /// The place that the end effector was sent to.
+    pub target: TargetMessage,
+    /// Distance between end effector and target at the end \[m\].
+    pub final_distance: f64,
+}
+
+/// A message of `/ik_trial/status`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TrialStatus<'a> {
+    /// Whether the trial is neither over nor stopped.
+    pub running: bool,
+    /// Simulation time since the start \[s\].
+    pub elapsed: f64,
+    /// \[s\].
+    pub duration: f64,
+    /// Targets reached since the start.
+    pub targets_reached: u64,
+    /// The target being pursued.
+    pub target: Option<TargetMessage>,
+    /// Distance between end effector and target \[m\], as last heard.
+    pub error: Option<f64>,
+    /// The setpoint that the goal commanded \[rad\].
+    pub desired_positions: Option<&'a [f64]>,
+    /// `idle`, `active`, `reached` or `preempted`.
+    pub action_status: &'a str,
+}
+
+/// A trajectory of one point: to be at `positions` \[rad\], at rest, as soon as may be.
+#[must_use]
+pub fn setpoint_trajectory(joint_names: &[&str], positions: &[f64]) -> Box<RawValue> {
+    let velocities = vec![0.0; positions.len()];
+    let trajectory = JointTrajectory {
+        header: Header {
+            stamp: Stamp::default(),
+            frame_id: "",
+        },
+        joint_names,
+        points: &[JointTrajectoryPoint {
+            positions,
+            velocities: &velocities,
+            accelerations: &[],
+            time_from_start: Stamp::default(),
+        }],
+    };
+    to_raw_value(&trajectory).unwrap_or_else(|_| {
+        debug_assert!(false, "numbers and names can always be written as JSON");
+        RawValue::NULL.to_owned()
+    })
+}

@@ -1,0 +1,257 @@
+//! The messages that the runtime sends: their types, and encoders that end each frame with a newline.
+//!
+//! Numbers that are not finite are written as `null`, in our own messages (`serde_json` does that) and in payloads that
+//! only pass through ([`Payload`]).
+//!
+//! **Invariant:** one frame is one line of valid JSON.
+
+pub mod goal;
+pub mod scene;
+mod telemetry;
+pub mod trajectory;
+
+use bytes::Bytes;
+use serde::Serialize;
+
+pub use self::telemetry::{
+    Clock, DiagnosticArray, DiagnosticStatus, ErrorEstimateMessage, Header, JointState,
+    JointTrajectory, JointTrajectoryPoint, KeyValue, Stamp,
+};
+use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::series;
+
+/// Room for a frame before it grows: the state of a 3-link arm and any status of ours fit.
+const USUAL_FRAME: usize = 512;
+
+/// How serious a status is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Level {
+    /// All is well.
+    Info,
+    /// Something was not as it should be, and was done all the same.
+    Warning,
+    /// Something was not done.
+    Error,
+}
+
+impl Level {
+    /// All levels, the least serious first.
+    pub const ALL: [Self; 3] = [Self::Info, Self::Warning, Self::Error];
+
+    /// The level's name on the wire.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Info => "info",
+            Self::Warning => "warning",
+            Self::Error => "error",
+        }
+    }
+}
+
+/// A message on a topic.
+#[must_use]
+pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
+    Encoder::op("publish")
+        .text("topic", topic)
+        .value("msg", msg)
+        .end()
+}
+
+/// A message that a client sent, which only passes through; `msg` is valid JSON.
+#[must_use]
+pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
+    // Exact: slow subscribers' outboxes keep these by the ten thousand, and count their text alone.
+    let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
+    Encoder::with_room("publish", head + topic.len() + msg.line().len())
+        .text("topic", topic)
+        .raw("msg", msg)
+        .end()
+}
+
+/// A frame that [`publish`] has made for `topic`, or a [series] of them, for those who know it by another spelling.
+#[must_use]
+pub fn respelled(topic: &str, spelling: &str, frames: &Bytes) -> Bytes {
+    if topic == spelling {
+        return frames.clone();
+    }
+    let mut text = Vec::with_capacity(frames.len());
+    for frame in series::messages(frames.clone()) {
+        let mut line = Encoder::after(text, "publish").text("topic", spelling);
+        line.key("msg");
+        line.text.extend_from_slice(message_text(topic, &frame));
+        line.text.extend_from_slice(b"}\n");
+        text = line.text;
+    }
+    text.shrink_to_fit();
+    Bytes::from(text)
+}
+
+/// The message within a frame that [`publish`] has made for `topic`, as JSON.
+#[must_use]
+pub fn message_text<'a>(topic: &str, frame: &'a [u8]) -> &'a [u8] {
+    let quoted = serde_json::to_string(topic).map_or(0, |quoted| quoted.len());
+    let head = "{\"op\":\"publish\",\"topic\":,\"msg\":".len() + quoted;
+    let msg = frame.get(head..frame.len().saturating_sub("}\n".len()));
+    debug_assert!(msg.is_some(), "{topic} is not what this frame is about");
+    msg.unwrap_or(b"null")
+}
+
+/// The answer to a service call; `values` is an object, `status` empty on success.
+#[must_use]
+pub fn response(
+    service: &str,
+    id: Option<&Payload>,
+    values: &impl Serialize,
+    result: bool,
+    status: &str,
+) -> Bytes {
+    Encoder::op("service_response")
+        .text("service", service)
+        .optional_raw("id", id)
+        .value("values", values)
+        .value("result", &result)
+        .text("status", status)
+        .end()
+}
+
+/// The answer of an external provider, whose `values` only pass through.
+#[must_use]
+pub fn response_raw(
+    service: &str,
+    id: Option<&Payload>,
+    values: &Payload,
+    result: bool,
+    status: &str,
+) -> Bytes {
+    Encoder::with_room("service_response", values.line().len() + USUAL_FRAME)
+        .text("service", service)
+        .optional_raw("id", id)
+        .raw("values", values)
+        .value("result", &result)
+        .text("status", status)
+        .end()
+}
+
+/// The answer to a call that failed: `values` is `{}`, `status` says why.
+#[must_use]
+pub fn failure(service: &str, id: Option<&Payload>, status: &str) -> Bytes {
+    response(service, id, &Empty {}, false, status)
+}
+
+/// Progress of a goal.
+#[must_use]
+pub fn action_feedback(action: &str, id: Option<&Payload>, values: &impl Serialize) -> Bytes {
+    Encoder::op("action_feedback")
+        .text("action", action)
+        .optional_raw("id", id)
+        .value("values", values)
+        .end()
+}
+
+/// The end of a goal; `status` as `action_msgs/msg/GoalStatus` counts. Where `result` is false, `values` says why.
+#[must_use]
+pub fn action_result(
+    action: &str,
+    id: Option<&Payload>,
+    values: &impl Serialize,
+    status: u8,
+    result: bool,
+) -> Bytes {
+    Encoder::op("action_result")
+        .text("action", action)
+        .optional_raw("id", id)
+        .value("values", values)
+        .value("status", &status)
+        .value("result", &result)
+        .end()
+}
+
+/// A status.
+#[must_use]
+pub fn status(level: Level, msg: &str, id: Option<&Payload>) -> Bytes {
+    Encoder::op("status")
+        .text("level", level.name())
+        .text("msg", msg)
+        .optional_raw("id", id)
+        .end()
+}
+
+/// A call that goes on to an external provider under an id of the runtime's own; `args` only pass through.
+#[must_use]
+pub fn call(service: &str, id: &str, args: &Payload) -> Bytes {
+    Encoder::with_room("call_service", args.line().len() + USUAL_FRAME)
+        .text("service", service)
+        .text("id", id)
+        .raw("args", args)
+        .end()
+}
+
+/// `{}`, the `values` of a response that has none.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct Empty {}
+
+/// A frame under construction; members come in the order in which they are written.
+struct Encoder {
+    text: Vec<u8>,
+}
+
+impl Encoder {
+    fn op(op: &str) -> Self {
+        Self::with_room(op, USUAL_FRAME)
+    }
+
+    fn with_room(op: &str, bytes: usize) -> Self {
+        Self::after(Vec::with_capacity(bytes), op)
+    }
+
+    /// A frame behind what is there.
+    fn after(mut text: Vec<u8>, op: &str) -> Self {
+        text.extend_from_slice(b"{\"op\":\"");
+        text.extend_from_slice(op.as_bytes());
+        text.push(b'"');
+        Self { text }
+    }
+
+    fn key(&mut self, key: &str) {
+        self.text.extend_from_slice(b",\"");
+        self.text.extend_from_slice(key.as_bytes());
+        self.text.extend_from_slice(b"\":");
+    }
+
+    fn text(self, key: &str, text: &str) -> Self {
+        self.value(key, text)
+    }
+
+    fn value<T: Serialize + ?Sized>(mut self, key: &str, value: &T) -> Self {
+        self.key(key);
+        let start = self.text.len();
+        if serde_json::to_writer(&mut self.text, value).is_err() {
+            // A `Vec` takes every byte, and none of our types fails to serialise; should one, the frame stays valid.
+            debug_assert!(false, "{key} can't be written as JSON");
+            self.text.truncate(start);
+            self.text.extend_from_slice(b"null");
+        }
+        self
+    }
+
+    fn raw(mut self, key: &str, raw: &Payload) -> Self {
+        self.key(key);
+        self.text.extend_from_slice(raw.line().as_bytes());
+        self
+    }
+
+    fn optional_raw(self, key: &str, raw: Option<&Payload>) -> Self {
+        match raw {
+            Some(raw) => self.raw(key, raw),
+            None => self,
+        }
+    }
+
+    fn end(mut self) -> Bytes {
+        self.text.extend_from_slice(b"}\n");
+        // It may wait for long: its spare room is given back, and only its bytes are counted.
+        self.text.shrink_to_fit();
+        Bytes::from(self.text)
+    }
+}

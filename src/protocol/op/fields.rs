@@ -1,0 +1,316 @@
+//! Reads a request field by field and collects what it rejects, by name.
+//!
+//! Every field is read alone: a bad one is left out and remembered, the others still count. The catalog says which
+//! fields a service has, in which order a positional array gives them, and which must be there. A field that is an
+//! object is read member by member in the same way; its members are named `gains.kp`.
+//!
+//! **Invariant:** each rejected field is named once or, where entries of an array are at fault, once for each of these.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use serde_json::value::RawValue;
+
+pub use super::rejections::{Bound, Reason, Rejection, Rejections};
+
+use crate::protocol::catalog::{Field, Service};
+use crate::protocol::op::Arguments;
+use crate::protocol::wire::json;
+use crate::protocol::wire::text;
+
+/// The fields of one request.
+#[derive(Debug)]
+pub struct Fields<'a> {
+    /// The fields that the catalog lists.
+    fields: &'static [Field],
+    /// Whether `null` in an optional field means absent.
+    null_is_absent: bool,
+    /// The text before the names: empty, or the name of the object and a full stop.
+    prefix: String,
+    /// The values that came, in the order of the catalog.
+    values: Vec<Option<&'a RawValue>>,
+    rejections: Rejections,
+}
+
+impl<'a> Fields<'a> {
+    /// Sorts the arguments of a call into the fields of the service. Unknown fields are ignored.
+    ///
+    /// # Errors
+    /// Where a positional array has more entries than the service has fields.
+    pub fn read(args: &'a Arguments, service: Service) -> Result<Self, Rejection> {
+        let mut read = Self::of(service);
+        let (fields, values) = (read.fields, &mut read.values);
+        let refused = |reason| Rejection {
+            field: "args".to_owned(),
+            reason,
+        };
+        let not = |expected, raw: &RawValue| {
+            refused(Reason::Mistyped {
+                expected: Cow::Borrowed(expected),
+                found: text::found(raw),
+            })
+        };
+        match args {
+            Arguments::Neither(args) => {
+                return Err(not("an object or an array", args.raw()));
+            }
+            Arguments::Object(args) => {
+                let raw = args.raw();
+                let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+                json::members_into(raw.get(), &names, values).map_err(|_| not("an object", raw))?;
+            }
+            Arguments::Positional(args) => {
+                let raw = args.raw();
+                let entries =
+                    json::entries(raw, fields.len()).ok_or_else(|| not("an array", raw))?;
+                if entries.count > fields.len() {
+                    let (limit, got) = (fields.len(), entries.count);
+                    return Err(refused(Reason::TooMany { limit, got }));
+                }
+                for (value, entry) in values.iter_mut().zip(entries.first) {
+                    *value = Some(entry);
+                }
+            }
+        }
+        Ok(read)
+    }
+
+    /// The same; arguments that are rejected as a whole count as none, so that the answer can echo the values as they are.
+    #[must_use]
+    pub fn read_or_none(args: &'a Arguments, service: Service) -> Self {
+        Self::read(args, service).unwrap_or_else(|rejection| Self {
+            rejections: rejection.into(),
+            ..Self::of(service)
+        })
+    }
+
+    /// The fields of a request that gives one field alone.
+    #[must_use]
+    pub fn single(service: Service, name: &str, value: &'a RawValue) -> Self {
+        let mut fields = Self::of(service);
+        let given = fields.fields.iter().zip(&mut fields.values);
+        for (field, entry) in given {
+            *entry = (field.name == name).then_some(value);
+        }
+        fields
+    }
+
+    /// The fields of a request that gives none.
+    fn of(service: Service) -> Self {
+        Self {
+            fields: service.fields(),
+            null_is_absent: service.all_or_nothing(),
+            prefix: String::new(),
+            values: vec![None; service.fields().len()],
+            rejections: Rejections::default(),
+        }
+    }
+
+    /// A finite number within `bound`.
+    pub fn number(&mut self, name: &'static str, bound: Bound) -> Option<f64> {
+        let raw = self.take(name)?;
+        match finite(raw, bound) {
+            Ok(value) => Some(value),
+            Err(reason) => self.rejected_as(name, reason),
+        }
+    }
+
+    /// An array of `count` finite numbers within `bound`.
+    pub fn numbers(&mut self, name: &'static str, count: usize, bound: Bound) -> Option<Vec<f64>> {
+        let raw = self.take(name)?;
+        let Some(entries) = json::entries(raw, count) else {
+            let expected = format!("an array of {count} numbers");
+            return self.mistyped(name, expected, raw);
+        };
+        if entries.count != count {
+            return self.rejected_as(
+                name,
+                Reason::Length {
+                    expected: count,
+                    got: entries.count,
+                },
+            );
+        }
+        let mut values = Vec::with_capacity(count);
+        for (index, entry) in entries.first.into_iter().enumerate() {
+            match finite(entry, bound) {
+                Ok(value) => values.push(value),
+                Err(reason) => {
+                    self.rejected_as::<()>(&format!("{name}[{index}]"), reason);
+                }
+            }
+        }
+        (values.len() == count).then_some(values)
+    }
+
+    /// The same as an array: one number per joint.
+    pub fn array<const N: usize>(&mut self, name: &'static str, bound: Bound) -> Option<[f64; N]> {
+        self.numbers(name, N, bound)?.try_into().ok()
+    }
+
+    /// `true` or `false`.
+    pub fn boolean(&mut self, name: &'static str) -> Option<bool> {
+        let raw = self.take(name)?;
+        match json::boolean(raw) {
+            Some(value) => Some(value),
+            None => self.mistyped(name, "true or false", raw),
+        }
+    }
+
+    /// A string.
+    pub fn text(&mut self, name: &'static str) -> Option<Cow<'a, str>> {
+        let raw = self.take(name)?;
+        match json::text(raw) {
+            Some(text) => Some(text),
+            None => self.mistyped(name, "a string", raw),
+        }
+    }
+
+    /// A whole number from 1 to `limit`; `10.0` counts as 10.
+    pub fn count(&mut self, name: &'static str, limit: u64) -> Option<u64> {
+        let raw = self.take(name)?;
+        match json::integer(raw) {
+            Some(value) if value > limit => {
+                let found = text::excerpt(raw.get());
+                self.rejected_as(name, Reason::TooLarge { limit, found })
+            }
+            Some(value) if value > 0 => Some(value),
+            _ if json::number(raw).is_some_and(f64::is_infinite) => {
+                self.rejected_as(name, Reason::NotFinite)
+            }
+            _ => self.mistyped(name, "an integer, at least 1", raw),
+        }
+    }
+
+    /// One of `options`, by its name.
+    pub fn choice<T: Copy>(
+        &mut self,
+        name: &'static str,
+        options: &[T],
+        name_of: impl Fn(T) -> &'static str,
+    ) -> Option<T> {
+        let raw = self.take(name)?;
+        let text = json::text(raw);
+        let chosen = options
+            .iter()
+            .copied()
+            .find(|&option| Some(name_of(option)) == text.as_deref());
+        if chosen.is_some() {
+            return chosen;
+        }
+        let names: Vec<&str> = options.iter().map(|&option| name_of(option)).collect();
+        self.mistyped(name, format!("one of {}", names.join(", ")), raw)
+    }
+
+    /// An object, whose members `read` reads as it would the fields of a request; `None` if it is absent or no object.
+    /// Which members there are is up to the field's type.
+    pub fn object<T>(
+        &mut self,
+        name: &'static str,
+        read: impl FnOnce(&mut Fields<'a>) -> T,
+    ) -> Option<T> {
+        let raw = self.take(name)?;
+        let field = self.fields.iter().find(|field| field.name == name)?;
+        let fields = field.members();
+        let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+        let mut values = vec![None; fields.len()];
+        if json::members_into(raw.get(), &names, &mut values).is_err() {
+            return self.mistyped(name, "an object", raw);
+        }
+        let mut members = Fields {
+            fields,
+            null_is_absent: self.null_is_absent,
+            prefix: format!("{}{name}.", self.prefix),
+            values,
+            rejections: Rejections::default(),
+        };
+        let value = read(&mut members);
+        self.rejections.append(members.rejections);
+        Some(value)
+    }
+
+    /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
+    pub fn refuse(&mut self, name: &str, reason: &impl fmt::Display) {
+        self.rejections
+            .refuse(&format!("{}{name}", self.prefix), reason);
+    }
+
+    /// Returns the rejections so far, in the order of reading.
+    #[must_use]
+    pub fn rejections(&self) -> &[Rejection] {
+        self.rejections.as_slice()
+    }
+
+    /// The same, once all has been read.
+    #[must_use]
+    pub fn finish(self) -> Rejections {
+        self.rejections
+    }
+
+    /// Whether every field that was read so far was good: the `result` of the response.
+    #[must_use]
+    pub fn accepted(&self) -> bool {
+        self.rejections.is_empty()
+    }
+
+    /// All rejections in one line; empty if there are none: the `status` of the response.
+    #[must_use]
+    pub fn status(&self) -> String {
+        self.rejections.status()
+    }
+
+    /// Takes the value that came under that name. A required field that is absent is rejected.
+    fn take(&mut self, name: &'static str) -> Option<&'a RawValue> {
+        let index = self.fields.iter().position(|field| field.name == name);
+        debug_assert!(index.is_some(), "{name} is not in the catalog");
+        let index = index?;
+        let required = self.fields.get(index).is_some_and(|field| field.required);
+        let raw = self.values.get(index).copied().flatten();
+        let null_is_absent = self.null_is_absent && !required;
+        match raw {
+            Some(raw) if null_is_absent && raw.get() == "null" => None,
+            None if required => self.rejected_as(name, Reason::Missing),
+            raw => raw,
+        }
+    }
+
+    fn mistyped<T>(
+        &mut self,
+        name: &str,
+        expected: impl Into<Cow<'static, str>>,
+        raw: &RawValue,
+    ) -> Option<T> {
+        let reason = Reason::Mistyped {
+            expected: expected.into(),
+            found: text::found(raw),
+        };
+        self.rejected_as(name, reason)
+    }
+
+    fn rejected_as<T>(&mut self, name: &str, reason: Reason) -> Option<T> {
+        self.rejections.push(Rejection {
+            field: format!("{}{name}", self.prefix),
+            reason,
+        });
+        None
+    }
+}
+
+fn finite(raw: &RawValue, bound: Bound) -> Result<f64, Reason> {
+    let Some(value) = json::number(raw) else {
+        return Err(Reason::Mistyped {
+            expected: "a number".into(),
+            found: text::found(raw),
+        });
+    };
+    if !value.is_finite() {
+        return Err(Reason::NotFinite);
+    }
+    if !bound.holds(value) {
+        return Err(Reason::OutOfBounds {
+            bound,
+            found: text::excerpt(raw.get()),
+        });
+    }
+    Ok(value)
+}

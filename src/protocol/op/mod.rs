@@ -1,0 +1,332 @@
+//! Every rosbridge operation that a client may send, read from a frame.
+//!
+//! Payloads (`msg`, `args`, `values`) stay raw: what only passes through is never parsed further than its syntax.
+//!
+//! **Invariant:** every frame gives exactly one operation or exactly one error that names what is wrong with it, and
+//! its `id` either way.
+
+pub mod fields;
+mod reader;
+mod rejections;
+pub mod token;
+
+use std::time::Duration;
+
+use serde_json::value::RawValue;
+
+use super::messages::Level;
+pub use crate::protocol::limits::MAX_NAME;
+use crate::protocol::wire::fragments::Piece;
+use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::series::Series;
+pub use reader::read;
+
+/// Longest `args` and trajectory for a node of ours, without what it has no use for: its thread reads them, within
+/// some tenth of a millisecond. Those of computations, which workers read, and those for other clients are as long as
+/// a frame may be.
+pub const MAX_ARGS: usize = 16 * 1024;
+/// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
+pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
+/// Largest `queue_length`: the [outbox](super::outbox) bounds what is held back by bytes, and no message is shorter
+/// than 40.
+pub const MAX_QUEUE_LENGTH: usize = 100_000;
+/// Longest `timeout` of a forwarded call: a day.
+pub const MAX_TIMEOUT: Duration = Duration::from_secs(24 * 3600);
+
+/// A frame, read.
+#[derive(Debug)]
+pub struct Incoming {
+    /// The sender's `id`, as it came; there also where the operation is in error.
+    pub id: Option<Payload>,
+    /// The operation.
+    pub op: Result<Op, OpError>,
+}
+
+impl Incoming {
+    /// Bytes that its payloads take.
+    #[must_use]
+    pub fn allocated(&self) -> usize {
+        let op = self.op.as_ref().map_or(0, Op::allocated);
+        op + self.id.as_ref().map_or(0, Payload::allocated)
+    }
+}
+
+/// An operation.
+#[derive(Debug, Clone)]
+pub enum Op {
+    /// Registers the sender as a publisher.
+    Advertise {
+        /// Topic name.
+        topic: String,
+        /// Message type, if given.
+        type_name: Option<String>,
+    },
+    /// Withdraws that.
+    Unadvertise {
+        /// Topic name.
+        topic: String,
+    },
+    /// Delivers a message to the topic's subscribers.
+    Publish {
+        /// Topic name.
+        topic: String,
+        /// The message, an object.
+        msg: Payload,
+        /// The part of it that the runtime's own listener needs, where the message is long.
+        heard: Option<Payload>,
+    },
+    /// The same for messages that go out as they have come in.
+    PublishLines(Series),
+    /// Registers the sender as a subscriber.
+    Subscribe(Subscribe),
+    /// Withdraws one subscription (the frame's id) or all.
+    Unsubscribe {
+        /// Topic name.
+        topic: String,
+    },
+    /// Makes the sender the provider of a service.
+    AdvertiseService {
+        /// Service name.
+        service: String,
+        /// Service type, if given.
+        type_name: Option<String>,
+    },
+    /// Withdraws that.
+    UnadvertiseService {
+        /// Service name.
+        service: String,
+    },
+    /// Calls a service.
+    CallService(CallService),
+    /// A goal for an action.
+    SendActionGoal(ActionGoal),
+    /// The end of the goal that has the frame's id.
+    CancelActionGoal {
+        /// Action name.
+        action: String,
+    },
+    /// A piece of a longer frame.
+    Fragment(Piece),
+    /// Which statuses the sender wants from now on.
+    SetLevel(Verbosity),
+    /// Shows who the sender is, where the runtime asks for that.
+    Auth {
+        /// The token that it shows.
+        token: String,
+    },
+    /// A provider's answer to a forwarded call.
+    ServiceResponse {
+        /// Service name.
+        service: String,
+        /// Any value.
+        values: Payload,
+        /// Whether the call succeeded.
+        result: bool,
+        /// The provider's own `status`, if it is a string.
+        status: Option<String>,
+    },
+}
+
+impl Op {
+    fn allocated(&self) -> usize {
+        match self {
+            Self::Publish { msg, heard, .. } => {
+                msg.allocated() + heard.as_ref().map_or(0, Payload::allocated)
+            }
+            Self::PublishLines(lines) => lines.frames.len(),
+            Self::CallService(CallService { args, .. })
+            | Self::SendActionGoal(ActionGoal { args, .. }) => args.payload().allocated(),
+            Self::ServiceResponse { values, .. } => values.allocated(),
+            // Names, which are short.
+            _ => 0,
+        }
+    }
+}
+
+/// The least serious status that a client wants; `None` for no status at all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Verbosity(pub Option<Level>);
+
+impl Verbosity {
+    /// Every status: what holds over raw TCP until the client says otherwise.
+    pub const ALL: Self = Self(Some(Level::Info));
+    /// No status: what holds over WebSocket until the client says otherwise.
+    pub const NONE: Self = Self(None);
+
+    /// Whether a status of that level is wanted.
+    #[must_use]
+    pub fn wants(self, level: Level) -> bool {
+        self.0.is_some_and(|least| level >= least)
+    }
+}
+
+/// A subscription.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Subscribe {
+    /// Topic name.
+    pub topic: String,
+    /// Message type, if given.
+    pub type_name: Option<String>,
+    /// Least time between deliveries; zero for no throttling; at most [`MAX_THROTTLE`].
+    pub throttle: Duration,
+    /// How many messages throttling may hold back; 1 to [`MAX_QUEUE_LENGTH`].
+    pub queue_length: usize,
+    /// How messages are to be written.
+    pub encoding: Encoding,
+}
+
+/// How a subscriber wants its messages written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Encoding {
+    /// As what.
+    pub compression: Compression,
+    /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. None: in one piece always, as
+    /// what is binary does.
+    pub fragment_size: Option<usize>,
+}
+
+impl Encoding {
+    /// Joins two subscriptions of one client: the denser encoding, the smaller pieces.
+    #[must_use]
+    pub fn merged(self, other: Self) -> Self {
+        let compression = self.compression.max(other.compression);
+        let sizes = self.fragment_size.into_iter().chain(other.fragment_size);
+        Self {
+            compression,
+            fragment_size: sizes.min().filter(|_| compression == Compression::None),
+        }
+    }
+}
+
+/// As what a message is written; of several that a client asked for, the last in this order counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Compression {
+    /// JSON. Also where `png` was asked for, which saves nothing on messages as short as ours.
+    #[default]
+    None,
+    /// CBOR, with typed arrays.
+    Cbor,
+    /// CDR in CBOR.
+    CborRaw,
+}
+
+/// A service call.
+#[derive(Debug, Clone)]
+pub struct CallService {
+    /// Service name.
+    pub service: String,
+    /// Its arguments.
+    pub args: Arguments,
+    /// How long an external provider may take, if given; at most [`MAX_TIMEOUT`].
+    pub timeout: Option<Duration>,
+}
+
+/// A goal.
+#[derive(Debug, Clone)]
+pub struct ActionGoal {
+    /// Action name.
+    pub action: String,
+    /// Action type, if given.
+    pub type_name: Option<String>,
+    /// Its fields.
+    pub args: Arguments,
+    /// Whether feedback is wanted.
+    pub feedback: bool,
+}
+
+/// The arguments of a call.
+#[derive(Debug, Clone)]
+pub enum Arguments {
+    /// Fields by name; `{}` where `args` was absent or `null`.
+    Object(Payload),
+    /// Fields in documented order.
+    Positional(Payload),
+    /// Something else, which whoever takes the call refuses: some services echo their values even then.
+    Neither(Payload),
+}
+
+impl Arguments {
+    /// No arguments: `{}`.
+    #[must_use]
+    pub fn none() -> Self {
+        Self::Object(
+            RawValue::from_string("{}".to_owned())
+                .unwrap_or_default()
+                .into(),
+        )
+    }
+
+    /// The arguments, whatever they are.
+    #[must_use]
+    pub fn payload(&self) -> &Payload {
+        match self {
+            Self::Object(args) | Self::Positional(args) | Self::Neither(args) => args,
+        }
+    }
+}
+
+/// Why a frame is no operation, and how its sender hears of it.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OpError {
+    /// Answered by an error `status`.
+    #[error("{0}")]
+    Status(Problem),
+    /// A call that can be told apart from others by its service and id: answered by `service_response` with `result:
+    /// false`.
+    #[error("{problem}")]
+    Call {
+        /// The service that was called.
+        service: String,
+        /// The fault.
+        problem: Problem,
+    },
+}
+
+/// A fault of an operation.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Problem {
+    /// Not a JSON object; holds the parser's complaint, shortened.
+    #[error("malformed frame: {0}")]
+    NotJson(String),
+    /// There is no `op`.
+    #[error("malformed frame: op is required")]
+    NoOp,
+    /// `op` is no string; holds what it is.
+    #[error("malformed frame: op must be a string, got {0}")]
+    OpNotText(String),
+    /// No operation of ours; holds its name, shortened.
+    #[error("unknown op \"{0}\"")]
+    UnknownOp(String),
+    /// A required field is absent.
+    #[error("{op}: {field} is required")]
+    Missing {
+        /// The operation.
+        op: &'static str,
+        /// The field.
+        field: &'static str,
+    },
+    /// A field is not what it has to be.
+    #[error("{op}: {field} must be {expected}, got {found}")]
+    Mistyped {
+        /// The operation.
+        op: &'static str,
+        /// The field.
+        field: &'static str,
+        /// The kind of value that it has to be.
+        expected: &'static str,
+        /// The value that came, shortened.
+        found: String,
+    },
+    /// A field is longer than it may be: [`MAX_NAME`], [`MAX_ARGS`].
+    #[error("{op}: {field} must be at most {limit} bytes long, got {length}")]
+    TooLong {
+        /// The operation.
+        op: &'static str,
+        /// The field.
+        field: &'static str,
+        /// How long it may be, in bytes.
+        limit: usize,
+        /// How long it is, in bytes.
+        length: usize,
+    },
+}

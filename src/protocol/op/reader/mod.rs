@@ -1,0 +1,384 @@
+//! Reads an operation from a frame.
+//!
+//! **Invariant:** a member is looked at only for the operations that have it; of every other its syntax alone counts.
+
+mod ours;
+
+use std::borrow::Cow;
+use std::time::Duration;
+
+use serde_json::value::RawValue;
+
+use super::{
+    ActionGoal, CallService, Compression, Encoding, Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE,
+    MAX_TIMEOUT, Op, OpError, Problem, Subscribe, Verbosity,
+};
+use crate::protocol::catalog::{Action, Service};
+use crate::protocol::limits::MAX_NAME;
+use crate::protocol::messages::Level;
+use crate::protocol::wire::fragments::Piece;
+use crate::protocol::wire::payload::Payload;
+use crate::protocol::wire::{json, text};
+
+/// Characters of the JSON parser's complaint that go into a message: it may quote the client.
+const MAX_COMPLAINT: usize = 160;
+
+/// The members of a frame that mean something to us.
+const KEYS: [&str; 23] = [
+    "op",
+    "id",
+    "topic",
+    "type",
+    "msg",
+    "throttle_rate",
+    "queue_length",
+    "service",
+    "args",
+    "timeout",
+    "values",
+    "result",
+    "status",
+    "level",
+    "token",
+    "compression",
+    "fragment_size",
+    "data",
+    "num",
+    "total",
+    "action",
+    "action_type",
+    "feedback",
+];
+
+/// The operations that we know.
+const OPS: [&str; 14] = [
+    "advertise",
+    "unadvertise",
+    "publish",
+    "subscribe",
+    "unsubscribe",
+    "advertise_service",
+    "unadvertise_service",
+    "call_service",
+    "service_response",
+    "set_level",
+    "auth",
+    "fragment",
+    "send_action_goal",
+    "cancel_action_goal",
+];
+
+/// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
+#[must_use]
+pub fn read(frame: &str) -> Incoming {
+    let members = match json::members(frame, &KEYS) {
+        Ok(members) => members,
+        Err(error) => {
+            let complaint = text::shortened(&error.to_string(), MAX_COMPLAINT);
+            return Incoming {
+                id: None,
+                op: Err(OpError::Status(Problem::NotJson(complaint))),
+            };
+        }
+    };
+    let reader = OpReader { op: "", members };
+    let id = reader.get("id").map(Payload::from);
+    let op = match reader.known_op() {
+        Ok(op @ "call_service") => OpReader { op, ..reader }.call(),
+        Ok(op) => OpReader { op, ..reader }.other().map_err(OpError::Status),
+        Err(problem) => Err(OpError::Status(problem)),
+    };
+    Incoming { id, op }
+}
+
+/// Reads the members of one frame.
+struct OpReader<'a> {
+    op: &'static str,
+    members: [Option<&'a RawValue>; KEYS.len()],
+}
+
+impl<'a> OpReader<'a> {
+    fn known_op(&self) -> Result<&'static str, Problem> {
+        let raw = self.get("op").ok_or(Problem::NoOp)?;
+        let op = json::text(raw).ok_or_else(|| Problem::OpNotText(text::found(raw)))?;
+        OPS.into_iter()
+            .find(|known| *known == op)
+            .ok_or_else(|| Problem::UnknownOp(text::excerpt(&op)))
+    }
+
+    /// A call. As soon as its service is known it can be answered as a call, whatever else is wrong.
+    fn call(&self) -> Result<Op, OpError> {
+        let service = self.name("service").map_err(OpError::Status)?;
+        let fields = Service::from_name(&service)
+            .filter(|service| !service.is_computation())
+            .map(Service::fields);
+        match self
+            .timeout()
+            .and_then(|timeout| Ok((timeout, self.args(fields)?)))
+        {
+            Ok((timeout, args)) => Ok(Op::CallService(CallService {
+                service,
+                args,
+                timeout,
+            })),
+            Err(problem) => Err(OpError::Call { service, problem }),
+        }
+    }
+
+    /// Any other operation.
+    fn other(&self) -> Result<Op, Problem> {
+        Ok(match self.op {
+            "advertise" => Op::Advertise {
+                topic: self.name("topic")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise" => Op::Unadvertise {
+                topic: self.name("topic")?,
+            },
+            "publish" => {
+                let (topic, msg) = (self.name("topic")?, self.message()?);
+                let heard = self.heard(&topic, &msg)?;
+                Op::Publish { topic, msg, heard }
+            }
+            "subscribe" => Op::Subscribe(self.subscription()?),
+            "unsubscribe" => Op::Unsubscribe {
+                topic: self.name("topic")?,
+            },
+            "advertise_service" => Op::AdvertiseService {
+                service: self.name("service")?,
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_service" => Op::UnadvertiseService {
+                service: self.name("service")?,
+            },
+            "send_action_goal" => Op::SendActionGoal(self.goal()?),
+            "cancel_action_goal" => Op::CancelActionGoal {
+                action: self.name("action")?,
+            },
+            "fragment" => Op::Fragment(self.piece()?),
+            "set_level" => Op::SetLevel(self.verbosity()?),
+            "auth" => Op::Auth {
+                token: self.secret()?,
+            },
+            _ => self.response()?,
+        })
+    }
+
+    fn goal(&self) -> Result<ActionGoal, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        let action = self.name("action")?;
+        let fields = Action::from_name(&action).map(Action::goal_fields);
+        Ok(ActionGoal {
+            type_name: self.optional_text("action_type")?,
+            args: self.args(fields)?,
+            feedback: match self.get("feedback") {
+                Some(_) => self.boolean("feedback")?,
+                None => false,
+            },
+            action,
+        })
+    }
+
+    fn subscription(&self) -> Result<Subscribe, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        Ok(Subscribe {
+            topic: self.name("topic")?,
+            type_name: self.optional_text("type")?,
+            throttle: self.throttle()?,
+            queue_length: self.queue_length()?,
+            // As one that is merged with nothing: what is binary is not cut up.
+            encoding: Encoding::default().merged(Encoding {
+                compression: self.compression()?,
+                fragment_size: self.fragment_size()?,
+            }),
+        })
+    }
+
+    fn compression(&self) -> Result<Compression, Problem> {
+        let Some(raw) = self.get("compression") else {
+            return Ok(Compression::None);
+        };
+        match json::text(raw).as_deref() {
+            Some("none" | "png") => Ok(Compression::None),
+            Some("cbor") => Ok(Compression::Cbor),
+            Some("cbor-raw") => Ok(Compression::CborRaw),
+            _ => Err(self.mistyped("compression", "none, png, cbor or cbor-raw", raw)),
+        }
+    }
+
+    fn fragment_size(&self) -> Result<Option<usize>, Problem> {
+        let Some(raw) = self.get("fragment_size").filter(|raw| raw.get() != "null") else {
+            return Ok(None);
+        };
+        let size = json::integer(raw)
+            .filter(|size| *size > 0)
+            .ok_or_else(|| self.mistyped("fragment_size", "an integer, at least 1", raw))?;
+        Ok(usize::try_from(size).ok())
+    }
+
+    fn piece(&self) -> Result<Piece, Problem> {
+        let id = self.required("id")?;
+        self.short("id", id.get())?;
+        let raw = self.required("data")?;
+        let data = json::text(raw).ok_or_else(|| self.mistyped("data", "a string", raw))?;
+        Ok(Piece {
+            id: id.get().to_owned(),
+            data: data.into_owned(),
+            num: self.index("num")?,
+            total: self.index("total")?,
+        })
+    }
+
+    /// A count; a larger one than fits is refused as too large a little later.
+    fn index(&self, field: &'static str) -> Result<usize, Problem> {
+        let raw = self.required(field)?;
+        let number = json::integer(raw)
+            .ok_or_else(|| self.mistyped(field, "an integer, at least 0", raw))?;
+        Ok(usize::try_from(number).unwrap_or(usize::MAX))
+    }
+
+    fn verbosity(&self) -> Result<Verbosity, Problem> {
+        let raw = self.required("level")?;
+        let name = json::text(raw);
+        let level = Level::ALL
+            .into_iter()
+            .find(|level| name.as_deref() == Some(level.name()));
+        match level {
+            None if name.as_deref() != Some("none") => {
+                Err(self.mistyped("level", "info, warning, error or none", raw))
+            }
+            level => Ok(Verbosity(level)),
+        }
+    }
+
+    /// Reads the token that a client shows. A complaint about it does not repeat it.
+    fn secret(&self) -> Result<String, Problem> {
+        let raw = self.required("token")?;
+        let token = json::text(raw).ok_or(Problem::Mistyped {
+            op: self.op,
+            field: "token",
+            expected: "a string",
+            found: "something else".to_owned(),
+        })?;
+        self.short("token", &token)?;
+        Ok(token.into_owned())
+    }
+
+    fn response(&self) -> Result<Op, Problem> {
+        self.required("id")?;
+        Ok(Op::ServiceResponse {
+            service: self.name("service")?,
+            values: self.required("values")?.into(),
+            result: self.boolean("result")?,
+            status: self.get("status").and_then(json::text).map(Cow::into_owned),
+        })
+    }
+
+    /// The member of that name; it is one of [`KEYS`].
+    fn get(&self, field: &'static str) -> Option<&'a RawValue> {
+        let index = KEYS.iter().position(|key| *key == field)?;
+        self.members.get(index).copied().flatten()
+    }
+
+    fn required(&self, field: &'static str) -> Result<&'a RawValue, Problem> {
+        self.get(field)
+            .ok_or(Problem::Missing { op: self.op, field })
+    }
+
+    fn mistyped(&self, field: &'static str, expected: &'static str, raw: &RawValue) -> Problem {
+        Problem::Mistyped {
+            op: self.op,
+            field,
+            expected,
+            found: text::found(raw),
+        }
+    }
+
+    /// A topic or service name.
+    fn name(&self, field: &'static str) -> Result<String, Problem> {
+        let raw = self.required(field)?;
+        let name = json::text(raw).filter(|name| !name.is_empty());
+        let name = name.ok_or_else(|| self.mistyped(field, "a non-empty string", raw))?;
+        self.short(field, &name)?;
+        Ok(name.into_owned())
+    }
+
+    fn short(&self, field: &'static str, text: &str) -> Result<(), Problem> {
+        self.within(MAX_NAME, field, text)
+    }
+
+    fn within(&self, limit: usize, field: &'static str, text: &str) -> Result<(), Problem> {
+        if text.len() <= limit {
+            return Ok(());
+        }
+        Err(Problem::TooLong {
+            op: self.op,
+            field,
+            limit,
+            length: text.len(),
+        })
+    }
+
+    fn optional_text(&self, field: &'static str) -> Result<Option<String>, Problem> {
+        let Some(raw) = self.get(field) else {
+            return Ok(None);
+        };
+        let text = json::text(raw).ok_or_else(|| self.mistyped(field, "a string", raw))?;
+        self.short(field, &text)?;
+        Ok(Some(text.into_owned()))
+    }
+
+    fn boolean(&self, field: &'static str) -> Result<bool, Problem> {
+        let raw = self.required(field)?;
+        json::boolean(raw).ok_or_else(|| self.mistyped(field, "true or false", raw))
+    }
+
+    /// A ROS message is an object.
+    fn message(&self) -> Result<Payload, Problem> {
+        let raw = self.required("msg")?;
+        if raw.get().starts_with('{') {
+            return Ok(raw.into());
+        }
+        Err(self.mistyped("msg", "an object", raw))
+    }
+
+    fn throttle(&self) -> Result<Duration, Problem> {
+        let Some(raw) = self.get("throttle_rate") else {
+            return Ok(Duration::ZERO);
+        };
+        let throttle_ms = json::number(raw)
+            .filter(|rate| rate.is_finite() && *rate >= 0.0)
+            .ok_or_else(|| self.mistyped("throttle_rate", "a number of ms, at least 0", raw))?;
+        Ok(duration(throttle_ms / 1000.0, MAX_THROTTLE))
+    }
+
+    fn queue_length(&self) -> Result<usize, Problem> {
+        let Some(raw) = self.get("queue_length") else {
+            return Ok(1);
+        };
+        let length = json::integer(raw)
+            .ok_or_else(|| self.mistyped("queue_length", "an integer, at least 0", raw))?;
+        Ok(usize::try_from(length)
+            .unwrap_or(MAX_QUEUE_LENGTH)
+            .clamp(1, MAX_QUEUE_LENGTH))
+    }
+
+    fn timeout(&self) -> Result<Option<Duration>, Problem> {
+        let Some(raw) = self.get("timeout") else {
+            return Ok(None);
+        };
+        let timeout = json::number(raw)
+            .filter(|timeout| timeout.is_finite() && *timeout > 0.0)
+            .ok_or_else(|| self.mistyped("timeout", "a number of seconds greater than 0", raw))?;
+        Ok(Some(duration(timeout, MAX_TIMEOUT)))
+    }
+}
+
+/// A finite number of seconds, 0 or more, as a duration of at most `longest`.
+fn duration(seconds: f64, longest: Duration) -> Duration {
+    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
+}

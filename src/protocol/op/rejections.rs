@@ -1,0 +1,170 @@
+//! Why fields of a request were not taken, by name.
+//!
+//! **Invariant:** what is told of them is one line of bounded length, whatever was sent.
+
+use std::borrow::Cow;
+use std::fmt;
+
+use crate::protocol::wire::text;
+
+/// Longest `status` in characters: room for every field of the largest service.
+const MAX_STATUS: usize = 2048;
+/// Longest reason, in characters, that another layer gives.
+const MAX_REASON: usize = 256;
+
+/// The range in which a number must be, besides finite.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// Any finite number.
+    Finite,
+    /// Greater than 0.
+    Positive,
+    /// 0 or greater.
+    NonNegative,
+}
+
+impl Bound {
+    pub(super) fn holds(self, value: f64) -> bool {
+        match self {
+            Self::Finite => true,
+            Self::Positive => value > 0.0,
+            Self::NonNegative => value >= 0.0,
+        }
+    }
+}
+
+impl fmt::Display for Bound {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Finite => "finite",
+            Self::Positive => "greater than 0",
+            Self::NonNegative => "at least 0",
+        })
+    }
+}
+
+/// A field that was not taken, and why. Reads as a sentence: `masses[1] must be greater than 0, got -2`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{field} {reason}")]
+pub struct Rejection {
+    /// The field, with the index of the entry where one entry is at fault.
+    pub field: String,
+    /// The fault.
+    pub reason: Reason,
+}
+
+/// Why a field was not taken.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Reason {
+    /// It has to be there.
+    #[error("is required")]
+    Missing,
+    /// Another type or value was expected.
+    #[error("must be {expected}, got {found}")]
+    Mistyped {
+        /// The kind of value that it must be.
+        expected: Cow<'static, str>,
+        /// The value that came, shortened.
+        found: String,
+    },
+    /// `NaN`, infinite, or a literal that overflows.
+    #[error("must be a finite number")]
+    NotFinite,
+    /// Out of bounds.
+    #[error("must be {bound}, got {found}")]
+    OutOfBounds {
+        /// The bound.
+        bound: Bound,
+        /// The number as it came, shortened.
+        found: String,
+    },
+    /// Above a limit.
+    #[error("must be at most {limit}, got {found}")]
+    TooLarge {
+        /// The limit.
+        limit: u64,
+        /// The number as it came, shortened.
+        found: String,
+    },
+    /// An array of the wrong length.
+    #[error("must have {expected} entries, got {got}")]
+    Length {
+        /// How many it must have.
+        expected: usize,
+        /// How many it has.
+        got: usize,
+    },
+    /// A positional array with more entries than the service has fields.
+    #[error("must have at most {limit} entries, got {got}")]
+    TooMany {
+        /// Fields of the service.
+        limit: usize,
+        /// Entries of the array.
+        got: usize,
+    },
+    /// The layer that was to use the value refuses it, in these words.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// The fields of a request that were not taken, in the order in which they were read.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Rejections(Vec<Rejection>);
+
+impl From<Rejection> for Rejections {
+    fn from(rejection: Rejection) -> Self {
+        Self(vec![rejection])
+    }
+}
+
+impl Rejections {
+    /// Whether every field was taken.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// The rejections, one by one.
+    #[must_use]
+    pub fn as_slice(&self) -> &[Rejection] {
+        &self.0
+    }
+
+    /// All of them in one line; empty if there are none: the `status` of the response.
+    #[must_use]
+    pub fn status(&self) -> String {
+        let sentences: Vec<String> = self.0.iter().map(Rejection::to_string).collect();
+        text::shortened(&sentences.join("; "), MAX_STATUS)
+    }
+
+    /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
+    pub fn refuse(&mut self, field: &str, reason: &impl fmt::Display) {
+        self.push(Rejection::refused(field, reason));
+    }
+
+    pub(super) fn push(&mut self, rejection: Rejection) {
+        self.0.push(rejection);
+    }
+
+    /// Adds those of `later` behind these.
+    pub fn append(&mut self, mut later: Self) {
+        self.0.append(&mut later.0);
+    }
+}
+
+impl fmt::Display for Rejections {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.status())
+    }
+}
+
+impl Rejection {
+    /// A field that the layer which was to use it does not take; `reason` reads on from the field's name.
+    #[must_use]
+    pub fn refused(field: &str, reason: &impl fmt::Display) -> Self {
+        Self {
+            field: field.to_owned(),
+            reason: Reason::Refused(text::shortened(&reason.to_string(), MAX_REASON)),
+        }
+    }
+}

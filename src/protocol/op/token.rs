@@ -1,0 +1,115 @@
+//! The secret that a runtime which other machines can reach asks of every client.
+//!
+//! **Invariant:** how long a comparison takes tells nothing about the secret but its length, and no log or message
+//! shows it.
+
+use std::fmt;
+
+use subtle::ConstantTimeEq;
+
+/// Shortest token in bytes: 16 random letters and digits are more than anybody can guess, however fast the answers
+/// come.
+pub const MIN_TOKEN: usize = 16;
+/// Longest token in bytes: it has to fit into a request's head with room to spare.
+pub const MAX_TOKEN: usize = 256;
+
+/// A token: printable ASCII without spaces, so that it survives a command line, an address and a cookie.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Token(Box<str>);
+
+/// Why a text can't be a token. The text itself is not repeated.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum TokenError {
+    /// Fewer than [`MIN_TOKEN`] bytes.
+    #[error("must be at least {MIN_TOKEN} bytes long, got {0}")]
+    TooShort(usize),
+    /// More than [`MAX_TOKEN`] bytes.
+    #[error("must be at most {MAX_TOKEN} bytes long, got {0}")]
+    TooLong(usize),
+    /// A space, a control character, or anything beyond ASCII.
+    #[error("must be printable ASCII without spaces")]
+    Unprintable,
+}
+
+impl Token {
+    /// Takes a text as a token.
+    ///
+    /// # Errors
+    /// [`TokenError`] where it can't be one.
+    pub fn new(text: &str) -> Result<Self, TokenError> {
+        if !text.bytes().all(|byte| byte.is_ascii_graphic()) {
+            Err(TokenError::Unprintable)
+        } else if text.len() < MIN_TOKEN {
+            Err(TokenError::TooShort(text.len()))
+        } else if text.len() > MAX_TOKEN {
+            Err(TokenError::TooLong(text.len()))
+        } else {
+            Ok(Self(text.into()))
+        }
+    }
+
+    /// Whether `presented` is the token, in a time that does not depend on where the two differ.
+    #[must_use]
+    pub fn matches(&self, presented: &str) -> bool {
+        self.0.as_bytes().ct_eq(presented.as_bytes()).into()
+    }
+
+    /// The secret itself, to be handed to whoever has just shown it.
+    #[must_use]
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Debug for Token {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Token(…)")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_token_itself_matches() {
+        let token = Token::new("correct-horse-battery").unwrap();
+        assert!(token.matches("correct-horse-battery"));
+        for other in [
+            "",
+            "correct-horse-batter",
+            "correct-horse-battery ",
+            "Correct-horse-battery",
+            "x",
+        ] {
+            assert!(!token.matches(other), "{other:?}");
+        }
+    }
+
+    #[test]
+    fn a_token_is_printable_and_of_bounded_length() {
+        assert_eq!(Token::new(""), Err(TokenError::TooShort(0)));
+        let short = "x".repeat(MIN_TOKEN);
+        assert!(Token::new(&short).is_ok());
+        let error = TokenError::TooShort(MIN_TOKEN - 1);
+        assert_eq!(Token::new(&short[1..]), Err(error));
+        let long = "x".repeat(MAX_TOKEN + 1);
+        assert_eq!(Token::new(&long), Err(TokenError::TooLong(MAX_TOKEN + 1)));
+        assert!(Token::new(&long[1..]).is_ok());
+        for text in [" ", "\n", "é", "\u{7f}"] {
+            let text = format!("correct-horse{text}battery");
+            assert_eq!(Token::new(&text), Err(TokenError::Unprintable));
+        }
+    }
+
+    #[test]
+    fn a_token_is_not_shown() {
+        let token = Token::new("correct-horse-battery").unwrap();
+        assert_eq!(format!("{token:?}"), "Token(…)");
+        assert_eq!(
+            token.reveal(),
+            "correct-horse-battery",
+            "but where it is asked for"
+        );
+    }
+}

@@ -1,0 +1,329 @@
+//! The outbox of one connection holds what waits to be written: bounded, in order, throttled where the client asked
+//! for it.
+//!
+//! Topic messages may be lost, oldest first; responses may not. Both leave in the order in which they were produced.
+//! A message that `throttle_rate` holds back takes its place in that order when its time comes.
+//!
+//! A push may be of a [series](crate::protocol::wire::series): it is queued as one piece, and dropped and held back
+//! message by message.
+//!
+//! Told the time; knows no socket and no clock.
+//!
+//! **Invariant:** dropping removes whole messages, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages
+//! wait, held back ones included.
+
+mod throttle;
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+
+use crate::protocol::limits::MAX_FRAME;
+use crate::protocol::outbox::throttle::Throttles;
+use crate::protocol::wire::series::{first_message, messages};
+
+/// Most bytes of topic messages that wait for one connection: the longest message that a client may send (and the
+/// newline behind it), or minutes of the arm's own.
+pub const MAX_TOPIC_BYTES: usize = MAX_FRAME + 1;
+/// Bytes that a frame takes beside its own: the count of those who share it, its place in a queue (which may be twice
+/// as long as what is in it), and the allocator's own of each.
+pub const FRAME_BYTES: usize = 192;
+/// Bytes of a place in the queue of topic messages, that of one that is held back, with its two indexes, included.
+pub const PLACE_BYTES: usize = 128;
+/// Room for this many frames is kept while nothing waits: a tick's worth.
+const KEPT_FRAMES: usize = 64;
+
+/// The outgoing queue of one connection.
+#[derive(Debug, Default)]
+pub struct Outbox {
+    /// Topic messages in order, each with its number.
+    topics: VecDeque<(u64, Bytes)>,
+    /// Responses and statuses in order, each with its number.
+    responses: VecDeque<(u64, Bytes)>,
+    throttles: Throttles,
+    /// Numbers given so far. Of what is queued the lower leaves first; of what may be dropped the lower is the older.
+    produced: u64,
+    /// Bytes of queued topic messages, without those held back.
+    topic_bytes: usize,
+    /// Bytes of responses that are queued or being written.
+    response_bytes: usize,
+    /// The frames that are being written: bytes left of each, and whether it is a response.
+    in_flight: VecDeque<(usize, bool)>,
+    /// Responses that are queued or being written.
+    response_count: usize,
+    dropped: u64,
+}
+
+impl Outbox {
+    /// An empty outbox.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds a message on a topic, or a series: queued, or held back if the topic is throttled. If it does not fit,
+    /// the oldest go.
+    pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
+        self.release(now);
+        // The newest messages of a series that is too long may still fit.
+        if frame.len() > MAX_TOPIC_BYTES && first_message(&frame) == frame.len() {
+            self.dropped += 1;
+            return;
+        }
+        if self.throttles.concerns(topic) {
+            self.offer(topic, frame, now);
+        } else {
+            let number = self.number();
+            self.enqueue(number, frame);
+        }
+        self.drop_while(|outbox| outbox.topic_bytes() > MAX_TOPIC_BYTES);
+    }
+
+    /// Drops topic messages, the oldest first, until those that are left take at most so many bytes, their places
+    /// included.
+    pub fn keep_topics(&mut self, bytes: usize) {
+        self.drop_while(|outbox| outbox.topic_cost() > bytes);
+        self.shrink();
+    }
+
+    /// Whether [`push`](Self::push) and [`take_batch`](Self::take_batch) look at the time that they are given.
+    #[must_use]
+    pub fn is_throttled(&self) -> bool {
+        !self.throttles.is_empty()
+    }
+
+    /// Adds a response or a status. What throttling holds back of the topics in `supersedes` is discarded: it is from
+    /// before.
+    pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
+        for topic in supersedes {
+            self.throttles.discard(topic);
+        }
+        self.response_bytes += frame.len();
+        self.response_count += 1;
+        let number = self.number();
+        self.responses.push_back((number, frame));
+    }
+
+    /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
+    /// (`None`, or no time at all). What is held back then counts as produced now.
+    pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
+        for (_, frame) in self.throttles.set(topic, throttle) {
+            let number = self.number();
+            self.enqueue(number, frame);
+        }
+    }
+
+    /// After an unsubscription: discards what is held back of a topic, and its throttle. What is queued leaves as it
+    /// would have.
+    pub fn forget(&mut self, topic: &str) {
+        self.throttles.forget(topic);
+    }
+
+    /// Moves the next frames into `batch`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
+    /// They count as being written until [`written`](Self::written) says otherwise. A series counts as one, unless
+    /// one frame is all that is asked for.
+    pub fn take_batch(
+        &mut self,
+        now: Instant,
+        max_frames: usize,
+        max_bytes: usize,
+        batch: &mut Vec<Bytes>,
+    ) {
+        self.release(now);
+        let mut bytes = 0;
+        for taken in 0..max_frames.max(1) {
+            let is_response = match (self.topics.front(), self.responses.front()) {
+                (Some((topic, _)), Some((response, _))) => response < topic,
+                (Some(_), None) => false,
+                (None, Some(_)) => true,
+                (None, None) => break,
+            };
+            let queue = if is_response {
+                &mut self.responses
+            } else {
+                &mut self.topics
+            };
+            let Some((_, next)) = queue.front_mut() else {
+                break;
+            };
+            let single = max_frames <= 1 && !is_response;
+            let length = if single {
+                first_message(next)
+            } else {
+                next.len()
+            };
+            bytes += length;
+            if taken > 0 && bytes > max_bytes {
+                break;
+            }
+            let frame = next.split_to(length);
+            if next.is_empty() {
+                queue.pop_front();
+            }
+            if !is_response {
+                self.topic_bytes -= length;
+            }
+            self.in_flight.push_back((length, is_response));
+            batch.push(frame);
+        }
+        self.shrink();
+    }
+
+    /// The next `bytes` of what was taken have been written.
+    pub fn written(&mut self, mut bytes: usize) {
+        while let Some((left, is_response)) = self.in_flight.front_mut() {
+            let done = bytes.min(*left);
+            *left -= done;
+            bytes -= done;
+            if *is_response {
+                self.response_bytes -= done;
+            }
+            if *left > 0 {
+                return;
+            }
+            self.response_count -= usize::from(*is_response);
+            self.in_flight.pop_front();
+        }
+    }
+
+    /// When the next held back message is due, if any is held back: the time to take a batch again.
+    pub fn next_release(&mut self) -> Option<Instant> {
+        self.throttles.next_release()
+    }
+
+    /// Whether there is nothing to be taken now (held back messages that are not due do not count).
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.topics.is_empty() && self.responses.is_empty()
+    }
+
+    /// Whether a response is to be taken.
+    #[must_use]
+    pub fn has_responses(&self) -> bool {
+        !self.responses.is_empty()
+    }
+
+    /// Bytes of responses that wait, those in the batch being written included.
+    #[must_use]
+    pub const fn response_bytes(&self) -> usize {
+        self.response_bytes
+    }
+
+    /// Bytes of those responses, their places included.
+    #[must_use]
+    pub const fn response_cost(&self) -> usize {
+        self.response_bytes + self.response_count * FRAME_BYTES
+    }
+
+    /// How many topic messages, or series of them, wait, those held back included.
+    #[must_use]
+    pub fn topic_count(&self) -> usize {
+        self.topics.len() + self.throttles.count()
+    }
+
+    fn topic_cost(&self) -> usize {
+        self.topic_bytes() + self.topic_count() * (PLACE_BYTES + FRAME_BYTES)
+    }
+
+    /// Bytes of topic messages that wait, those held back included; at most [`MAX_TOPIC_BYTES`].
+    #[must_use]
+    pub const fn topic_bytes(&self) -> usize {
+        self.topic_bytes + self.throttles.bytes()
+    }
+
+    /// Topic messages dropped so far for want of room. What throttling replaces by something newer is not counted.
+    #[must_use]
+    pub const fn dropped(&self) -> u64 {
+        self.dropped
+    }
+
+    fn number(&mut self) -> u64 {
+        self.produced += 1;
+        self.produced
+    }
+
+    /// Gives the throttle each message by itself.
+    fn offer(&mut self, topic: &Arc<str>, frames: Bytes, now: Instant) {
+        for frame in messages(frames) {
+            let number = self.number();
+            if let Some(frame) = self.throttles.offer(topic, number, frame, now) {
+                self.enqueue(number, frame);
+            }
+        }
+    }
+
+    fn enqueue(&mut self, number: u64, frame: Bytes) {
+        self.topic_bytes += frame.len();
+        self.topics.push_back((number, frame));
+    }
+
+    /// Queues the held back messages whose time has come.
+    fn release(&mut self, now: Instant) {
+        while let Some(frame) = self.throttles.release(now) {
+            let number = self.number();
+            self.enqueue(number, frame);
+        }
+    }
+
+    /// Drops the oldest topic messages for as long as that is too many: of the queue's first and the longest held
+    /// back, the older.
+    fn drop_while(&mut self, too_many: impl Fn(&Self) -> bool) {
+        while too_many(self) {
+            let queued = self.topics.front().map(|(number, _)| *number);
+            let held = self.throttles.oldest();
+            if held.is_some_and(|held| queued.is_none_or(|queued| held < queued)) {
+                self.throttles.drop_oldest();
+            } else if let Some((_, frames)) = self.topics.front_mut() {
+                let oldest = frames.split_to(first_message(frames));
+                if frames.is_empty() {
+                    self.topics.pop_front();
+                }
+                self.topic_bytes -= oldest.len();
+            } else {
+                debug_assert!(false, "bytes are counted that no message has");
+                return;
+            }
+            self.dropped += 1;
+        }
+    }
+
+    /// Gives back the memory of a burst once it has been taken.
+    fn shrink(&mut self) {
+        for queue in [&mut self.topics, &mut self.responses] {
+            if queue.is_empty() && queue.capacity() > 4 * KEPT_FRAMES {
+                queue.shrink_to(KEPT_FRAMES);
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Room for `frames` topic messages and as many responses, taken at once: what of it is still held.
+    fn held_after(frames: usize) -> [usize; 2] {
+        let mut outbox = Outbox::new();
+        let (now, topic) = (Instant::now(), Arc::<str>::from("/a"));
+        for _ in 0..frames {
+            outbox.push(&topic, Bytes::from_static(b"x"), now);
+            outbox.push_response(Bytes::from_static(b"y"), &[]);
+        }
+        let mut batch = Vec::new();
+        outbox.take_batch(now, usize::MAX, usize::MAX, &mut batch);
+        assert_eq!(batch.len(), 2 * frames);
+        [outbox.topics.capacity(), outbox.responses.capacity()]
+    }
+
+    #[test]
+    fn the_memory_of_a_burst_is_given_back_and_that_of_a_few_ticks_kept() {
+        for held in held_after(10_000) {
+            assert!((KEPT_FRAMES..4 * KEPT_FRAMES).contains(&held), "{held}");
+        }
+        for held in held_after(4 * KEPT_FRAMES) {
+            assert!(held >= 4 * KEPT_FRAMES, "{held}");
+        }
+    }
+}

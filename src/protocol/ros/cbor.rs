@@ -1,0 +1,217 @@
+//! Messages as binary: `cbor` (the message itself) and `cbor-raw` (its CDR bytes), for subscribers over WebSocket.
+//!
+//! Arrays of numbers are typed arrays (RFC 8746), little-endian, which clients read without looking at each entry. A
+//! number that is not finite was `null` as JSON and is NaN here, where the type says that it is a number.
+//!
+//! **Invariant:** a frame begins with a byte that no JSON frame begins with.
+
+use serde_json::{Map, Value};
+
+use super::cdr;
+use crate::protocol::catalog::types;
+use crate::protocol::catalog::types::{Count, Type};
+
+/// Major types of CBOR (RFC 8949), in place: the upper three bits.
+const UNSIGNED: u8 = 0x00;
+const NEGATIVE: u8 = 0x20;
+const BYTES: u8 = 0x40;
+const TEXT: u8 = 0x60;
+const ARRAY: u8 = 0x80;
+const MAP: u8 = 0xa0;
+const TAG: u8 = 0xc0;
+const FALSE: u8 = 0xf4;
+const TRUE: u8 = 0xf5;
+const NULL: u8 = 0xf6;
+const FLOAT64: u8 = 0xfb;
+/// Typed arrays, little-endian.
+const FLOAT64_ARRAY: u64 = 86;
+const INT32_ARRAY: u64 = 78;
+
+/// A whole `publish` frame with the message in CBOR. `type_name` is the message's type, if it is known.
+#[must_use]
+pub fn publish(topic: &str, type_name: Option<&str>, msg: &Value) -> Vec<u8> {
+    let mut out = head(topic);
+    match type_name.and_then(types::find) {
+        Some(one) => message(&mut out, one, msg),
+        None => untyped(&mut out, msg),
+    }
+    out.shrink_to_fit();
+    out
+}
+
+/// A whole `publish` frame with the message in CDR; `None` if its type is not known.
+#[must_use]
+pub fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
+    let one = types::find(type_name)?;
+    let (secs, nsecs) = stamp(msg);
+    let mut out = head(topic);
+    length(&mut out, MAP, 3);
+    text(&mut out, "secs");
+    length(&mut out, UNSIGNED, secs);
+    text(&mut out, "nsecs");
+    length(&mut out, UNSIGNED, nsecs);
+    text(&mut out, "bytes");
+    let bytes = cdr::encode(one, msg);
+    length(&mut out, BYTES, bytes.len() as u64);
+    out.extend_from_slice(&bytes);
+    out.shrink_to_fit();
+    Some(out)
+}
+
+/// The time that a message tells of itself; 0 if it tells none.
+fn stamp(msg: &Value) -> (u64, u64) {
+    let places = [
+        "/header/stamp",
+        "/stamp",
+        "/clock",
+        "/transforms/0/header/stamp",
+    ];
+    let found = places.into_iter().find_map(|place| msg.pointer(place));
+    let part = |name: &str| found.and_then(|one| one.get(name)?.as_u64());
+    (
+        part("sec").unwrap_or_default(),
+        part("nanosec").unwrap_or_default(),
+    )
+}
+
+fn head(topic: &str) -> Vec<u8> {
+    let mut out = Vec::with_capacity(256);
+    length(&mut out, MAP, 3);
+    text(&mut out, "op");
+    text(&mut out, "publish");
+    text(&mut out, "topic");
+    text(&mut out, topic);
+    text(&mut out, "msg");
+    out
+}
+
+/// A head: the major type and a number, in as few bytes as may be.
+#[allow(
+    clippy::cast_possible_truncation,
+    reason = "each arm has just seen that the number fits"
+)]
+fn length(out: &mut Vec<u8>, major: u8, number: u64) {
+    match number {
+        0..=23 => out.push(major + number as u8),
+        24..=0xff => out.extend_from_slice(&[major + 24, number as u8]),
+        0x100..=0xffff => {
+            out.push(major + 25);
+            out.extend_from_slice(&(number as u16).to_be_bytes());
+        }
+        0x1_0000..=0xffff_ffff => {
+            out.push(major + 26);
+            out.extend_from_slice(&(number as u32).to_be_bytes());
+        }
+        _ => {
+            out.push(major + 27);
+            out.extend_from_slice(&number.to_be_bytes());
+        }
+    }
+}
+
+fn text(out: &mut Vec<u8>, text: &str) {
+    length(out, TEXT, text.len() as u64);
+    out.extend_from_slice(text.as_bytes());
+}
+
+fn float(out: &mut Vec<u8>, value: f64) {
+    out.push(FLOAT64);
+    out.extend_from_slice(&value.to_be_bytes());
+}
+
+/// Every field that is there, in the type's order; others, which it does not have, are left out.
+fn message(out: &mut Vec<u8>, one: Type, msg: &Value) {
+    let Some(members) = msg.as_object() else {
+        return untyped(out, msg);
+    };
+    let there = one
+        .fields
+        .iter()
+        .filter(|field| members.contains_key(field.name));
+    length(out, MAP, there.clone().count() as u64);
+    for field in there {
+        text(out, field.name);
+        let value = members.get(field.name).unwrap_or(&Value::Null);
+        let (kind, count) = field.element();
+        // Looked up once, however many entries there are.
+        let inner = cdr::message_type(kind);
+        match count {
+            Count::One => single(out, kind, inner, value),
+            Count::Any => many(out, kind, inner, value),
+        }
+    }
+}
+
+/// A value of type `kind`, which has fields if it is a message: then it is `inner`.
+fn single(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
+    match (kind, value) {
+        ("float64" | "float32", Value::Null) => float(out, f64::NAN),
+        ("float64" | "float32", Value::Number(number)) => {
+            float(out, number.as_f64().unwrap_or(f64::NAN));
+        }
+        _ => match inner {
+            Some(one) => message(out, one, value),
+            None => untyped(out, value),
+        },
+    }
+}
+
+fn many(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
+    let Some(entries) = value.as_array() else {
+        return untyped(out, value);
+    };
+    match kind {
+        "float64" => {
+            length(out, TAG, FLOAT64_ARRAY);
+            length(out, BYTES, entries.len() as u64 * 8);
+            for entry in entries {
+                out.extend_from_slice(&entry.as_f64().unwrap_or(f64::NAN).to_le_bytes());
+            }
+        }
+        "int32" => {
+            length(out, TAG, INT32_ARRAY);
+            length(out, BYTES, entries.len() as u64 * 4);
+            for entry in entries {
+                let entry = entry.as_i64().and_then(|entry| i32::try_from(entry).ok());
+                out.extend_from_slice(&entry.unwrap_or_default().to_le_bytes());
+            }
+        }
+        _ => {
+            length(out, ARRAY, entries.len() as u64);
+            for entry in entries {
+                single(out, kind, inner, entry);
+            }
+        }
+    }
+}
+
+/// Writes any JSON value. It goes as deep as a frame may be nested, which the frame's reader has checked.
+fn untyped(out: &mut Vec<u8>, value: &Value) {
+    match value {
+        Value::Null => out.push(NULL),
+        Value::Bool(false) => out.push(FALSE),
+        Value::Bool(true) => out.push(TRUE),
+        Value::Number(number) => match (number.as_u64(), number.as_i64()) {
+            (Some(number), _) => length(out, UNSIGNED, number),
+            // CBOR writes -1 - n for n; the complement of a negative number is that n.
+            (None, Some(number)) => length(out, NEGATIVE, (!number).unsigned_abs()),
+            (None, None) => float(out, number.as_f64().unwrap_or(f64::NAN)),
+        },
+        Value::String(string) => text(out, string),
+        Value::Array(entries) => {
+            length(out, ARRAY, entries.len() as u64);
+            for entry in entries {
+                untyped(out, entry);
+            }
+        }
+        Value::Object(members) => object(out, members),
+    }
+}
+
+fn object(out: &mut Vec<u8>, members: &Map<String, Value>) {
+    length(out, MAP, members.len() as u64);
+    for (name, value) in members {
+        text(out, name);
+        untyped(out, value);
+    }
+}

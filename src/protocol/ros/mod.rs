@@ -1,0 +1,9 @@
+//! The formats and names of ROS: rosapi, CDR, CBOR, URDF, parameters.
+//!
+//! **Invariant:** names and types that ROS fixes stand here and in the catalogue, nowhere else.
+
+pub mod cbor;
+pub mod cdr;
+pub mod parameters;
+pub mod rosapi;
+pub mod urdf;

@@ -1,0 +1,132 @@
+//! The parameters, as `get_param` and `set_param` know them: the fields of the arm's services, by name. One row each.
+//!
+//! **Invariant:** a parameter has no value of its own: it is a field of the service that sets it.
+
+use crate::protocol::catalog::{Node, Service, table};
+use crate::protocol::names;
+
+table! {
+    /// A parameter of the arm.
+    pub enum Parameter of ParameterEntry {
+        /// Gravity \[m/s²\].
+        Gravity = field_of(Service::SetParams, "gravity"),
+        /// Masses of the links \[kg\].
+        Masses = field_of(Service::SetParams, "masses"),
+        /// Lengths of the links \[m\].
+        Lengths = field_of(Service::SetParams, "lengths"),
+        /// Proportional gains.
+        Kp = field_of(Service::SetGains, "kp"),
+        /// Integral gains.
+        Ki = field_of(Service::SetGains, "ki"),
+        /// Derivative gains.
+        Kd = field_of(Service::SetGains, "kd"),
+        /// The integration method.
+        Integrator = ParameterEntry {
+            name: "integrator",
+            ..field_of(Service::SetIntegrator, "method")
+        },
+        /// The timestep \[s\].
+        Timestep = field_of(Service::SetIntegrator, "timestep"),
+        /// The arm as URDF, made from lengths and masses; can't be set.
+        RobotDescription = ParameterEntry { name: "robot_description", field: None },
+    }
+}
+
+/// A row: the parameter's name, and the field that is its value.
+pub(super) struct ParameterEntry {
+    name: &'static str,
+    field: Option<(Service, &'static str)>,
+}
+
+/// A parameter that goes by the name of its field.
+const fn field_of(service: Service, name: &'static str) -> ParameterEntry {
+    ParameterEntry {
+        name,
+        field: Some((service, name)),
+    }
+}
+
+/// The node that has the parameters.
+const NODE: Node = Node::ArmSim;
+/// The node to which the description belongs elsewhere, and which tools therefore ask.
+const DESCRIBING_NODE: &str = "robot_state_publisher";
+
+impl Parameter {
+    /// The name without a node.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.entry().name
+    }
+
+    /// The name as `get_param_names` lists it: `/arm_sim:gravity`.
+    #[must_use]
+    pub fn full_name(self) -> String {
+        format!("/{}:{}", NODE.name(), self.name())
+    }
+
+    /// The parameter of that name: `gravity`, `/gravity`, `arm_sim:gravity` or `/arm_sim:gravity`.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        let (node, name) = match name.rsplit_once(':') {
+            Some((node, name)) => (Some(names::relative(node)), name),
+            None => (None, names::relative(name)),
+        };
+        let found = Self::ALL.into_iter().find(|one| one.name() == name)?;
+        let described = found == Self::RobotDescription && node == Some(DESCRIBING_NODE);
+        (described || node.is_none_or(|node| node == NODE.name())).then_some(found)
+    }
+
+    /// The service that answers for the parameter, and the field that is its value; none for what is made from others.
+    #[must_use]
+    pub const fn field(self) -> Option<(Service, &'static str)> {
+        self.entry().field
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parameter_goes_by_its_name_with_a_slash_or_its_node_before_it() {
+        for one in Parameter::ALL {
+            let name = one.name();
+            for spelled in [
+                name.to_owned(),
+                format!("/{name}"),
+                format!("arm_sim:{name}"),
+                one.full_name(),
+            ] {
+                assert_eq!(Parameter::from_name(&spelled), Some(one), "{spelled}");
+            }
+        }
+        let described = Parameter::from_name("/robot_state_publisher:robot_description");
+        assert_eq!(described, Some(Parameter::RobotDescription));
+        for other in [
+            "",
+            "/",
+            "ik:gravity",
+            "gravity:",
+            "robot_state_publisher:gravity",
+        ] {
+            assert_eq!(Parameter::from_name(other), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn every_field_of_a_parameter_is_one_that_its_service_takes_and_answers() {
+        for parameter in Parameter::ALL {
+            let Some((service, field)) = parameter.field() else {
+                assert_eq!(parameter, Parameter::RobotDescription);
+                continue;
+            };
+            assert!(service.fields().iter().any(|one| one.name == field));
+            assert!(
+                service
+                    .response_fields()
+                    .iter()
+                    .any(|one| one.name == field)
+            );
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! Types as rosapi lays them out, of messages, services and actions.
+//!
+//! **Invariant:** a type comes with every type inside it, each once.
+
+use std::collections::BTreeSet;
+
+use serde::Serialize;
+
+use super::graph::{own_services, same_service_type};
+use crate::protocol::catalog::types::{self, Count, Type};
+use crate::protocol::catalog::{Action, Field, Rosapi, Service};
+use crate::protocol::names;
+
+/// A type as rosapi lays it out, field by field.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct TypeDef {
+    /// Its name, without the middle part.
+    #[serde(rename = "type")]
+    pub name: String,
+    /// Names of the fields.
+    pub fieldnames: Vec<&'static str>,
+    /// Their types, without brackets.
+    pub fieldtypes: Vec<String>,
+    /// -1 for one value, 0 for any number.
+    pub fieldarraylen: Vec<i32>,
+    /// A value that each may have.
+    pub examples: Vec<&'static str>,
+    /// Names of the constants.
+    pub constnames: Vec<&'static str>,
+    /// Their values.
+    pub constvalues: Vec<&'static str>,
+}
+
+/// A type of that name, field by field; `None` if the runtime knows none.
+pub(super) fn details(question: Rosapi, name: &str) -> Option<Vec<TypeDef>> {
+    let service = || service_of_type(name);
+    let action = || {
+        let mut all = Action::ALL.into_iter();
+        all.find(|action| names::same_type(action.type_name(), name))
+    };
+    Some(match question {
+        Rosapi::MessageDetails => typedefs(types::find(name)?),
+        Rosapi::ServiceRequestDetails => {
+            part_typedefs(service()?.type_name(), "Request", service()?.fields())
+        }
+        Rosapi::ServiceResponseDetails => part_typedefs(
+            service()?.type_name(),
+            "Response",
+            service()?.response_fields(),
+        ),
+        Rosapi::ActionGoalDetails => {
+            part_typedefs(action()?.type_name(), "Goal", action()?.goal_fields())
+        }
+        Rosapi::ActionResultDetails => {
+            part_typedefs(action()?.type_name(), "Result", action()?.result_fields())
+        }
+        Rosapi::ActionFeedbackDetails => part_typedefs(
+            action()?.type_name(),
+            "Feedback",
+            action()?.feedback_fields(),
+        ),
+        _ => return None,
+    })
+}
+
+fn service_of_type(name: &str) -> Option<Service> {
+    own_services().find(|service| same_service_type(service.type_name(), name))
+}
+
+/// Every type that the runtime knows, each once.
+pub(super) fn interfaces() -> BTreeSet<&'static str> {
+    let messages = types::all().map(|one| one.name);
+    let services = own_services().map(Service::type_name);
+    let actions = Action::ALL.into_iter().map(Action::type_name);
+    messages.chain(services).chain(actions).collect()
+}
+
+/// A type and all types in it.
+fn typedefs(first: Type) -> Vec<TypeDef> {
+    let all = types::with_parts(first).into_iter();
+    all.map(|one| TypeDef::new(names::short_type(one.name), &one))
+        .collect()
+}
+
+/// One part of a service's or an action's type, and all types in it.
+fn part_typedefs(type_name: &'static str, part: &str, fields: &'static [Field]) -> Vec<TypeDef> {
+    let first = Type {
+        name: type_name,
+        fields,
+        constants: &[],
+    };
+    let mut all = typedefs(first);
+    if let Some(first) = all.first_mut() {
+        first.name = format!("{}_{part}", first.name);
+    }
+    all
+}
+
+impl TypeDef {
+    fn new(name: String, one: &Type) -> Self {
+        let fields = one.fields;
+        let elements = || fields.iter().map(Field::element);
+        Self {
+            name,
+            fieldnames: fields.iter().map(|field| field.name).collect(),
+            fieldtypes: elements()
+                .map(|(kind, _)| names::short_type(kind))
+                .collect(),
+            fieldarraylen: elements()
+                .map(|(_, count)| if count == Count::One { -1 } else { 0 })
+                .collect(),
+            examples: elements()
+                .map(|(kind, count)| example(kind, count))
+                .collect(),
+            constnames: one.constants.iter().map(|one| one.name).collect(),
+            constvalues: one.constants.iter().map(|one| one.value).collect(),
+        }
+    }
+}
+
+/// A value of that type, as JSON text.
+fn example(kind: &str, count: Count) -> &'static str {
+    match (count, kind) {
+        (Count::Any, _) => "[]",
+        (_, "string") => "",
+        (_, "bool") => "false",
+        (_, "float64" | "float32") => "0.0",
+        (_, kind) if kind.contains('/') => "{}",
+        _ => "0",
+    }
+}

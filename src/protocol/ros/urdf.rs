@@ -1,0 +1,71 @@
+//! The arm as 3D tools draw it: URDF from lengths and masses.
+//!
+//! One link per rod, `link1` to `linkN`, `world` before the first and `hand` behind the last; joint `i` turns about z.
+//! At `q = 0` all lie along +x. Frames of the same names are what `/tf` moves.
+//!
+//! **Invariant:** the inertia told is that of the dynamics: a thin uniform rod.
+
+use std::fmt::Write as _;
+
+use crate::protocol::messages::scene::{END_EFFECTOR, WORLD, link_name};
+
+/// Thickness of a link as it is drawn \[m\]; it has none in the dynamics.
+const THICKNESS: f64 = 0.05;
+/// A thin rod has no inertia about its own axis \[kg m²\]; parsers want one greater than 0.
+const LEAST_INERTIA: f64 = 1e-6;
+
+/// The description of an arm with these lengths \[m\] and masses \[kg\].
+#[must_use]
+pub fn describe(joint_names: &[&str], lengths: &[f64], masses: &[f64]) -> String {
+    let mut xml = String::from("<?xml version=\"1.0\"?>\n<robot name=\"pendularm\">\n");
+    let _ = writeln!(xml, "  <link name=\"{WORLD}\"/>");
+    let (mut parent, mut at) = (WORLD.to_owned(), 0.0);
+    for (index, ((joint, length), mass)) in joint_names.iter().zip(lengths).zip(masses).enumerate()
+    {
+        let link = link_name(index);
+        let middle = length / 2.0;
+        let across = mass * length * length / 12.0;
+        // A `String` takes whatever is written to it.
+        let _ = write!(
+            xml,
+            "  <joint name=\"{joint}\" type=\"continuous\">\n    <parent link=\"{parent}\"/>\n    \
+             <child link=\"{link}\"/>\n    <origin xyz=\"{at:?} 0 0\"/>\n    <axis xyz=\"0 0 1\"/>\n  </joint>\n  \
+             <link name=\"{link}\">\n    <inertial>\n      <origin xyz=\"{middle:?} 0 0\"/>\n      \
+             <mass value=\"{mass:?}\"/>\n      <inertia ixx=\"{LEAST_INERTIA:?}\" ixy=\"0\" ixz=\"0\" \
+             iyy=\"{across:?}\" iyz=\"0\" izz=\"{across:?}\"/>\n    </inertial>\n    <visual>\n      \
+             <origin xyz=\"{middle:?} 0 0\"/>\n      <geometry>\
+             <box size=\"{length:?} {THICKNESS} {THICKNESS}\"/></geometry>\n    \
+             </visual>\n  </link>\n"
+        );
+        parent = link;
+        at = *length;
+    }
+    let _ = write!(
+        xml,
+        "  <joint name=\"{END_EFFECTOR}_mount\" type=\"fixed\">\n    <parent link=\"{parent}\"/>\n    \
+         <child link=\"{END_EFFECTOR}\"/>\n    <origin xyz=\"{at:?} 0 0\"/>\n  </joint>\n  \
+         <link name=\"{END_EFFECTOR}\"/>\n</robot>\n"
+    );
+    xml
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A rod of 3 kg and 2 m has m l² / 12 = 1 kg m². Its joint stands at the end of the link before.
+    #[test]
+    fn a_description_has_the_lengths_the_masses_and_the_rods_inertia() {
+        let xml = describe(&["joint1", "joint2"], &[0.5, 2.0], &[1.0, 3.0]);
+        for part in [
+            "<origin xyz=\"0.5 0 0\"/>",
+            "<mass value=\"3.0\"/>",
+            "izz=\"1.0\"",
+            "<box size=\"2.0 0.05 0.05\"/>",
+            "<child link=\"hand\"/>",
+        ] {
+            assert!(xml.contains(part), "no {part} in {xml}");
+        }
+        assert_eq!(xml.matches("type=\"continuous\"").count(), 2);
+    }
+}

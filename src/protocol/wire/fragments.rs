@@ -1,0 +1,400 @@
+//! Long messages in pieces: `fragment` in both directions.
+//!
+//! Out only to subscribers that asked for it with `fragment_size`; in, from whoever sends them, within bounds. Told the
+//! time.
+//!
+//! **Invariant:** what is kept of unfinished messages is at most [`MAX_FRAME`] bytes in at most [`MAX_UNFINISHED`]
+//! messages, none of them for longer than [`MAX_AGE`].
+
+use std::collections::{BTreeMap, HashMap};
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use serde::Serialize;
+
+use crate::protocol::limits::MAX_FRAME;
+
+/// Messages of one connection that may be incomplete at once: clients send one after the other.
+pub const MAX_UNFINISHED: usize = 8;
+/// Pieces of one message: each of a longest frame's has a kilobyte.
+pub const MAX_PIECES: usize = 4096;
+/// Bytes that a piece takes beside its text: its place among the others, and the allocator's own.
+pub const PIECE_BYTES: usize = 128;
+/// How long a message may take to come: longer than the slowest network that a person would bear.
+pub const MAX_AGE: Duration = Duration::from_secs(60);
+/// The smallest pieces sent: smaller ones would be frame more than content.
+pub const MIN_SIZE: usize = 64;
+
+/// A piece of a message.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Piece {
+    /// Which message, as the sender names it (any JSON value's text).
+    pub id: String,
+    /// The text.
+    pub data: String,
+    /// Which piece, from 0.
+    pub num: usize,
+    /// How many there are.
+    pub total: usize,
+}
+
+/// Why a piece is not taken; what came of its message is forgotten.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum FragmentError {
+    /// There is no such piece.
+    #[error("fragment: num must be less than total, got {num} of {total}")]
+    NoSuchPiece {
+        /// The piece.
+        num: usize,
+        /// How many there are.
+        total: usize,
+    },
+    /// Too many pieces.
+    #[error("fragment: total must be at most {MAX_PIECES}, got {0}")]
+    TooMany(usize),
+    /// The number of pieces has changed.
+    #[error("fragment: total was {before}, and now is {now}")]
+    Changed {
+        /// As it was.
+        before: usize,
+        /// As it is.
+        now: usize,
+    },
+    /// Too many messages at once.
+    #[error("fragment: at most {MAX_UNFINISHED} messages may be incomplete at once")]
+    TooManyMessages,
+    /// Too long.
+    #[error("fragment: what is incomplete has at most {MAX_FRAME} bytes")]
+    TooLong,
+}
+
+/// Messages of one connection that are still incomplete.
+#[derive(Debug, Default)]
+pub struct Fragments {
+    messages: HashMap<String, Incomplete>,
+    /// Bytes of all pieces.
+    bytes: usize,
+}
+
+#[derive(Debug)]
+struct Incomplete {
+    began: Instant,
+    total: usize,
+    pieces: BTreeMap<usize, String>,
+}
+
+impl Incomplete {
+    fn bytes(&self) -> usize {
+        self.pieces.values().map(String::len).sum()
+    }
+}
+
+impl Fragments {
+    /// Takes a piece; the whole text once it is the last one missing. A piece that comes twice counts once.
+    ///
+    /// # Errors
+    /// [`FragmentError`] where the piece breaks a bound.
+    pub fn take(&mut self, piece: Piece, now: Instant) -> Result<Option<String>, FragmentError> {
+        self.forget_old(now);
+        let Piece {
+            id,
+            data,
+            num,
+            total,
+        } = piece;
+        let checked = self.check(&id, data.len(), num, total);
+        if let Err(why) = checked {
+            self.forget(&id);
+            return Err(why);
+        }
+        let unfinished = self
+            .messages
+            .entry(id.clone())
+            .or_insert_with(|| Incomplete {
+                began: now,
+                total,
+                pieces: BTreeMap::new(),
+            });
+        self.bytes += data.len();
+        if let Some(before) = unfinished.pieces.insert(num, data) {
+            self.bytes -= before.len();
+        }
+        if unfinished.pieces.len() < total {
+            return Ok(None);
+        }
+        Ok(self
+            .forget(&id)
+            .map(|whole| whole.pieces.into_values().collect()))
+    }
+
+    /// Bytes of what is kept.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// Bytes of memory that this takes: pieces without text take some too, and so do ids.
+    #[must_use]
+    pub fn allocated(&self) -> usize {
+        let beside = self.messages.iter();
+        let beside = beside.map(|(id, one)| id.len() + PIECE_BYTES * (1 + one.pieces.len()));
+        self.bytes + beside.sum::<usize>()
+    }
+
+    /// When the oldest unfinished message began.
+    #[must_use]
+    pub fn oldest(&self) -> Option<Instant> {
+        self.messages.values().map(|one| one.began).min()
+    }
+
+    fn check(&self, id: &str, bytes: usize, num: usize, total: usize) -> Result<(), FragmentError> {
+        if num >= total {
+            return Err(FragmentError::NoSuchPiece { num, total });
+        }
+        if total > MAX_PIECES {
+            return Err(FragmentError::TooMany(total));
+        }
+        match self.messages.get(id).map(|one| one.total) {
+            Some(before) if before != total => {
+                return Err(FragmentError::Changed { before, now: total });
+            }
+            None if self.messages.len() >= MAX_UNFINISHED => {
+                return Err(FragmentError::TooManyMessages);
+            }
+            _ => {}
+        }
+        if self.bytes + bytes > MAX_FRAME {
+            return Err(FragmentError::TooLong);
+        }
+        Ok(())
+    }
+
+    fn forget(&mut self, id: &str) -> Option<Incomplete> {
+        let gone = self.messages.remove(id)?;
+        self.bytes -= gone.bytes();
+        Some(gone)
+    }
+
+    /// Forgets what has taken longer than [`MAX_AGE`].
+    pub fn forget_old(&mut self, now: Instant) {
+        let bytes = &mut self.bytes;
+        self.messages.retain(|_, one| {
+            let kept = now.saturating_duration_since(one.began) <= MAX_AGE;
+            if !kept {
+                *bytes -= one.bytes();
+            }
+            kept
+        });
+    }
+}
+
+#[derive(Serialize)]
+struct Fragment<'a> {
+    op: &'static str,
+    id: &'a str,
+    data: &'a str,
+    num: usize,
+    total: usize,
+}
+
+/// A frame in pieces of at most `size` bytes of text each, one line per piece; as it is where it is no longer than
+/// that.
+#[must_use]
+pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
+    let text = frame.strip_suffix(b"\n").unwrap_or(frame);
+    let Some(text) = std::str::from_utf8(text)
+        .ok()
+        .filter(|text| text.len() > size)
+    else {
+        return frame.clone();
+    };
+    // A piece must not end within a character: the longest has four bytes.
+    let size = size.max(MIN_SIZE);
+    let mut pieces = Vec::new();
+    let mut rest = text;
+    while !rest.is_empty() {
+        let (piece, behind) = rest.split_at(boundary(rest, size));
+        pieces.push(piece);
+        rest = behind;
+    }
+    let total = pieces.len();
+    let mut lines = Vec::with_capacity(text.len() + total * 96);
+    for (num, data) in pieces.into_iter().enumerate() {
+        let fragment = Fragment {
+            op: "fragment",
+            id,
+            data,
+            num,
+            total,
+        };
+        if serde_json::to_writer(&mut lines, &fragment).is_err() {
+            debug_assert!(false, "text can always be written as JSON");
+            return frame.clone();
+        }
+        lines.push(b'\n');
+    }
+    lines.shrink_to_fit();
+    Bytes::from(lines)
+}
+
+/// The last boundary of characters at or before `at`.
+fn boundary(text: &str, at: usize) -> usize {
+    let at = at.min(text.len());
+    let boundary = (0..=at).rev().find(|&at| text.is_char_boundary(at));
+    boundary.unwrap_or(text.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(id: &str, num: usize, total: usize, data: &str) -> Piece {
+        Piece {
+            id: id.to_owned(),
+            data: data.to_owned(),
+            num,
+            total,
+        }
+    }
+
+    #[test]
+    fn pieces_make_a_message_in_whatever_order_they_come() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.take(piece("a", 2, 3, "z"), now), Ok(None));
+        assert_eq!(fragments.take(piece("b", 0, 2, "other"), now), Ok(None));
+        assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
+        assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
+        let whole = fragments.take(piece("a", 1, 3, "y"), now);
+        assert_eq!(whole, Ok(Some("xyz".to_owned())));
+        assert_eq!(fragments.bytes, "other".len());
+    }
+
+    #[test]
+    fn what_breaks_a_bound_is_refused_and_its_message_forgotten() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        fragments.take(piece("a", 0, 2, "x"), now).unwrap();
+        let half = "x".repeat(MAX_FRAME / 2 + 1);
+        for (bad, why) in [
+            (
+                piece("a", 1, 3, "y"),
+                FragmentError::Changed { before: 2, now: 3 },
+            ),
+            (
+                piece("a", 2, 2, "y"),
+                FragmentError::NoSuchPiece { num: 2, total: 2 },
+            ),
+            (
+                piece("a", 0, 0, "y"),
+                FragmentError::NoSuchPiece { num: 0, total: 0 },
+            ),
+            (
+                piece("a", 0, MAX_PIECES + 1, "y"),
+                FragmentError::TooMany(MAX_PIECES + 1),
+            ),
+        ] {
+            assert_eq!(fragments.take(bad, now), Err(why));
+            assert!(fragments.messages.is_empty());
+            assert_eq!(fragments.bytes, 0);
+            fragments.take(piece("a", 0, 2, "x"), now).unwrap();
+        }
+        fragments.take(piece("b", 0, 3, &half), now).unwrap();
+        let long = fragments.take(piece("b", 1, 3, &half), now);
+        assert_eq!(long, Err(FragmentError::TooLong));
+        assert_eq!(fragments.bytes, 1);
+        for number in 1..MAX_UNFINISHED {
+            fragments
+                .take(piece(&number.to_string(), 0, 2, "x"), now)
+                .unwrap();
+        }
+        let more = fragments.take(piece("more", 0, 2, "x"), now);
+        assert_eq!(more, Err(FragmentError::TooManyMessages));
+        let later = now + MAX_AGE + Duration::from_secs(1);
+        assert_eq!(fragments.take(piece("more", 0, 2, "x"), later), Ok(None));
+        assert_eq!(fragments.messages.len(), 1, "old ones are forgotten");
+    }
+
+    #[test]
+    fn the_bounds_themselves_are_within_bounds() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!(
+            fragments.take(piece("a", 0, MAX_PIECES, "x"), now),
+            Ok(None)
+        );
+        let half = "x".repeat(MAX_FRAME / 2);
+        let mut fragments = Fragments::default();
+        assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
+        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
+        assert_eq!(whole.map(|text| text.len()), Some(MAX_FRAME));
+    }
+
+    #[test]
+    fn what_is_kept_and_since_when_can_be_asked() {
+        let now = Instant::now();
+        let later = now + Duration::from_secs(1);
+        let mut fragments = Fragments::default();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
+        fragments.take(piece("a", 0, 2, "abc"), now).unwrap();
+        fragments.take(piece("b", 0, 2, "de"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(now)));
+        fragments.take(piece("a", 1, 2, "f"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (2, Some(later)));
+    }
+
+    #[test]
+    fn what_is_forgotten_makes_room() {
+        let now = Instant::now();
+        let much = "x".repeat(MAX_FRAME / 2 + 1);
+        let mut fragments = Fragments::default();
+        fragments.take(piece("old", 0, 2, &much), now).unwrap();
+        let at_last = now + MAX_AGE;
+        let more = fragments.take(piece("new", 0, 2, &much), at_last);
+        assert_eq!(more, Err(FragmentError::TooLong));
+        let later = at_last + Duration::from_nanos(1);
+        assert_eq!(fragments.take(piece("new", 0, 2, &much), later), Ok(None));
+        assert_eq!(fragments.bytes, much.len());
+    }
+
+    #[test]
+    fn what_is_kept_is_known_by_its_bytes_and_its_oldest() {
+        let now = Instant::now();
+        let mut fragments = Fragments::default();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (0, None));
+        fragments.take(piece("a", 0, 2, "one"), now).unwrap();
+        let later = now + Duration::from_secs(1);
+        fragments.take(piece("b", 0, 2, "three"), later).unwrap();
+        assert_eq!((fragments.bytes(), fragments.oldest()), (8, Some(now)));
+        fragments.forget_old(now + MAX_AGE);
+        assert_eq!(fragments.bytes(), 8);
+        fragments.forget_old(later + MAX_AGE);
+        assert_eq!((fragments.bytes(), fragments.oldest()), (5, Some(later)));
+    }
+
+    /// Characters of one to four bytes, cut at every size: together again they are what they were.
+    #[test]
+    fn a_frame_in_pieces_is_the_frame_again() {
+        let text = format!("{{\"msg\":\"{}\"}}", "aä€😀\\\"".repeat(40));
+        let frame = Bytes::from(format!("{text}\n"));
+        assert_eq!(split(&frame, text.len(), "id"), frame);
+        for size in MIN_SIZE..MIN_SIZE + 8 {
+            let mut fragments = Fragments::default();
+            let mut whole = None;
+            let lines = split(&frame, size, "id");
+            for line in lines
+                .strip_suffix(b"\n")
+                .unwrap()
+                .split(|byte| *byte == b'\n')
+            {
+                let line: serde_json::Value = serde_json::from_slice(line).unwrap();
+                let number = |name: &str| usize::try_from(line[name].as_u64().unwrap()).unwrap();
+                let data = line["data"].as_str().unwrap();
+                assert!(data.len() <= size && line["id"] == "id" && line["op"] == "fragment");
+                let piece = piece("id", number("num"), number("total"), data);
+                whole = fragments.take(piece, Instant::now()).unwrap();
+            }
+            assert_eq!(whole.as_deref(), Some(&*text));
+        }
+    }
+}

@@ -1,0 +1,368 @@
+//! Bytes into frames: an incremental reader that any split of the stream leaves unmoved, and that resynchronises.
+//!
+//! A frame is one JSON object. It ends where its braces and brackets balance outside strings, or at a newline. Anything
+//! else runs to the newline and is one malformed frame.
+//!
+//! Messages that need no reading (see [`series`]) are taken as they are.
+//!
+//! **Invariant:** no byte is looked at more than twice, and no more is kept than one unfinished frame and what was last
+//! pushed.
+
+mod raw;
+
+use bytes::Bytes;
+
+pub use self::raw::{Cut, Frame, FrameError, RawFrame};
+use super::nesting::{Event, Nesting};
+pub use super::opening::{Foreign, Opening, is_host_line, opening};
+use super::series::{self, Series};
+use super::text;
+use crate::protocol::limits::MAX_FRAME;
+
+/// Bytes of a line that is no object, kept for the error message.
+const MAX_PREFIX: usize = 32;
+/// Buffer that an idle reader may keep.
+const KEPT_BUFFER: usize = 16 * 1024;
+
+/// The part of the stream that the reader is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Within {
+    /// Between frames: white space.
+    Between,
+    /// In an object that is kept.
+    Object,
+    /// In an object that has been reported already: on to where it would have ended.
+    SkippedObject,
+    /// In a line that is no object; its beginning is being collected.
+    Line,
+    /// In a line that has been reported already: on to the newline.
+    SkippedLine,
+}
+
+/// Takes bytes as they come and gives frames, one at a time.
+///
+/// [`push`](Self::push) a chunk, then take frames with `next()` until it gives `None`; at the end of the stream,
+/// [`finish`](Self::finish).
+#[derive(Debug)]
+pub struct FrameReader {
+    buffer: Vec<u8>,
+    /// Where the present frame starts in the buffer. What is before it has been handed out or skipped.
+    start: usize,
+    /// How far the buffer has been scanned.
+    at: usize,
+    state: Within,
+    nesting: Nesting,
+    /// Longest frame.
+    limit: usize,
+    /// Whether every line is a message, which holds one object.
+    of_messages: bool,
+}
+
+impl Default for FrameReader {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl FrameReader {
+    /// A reader at the beginning of a stream.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self::with_limit(MAX_FRAME)
+    }
+
+    /// The same for frames of at most `limit` bytes.
+    #[must_use]
+    pub const fn with_limit(limit: usize) -> Self {
+        Self {
+            buffer: Vec::new(),
+            start: 0,
+            at: 0,
+            state: Within::Between,
+            nesting: Nesting::new(),
+            limit,
+            of_messages: false,
+        }
+    }
+
+    /// The same where every line is a message: behind its object only white space may stand. Lines have to be pushed
+    /// whole.
+    #[must_use]
+    pub const fn of_messages() -> Self {
+        let mut reader = Self::new();
+        reader.of_messages = true;
+        reader
+    }
+
+    /// Whether every line is a message.
+    #[must_use]
+    pub const fn is_of_messages(&self) -> bool {
+        self.of_messages
+    }
+
+    /// Adds bytes from the stream. Take all frames before the next push, so that memory stays bounded.
+    pub fn push(&mut self, bytes: &[u8]) {
+        self.compact();
+        self.buffer.extend_from_slice(bytes);
+    }
+
+    /// The series of messages that the stream goes on with, if it does; to be asked for before the next frame is.
+    pub fn series(&mut self) -> Option<Series> {
+        if self.state != Within::Between {
+            return None;
+        }
+        let rest = self.rest();
+        let space = rest.iter().position(|byte| !is_space(*byte))?;
+        let rest = rest.get(space..)?;
+        let (topic, length) = series::leading(rest)?;
+        let series = Series {
+            topic: topic.into(),
+            // A copy of its own: whoever keeps it keeps nothing else of the stream.
+            frames: Bytes::copy_from_slice(rest.get(..length)?),
+        };
+        self.at += space + length;
+        self.start = self.at;
+        Some(series)
+    }
+
+    /// Cuts off what the stream goes on with. `None` means that more bytes are needed, not that the stream has ended.
+    pub fn cut(&mut self) -> Option<Cut> {
+        if let Some(lines) = self.series() {
+            return Some(Cut::Lines(lines));
+        }
+        Some(match self.next_raw()? {
+            Ok(frame) => Cut::Frame(frame),
+            Err(error) => Cut::Error(error),
+        })
+    }
+
+    /// How much memory the reader holds, in bytes.
+    #[must_use]
+    pub const fn buffered(&self) -> usize {
+        self.buffer.capacity()
+    }
+
+    /// How many bytes are kept, in all.
+    #[must_use]
+    pub const fn kept(&self) -> usize {
+        self.buffer.len()
+    }
+
+    /// Whether a frame has begun and not ended, one that is being skipped included.
+    #[must_use]
+    pub fn is_unfinished(&self) -> bool {
+        self.state != Within::Between
+    }
+
+    /// Gives up the frame that has begun, once `next` gives none: the rest of it is skipped, as of one that is too
+    /// long. False if there is none of which anything is kept.
+    pub fn give_up(&mut self) -> bool {
+        let skipped = match self.state {
+            Within::Object => Within::SkippedObject,
+            Within::Line => Within::SkippedLine,
+            Within::Between | Within::SkippedObject | Within::SkippedLine => return false,
+        };
+        self.state = skipped;
+        self.start = self.at;
+        self.give_back();
+        true
+    }
+
+    /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
+    pub fn finish(&mut self) -> Option<FrameError> {
+        let error = match self.state {
+            Within::Object => Some(FrameError::StreamEnded),
+            Within::Line => Some(self.not_an_object()),
+            Within::Between | Within::SkippedObject | Within::SkippedLine => None,
+        };
+        *self = Self {
+            of_messages: self.of_messages,
+            ..Self::with_limit(self.limit)
+        };
+        error
+    }
+
+    /// Moves what is unfinished to the front of the buffer, once what is done with has outgrown it: constant time per
+    /// byte.
+    fn compact(&mut self) {
+        let rest = self.buffer.len() - self.start;
+        if self.start < rest {
+            return;
+        }
+        self.buffer.copy_within(self.start.., 0);
+        self.buffer.truncate(rest);
+        self.at -= self.start;
+        self.start = 0;
+    }
+
+    /// Gives back the memory of a long frame once nothing of it is left.
+    fn give_back(&mut self) {
+        if self.start == self.buffer.len() {
+            self.buffer.clear();
+            self.buffer.shrink_to(KEPT_BUFFER);
+            self.start = 0;
+            self.at = 0;
+        }
+    }
+
+    fn rest(&self) -> &[u8] {
+        self.buffer.get(self.at..).unwrap_or_default()
+    }
+
+    /// Skips white space up to the first byte of something.
+    fn skip_space(&mut self) {
+        let rest = self.rest();
+        let space = rest.iter().position(|byte| !is_space(*byte));
+        let first = space.and_then(|space| rest.get(space)).copied();
+        self.at += space.unwrap_or(rest.len());
+        self.start = self.at;
+        match first {
+            Some(b'{') => {
+                self.state = Within::Object;
+                self.nesting = Nesting::new();
+            }
+            Some(_) => self.state = Within::Line,
+            None => {}
+        }
+    }
+
+    /// Goes on in a line that is no object. `None` if it has not ended yet or has been reported.
+    fn scan_line(&mut self) -> Option<FrameError> {
+        let rest = self.rest();
+        let newline = rest.iter().position(|&byte| byte == b'\n');
+        let length = newline.unwrap_or(rest.len());
+        if self.state == Within::SkippedLine {
+            self.at += length;
+            self.start = self.at;
+            if newline.is_some() {
+                self.state = Within::Between;
+            }
+            return None;
+        }
+        let wanted = MAX_PREFIX - (self.at - self.start);
+        self.at += length.min(wanted);
+        if newline.is_none() && length < wanted {
+            return None;
+        }
+        let error = self.not_an_object();
+        self.state = Within::SkippedLine;
+        self.start = self.at;
+        Some(error)
+    }
+
+    fn not_an_object(&self) -> FrameError {
+        let prefix = self.buffer.get(self.start..self.at).unwrap_or_default();
+        let cut = prefix.len() == MAX_PREFIX;
+        let text = String::from_utf8_lossy(prefix.trim_ascii_end());
+        let excerpt = text::excerpt(&text);
+        FrameError::NotAnObject(if cut { excerpt + "…" } else { excerpt })
+    }
+
+    /// Goes on in an object. `None` if it has not ended yet, or ended after it had been reported.
+    fn scan_object(&mut self) -> Option<Result<RawFrame, FrameError>> {
+        let (scanned, event) = self
+            .nesting
+            .scan(self.buffer.get(self.at..).unwrap_or_default());
+        self.at += scanned;
+        let kept = self.state == Within::Object;
+        if !kept {
+            self.start = self.at;
+        }
+        // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
+        let limit = self.limit;
+        let too_long = self.at - self.start > limit;
+        let (state, error) = match event {
+            None if !too_long => return None,
+            None => (Within::SkippedObject, FrameError::TooLong(limit)),
+            Some(Event::Balanced) if kept && !too_long => return Some(self.take_frame()),
+            Some(Event::Balanced) => (Within::Between, FrameError::TooLong(limit)),
+            Some(Event::Newline { in_string: true }) => {
+                (Within::Between, FrameError::LineEndedInString)
+            }
+            Some(Event::Newline { in_string: false }) => (Within::Between, FrameError::LineEnded),
+            Some(Event::Mismatch { opener, found }) => {
+                (Within::SkippedLine, FrameError::Mismatch { opener, found })
+            }
+            Some(Event::TooDeep) => (Within::SkippedObject, FrameError::TooDeep),
+        };
+        self.state = state;
+        self.start = self.at;
+        kept.then_some(Err(if too_long {
+            FrameError::TooLong(limit)
+        } else {
+            error
+        }))
+    }
+
+    /// The frame that has just balanced.
+    fn take_frame(&mut self) -> Result<RawFrame, FrameError> {
+        let rest = self.rest();
+        let behind = rest
+            .iter()
+            .find(|byte| !matches!(byte, b' ' | b'\t' | b'\r'));
+        let newline = behind == Some(&b'\n');
+        let is_last = newline || behind.is_none();
+        if self.of_messages && !is_last {
+            self.start = self.at;
+            self.state = Within::SkippedLine;
+            return Err(FrameError::MoreBehind);
+        }
+        let length = self.at - self.start;
+        let bytes = if length > KEPT_BUFFER && length >= rest.len() {
+            // The frame keeps the buffer; what is behind it is copied instead, which is less.
+            let mut kept = Vec::with_capacity(rest.len().max(KEPT_BUFFER));
+            kept.extend_from_slice(rest);
+            let mut bytes = std::mem::replace(&mut self.buffer, kept);
+            bytes.truncate(self.at);
+            bytes.drain(..self.start);
+            self.at = 0;
+            bytes
+        } else {
+            let frame = self.buffer.get(self.start..self.at);
+            frame.unwrap_or_default().to_vec()
+        };
+        self.start = self.at;
+        self.state = Within::Between;
+        Ok(RawFrame {
+            bytes,
+            names: self.nesting.names,
+            newline,
+        })
+    }
+
+    /// The next frame, still to be [decoded](RawFrame::decode). `None` means that more bytes are needed, not that the
+    /// stream has ended.
+    pub fn next_raw(&mut self) -> Option<Result<RawFrame, FrameError>> {
+        loop {
+            let found = match self.state {
+                Within::Between => {
+                    self.skip_space();
+                    None
+                }
+                Within::Object | Within::SkippedObject => self.scan_object(),
+                Within::Line | Within::SkippedLine => self.scan_line().map(Err),
+            };
+            if found.is_some() {
+                return found;
+            }
+            if self.at == self.buffer.len() {
+                self.give_back();
+                return None;
+            }
+        }
+    }
+}
+
+/// Frames as far as the bytes reach, decoded.
+impl Iterator for FrameReader {
+    type Item = Result<Frame, FrameError>;
+
+    fn next(&mut self) -> Option<Result<Frame, FrameError>> {
+        self.next_raw()
+            .map(|frame| frame.and_then(RawFrame::decode))
+    }
+}
+
+const fn is_space(byte: u8) -> bool {
+    matches!(byte, b' ' | b'\t' | b'\r' | b'\n')
+}

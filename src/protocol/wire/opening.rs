@@ -1,0 +1,124 @@
+//! The first bytes of a connection, and whether they are ours to read or those of another protocol.
+//!
+//! **Invariant:** what opens like HTTP, TLS or BSON is never read as JSON: a web page could otherwise drive the arm by
+//! posting at the port.
+
+/// The verdict on a connection by its first bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Opening {
+    /// Could still become anything: wait for more bytes (at most eight are ever needed).
+    Undecided,
+    /// Ours to read.
+    Json,
+    /// Another protocol: answer one line, close, parse nothing.
+    Foreign(Foreign),
+}
+
+/// Protocols that must never be read as JSON.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Foreign {
+    /// An HTTP request line.
+    Http,
+    /// A TLS hello.
+    Tls,
+    /// BSON, as some C++ rosbridge clients send.
+    Bson,
+}
+
+impl Foreign {
+    /// One line for the status: what was recognised, and what this port speaks.
+    #[must_use]
+    pub const fn explanation(self) -> &'static str {
+        match self {
+            Self::Http => {
+                "this is an HTTP request, and this port speaks rosbridge JSON over plain TCP, one object per line"
+            }
+            Self::Tls => {
+                "this is a TLS hello, and this port speaks rosbridge JSON over plain TCP, one object per line"
+            }
+            Self::Bson => {
+                "this is BSON, and this port speaks rosbridge JSON over plain TCP, one object per line"
+            }
+        }
+    }
+}
+
+/// How HTTP requests open.
+const METHODS: [&[u8]; 10] = [
+    b"GET ",
+    b"HEAD ",
+    b"POST ",
+    b"PUT ",
+    b"DELETE ",
+    b"CONNECT ",
+    b"OPTIONS ",
+    b"TRACE ",
+    b"PATCH ",
+    b"PRI ",
+];
+/// How a TLS record with a hello opens.
+const TLS_HELLO: &[u8] = &[0x16, 0x03];
+/// A BSON document opens with its length in four bytes, little-endian: below 16 MiB one of them is 0.
+const BSON_LENGTH: usize = 4;
+
+/// Judges a connection by all the bytes that it has sent so far.
+///
+/// At the end of the stream what is undecided is to be read as JSON.
+#[must_use]
+pub fn opening(first: &[u8]) -> Opening {
+    if first.starts_with(TLS_HELLO) {
+        return Opening::Foreign(Foreign::Tls);
+    }
+    if first.iter().take(BSON_LENGTH).any(|&byte| byte == 0) {
+        return Opening::Foreign(Foreign::Bson);
+    }
+    if METHODS.iter().any(|method| first.starts_with(method)) {
+        return Opening::Foreign(Foreign::Http);
+    }
+    let method_may_follow = METHODS.iter().any(|method| method.starts_with(first));
+    let nul_may_follow = first.len() < BSON_LENGTH && !holds_a_line(first);
+    if method_may_follow || nul_may_follow {
+        Opening::Undecided
+    } else {
+        Opening::Json
+    }
+}
+
+/// Whether a malformed line is one that every request of a browser has in its head: `start` is how the line begins.
+///
+/// A page may choose its request's method where browsers think that it speaks to its own server, which a hostile name
+/// server makes them think. Then the opening is none of `METHODS`, but the head comes before the body all the same, and
+/// has a line that names the host.
+#[must_use]
+pub fn is_host_line(start: &str) -> bool {
+    let name = start.split(':').next().unwrap_or_default();
+    name.len() < start.len() && name.eq_ignore_ascii_case("host")
+}
+
+/// Whether a line with text in it is complete: such a line is answered, not kept waiting for a fourth byte.
+fn holds_a_line(bytes: &[u8]) -> bool {
+    bytes.trim_ascii_start().contains(&b'\n')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_line_is_one_in_any_case_and_with_any_value() {
+        for line in ["Host: a", "host:a", "HOST:", "Host: a:1"] {
+            assert!(is_host_line(line), "{line}");
+        }
+        for line in [
+            "",
+            "Host",
+            "Hosts: a",
+            "X-Host: a",
+            "host a:1",
+            " Host: a",
+            ":host",
+        ] {
+            assert!(!is_host_line(line), "{line}");
+        }
+    }
+}

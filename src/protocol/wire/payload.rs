@@ -1,0 +1,78 @@
+//! A client's JSON that is passed on or echoed: ids, messages, arguments, answers.
+//!
+//! **Invariant:** it is read once, when it comes. What is written of it is one line of valid JSON, ready to be copied.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use serde_json::value::RawValue;
+
+use super::json;
+
+/// A JSON value as a client sent it. Cheap to clone.
+#[derive(Debug, Clone)]
+pub struct Payload(Arc<Inner>);
+
+#[derive(Debug)]
+struct Inner {
+    raw: Box<RawValue>,
+    /// As it is written, where that is not as it came.
+    line: Option<Box<str>>,
+}
+
+impl Payload {
+    /// The value as it came: numbers that overflow are still there, for whoever has to refuse them by name.
+    #[must_use]
+    pub fn raw(&self) -> &RawValue {
+        &self.0.raw
+    }
+
+    /// The text as it came.
+    #[must_use]
+    pub fn get(&self) -> &str {
+        self.0.raw.get()
+    }
+
+    /// Bytes that it takes, whoever shares them: its text, the line where that is another text, and what keeps them.
+    #[must_use]
+    pub fn allocated(&self) -> usize {
+        let counts = 2 * size_of::<usize>();
+        let line = self.0.line.as_ref().map_or(0, |line| line.len());
+        counts + size_of::<Inner>() + self.get().len() + line
+    }
+
+    /// The text as it is written: [strict](json::strict), on one line.
+    #[must_use]
+    pub fn line(&self) -> &str {
+        self.0.line.as_deref().unwrap_or_else(|| self.get())
+    }
+}
+
+impl From<Box<RawValue>> for Payload {
+    fn from(raw: Box<RawValue>) -> Self {
+        let strict = json::strict(raw.get());
+        // Valid JSON has a carriage return between tokens only. Some readers take one for the end of a line: then what
+        // another client has put between two of them would be a frame to them.
+        let line = match strict {
+            text if text.contains('\r') => Some(text.replace('\r', " ")),
+            Cow::Owned(text) => Some(text),
+            Cow::Borrowed(_) => None,
+        };
+        let line = line.map(String::into_boxed_str);
+        Self(Arc::new(Inner { raw, line }))
+    }
+}
+
+impl From<&RawValue> for Payload {
+    fn from(raw: &RawValue) -> Self {
+        raw.to_owned().into()
+    }
+}
+
+impl PartialEq for Payload {
+    fn eq(&self, other: &Self) -> bool {
+        self.get() == other.get()
+    }
+}
+
+impl Eq for Payload {}

@@ -1,0 +1,94 @@
+//! Client text in our own messages and in the log: shortened, and with control characters escaped.
+//!
+//! **Invariant:** nothing that a client sent is echoed in a message of ours at a length of its own choosing.
+
+use std::fmt::Write as _;
+
+use serde_json::value::RawValue;
+
+use super::json;
+
+/// Characters of client text that a message of ours repeats: enough to recognise it by, one line on a terminal.
+pub(crate) const EXCERPT: usize = 48;
+
+/// At most [`EXCERPT`] characters of `text`, control characters escaped, an ellipsis where something was cut.
+pub(crate) fn excerpt(text: &str) -> String {
+    shortened(text, EXCERPT)
+}
+
+/// At most `limit` characters of `text`, control characters escaped, an ellipsis where something was cut.
+pub(crate) fn shortened(text: &str, limit: usize) -> String {
+    let mut short = String::with_capacity(text.len().min(limit));
+    for (count, character) in text.chars().enumerate() {
+        if count == limit {
+            short.push('…');
+            break;
+        }
+        push_plain(&mut short, character);
+    }
+    short
+}
+
+/// Appends a character, escaped where it does something on a terminal other than to show itself: control characters,
+/// and those that end a line or turn the direction of writing.
+pub(crate) fn push_plain(text: &mut String, character: char) {
+    let acts = matches!(
+        character,
+        '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}'
+    );
+    if acts || character.is_control() {
+        // A `String` takes whatever is written to it.
+        let _ = write!(text, "{}", character.escape_default());
+    } else {
+        text.push(character);
+    }
+}
+
+/// Names a JSON value in words a sentence can end with: the value itself if it is short, else its kind.
+pub(crate) fn found(raw: &RawValue) -> String {
+    match raw.get() {
+        object if object.starts_with('{') => "an object".to_owned(),
+        array if array.starts_with('[') => "an array".to_owned(),
+        // The reader has put these in the place of names that JSON does not have.
+        json::NAN => "NaN".to_owned(),
+        json::INFINITY => "Infinity".to_owned(),
+        negative if negative.strip_prefix('-') == Some(json::INFINITY) => "-Infinity".to_owned(),
+        _ => excerpt(raw.get()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_acts_on_a_terminal_is_escaped_and_what_shows_itself_is_not() {
+        for acting in [
+            '\0', '\n', '\r', '\t', '\u{1b}', '\u{7f}', '\u{85}', '\u{9b}', '\u{61c}', '\u{200e}',
+            '\u{200f}', '\u{2028}', '\u{2029}', '\u{202a}', '\u{202e}', '\u{2066}', '\u{2069}',
+            '\u{feff}',
+        ] {
+            let mut text = String::new();
+            push_plain(&mut text, acting);
+            assert_eq!(text, acting.escape_default().to_string());
+            assert!(text.is_ascii() && text.starts_with('\\'), "{text}");
+        }
+        for plain in [
+            ' ',
+            'a',
+            '~',
+            '\\',
+            '"',
+            '\u{e9}',
+            '\u{2027}',
+            '\u{202f}',
+            '\u{2065}',
+            '\u{206a}',
+            '\u{1f9be}',
+        ] {
+            let mut text = String::new();
+            push_plain(&mut text, plain);
+            assert_eq!(text, plain.to_string());
+        }
+    }
+}

@@ -1,0 +1,230 @@
+//! The largest stable timestep, measured: the arm itself is nudged off its equilibrium and watched.
+//!
+//! Held control runs through [`Simulation`], the live loop; control in every stage through [`ContinuousLoop`], where the
+//! method steps the arm and its law as one system. Stable means that the deviation decays. "Did it overflow?" would be
+//! the wrong question: just past the limit a nonlinear arm chatters between two poses for ever. And decay is judged by
+//! energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose; single joints may well move further off
+//! for a while, as others come back.
+//!
+//! **Invariant:** no prediction enters but the equilibrium and a timestep to start the search from.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N and 0..2N of arrays of these lengths"
+)]
+
+use super::sampled::SampledLoop;
+use crate::math::arm::State;
+use crate::math::dynamics::mass_matrix;
+use crate::math::pid::Setpoint;
+use crate::math::simulation::Simulation;
+use crate::study::continuous::ContinuousLoop;
+use crate::study::control_loop::ControlLoop;
+use crate::study::linear::{equilibrium, gravity_gradient, no_control};
+use crate::study::stability::Sampling;
+
+/// Steps for which a deviation is watched: a mode that is off the unit circle by 0.1 % changes 50-fold meanwhile.
+pub const STEPS: u64 = 4000;
+
+/// The nudge \[rad\]; small, so that what is linear shows, and a billion units of rounding.
+const NUDGE: f64 = 1e-6;
+
+/// A deviation, or a velocity times the timestep, that has made its point \[rad\]: two thousand nudges, and still less than
+/// the chatter past a limit.
+const ESCAPED: f64 = 2e-3;
+
+/// A deviation that has died \[rad\]; a hundred thousand units of rounding, which would otherwise be compared next.
+const DEAD: f64 = 1e-11;
+
+/// Halvings of the search interval; the last one is narrower than 0.005 %.
+const HALVINGS: u32 = 15;
+
+/// Widenings of the search interval before the search is given up.
+const WIDENINGS: u32 = 12;
+
+/// The largest timestep \[s\] at which a deviation of the loop decays, searched around `guess`; `None` if none within
+/// some thousandfold of it divides what decays from what does not.
+#[must_use]
+pub fn measured_limit<const N: usize>(
+    control: &ControlLoop<N>,
+    sampling: Sampling,
+    guess: f64,
+) -> Option<f64> {
+    boundary(guess, |timestep| {
+        decays(&control.with_timestep(timestep), sampling)
+    })
+}
+
+/// As [`measured_limit`] for the control period, with `substeps` steps of the method in each; `delayed`: every effort
+/// acts one period late.
+#[must_use]
+pub fn measured_period<const N: usize>(
+    control: &ControlLoop<N>,
+    guess: f64,
+    substeps: u32,
+    delayed: bool,
+) -> Option<f64> {
+    boundary(guess, |period| {
+        sampled_growth(&control.with_timestep(period), substeps, delayed)
+            .is_some_and(|growth| growth < 1.0)
+    })
+}
+
+/// Whether a small deviation from the equilibrium has less energy at the end of [`STEPS`] steps than soon after their
+/// beginning.
+#[must_use]
+pub fn decays<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> bool {
+    growth(control, sampling).is_some_and(|growth| growth < 1.0)
+}
+
+/// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth: in the first, modes
+/// die out that say nothing about the last to do so. `None` once the deviation has escaped.
+#[must_use]
+pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
+    let rest = equilibrium(control);
+    let start = nudged(&rest.position, control.timestep);
+    let energy = energy_about(control, &rest.position);
+    match sampling {
+        Sampling::Held => {
+            let mut live = primed(control, &rest.integral)?;
+            live.set_state(start);
+            watch(|| live.step().then(|| energy(live.state())).flatten())
+        }
+        Sampling::Continuous => {
+            let mut whole = ContinuousLoop {
+                control: *control,
+                state: start,
+                integral: rest.integral,
+            };
+            watch(|| whole.step().then(|| energy(&whole.state)).flatten())
+        }
+    }
+}
+
+/// As [`growth`], per control period of `substeps` steps, each effort one period late if `delayed`.
+#[must_use]
+pub fn sampled_growth<const N: usize>(
+    control: &ControlLoop<N>,
+    substeps: u32,
+    delayed: bool,
+) -> Option<f64> {
+    let rest = equilibrium(control);
+    let energy = energy_about(control, &rest.position);
+    let start = nudged(&rest.position, control.timestep);
+    let mut sampled = SampledLoop::new(control, substeps, &rest, start);
+    if delayed {
+        sampled = sampled.delayed(&rest);
+    }
+    watch(|| {
+        sampled.advance();
+        energy(&sampled.state)
+    })
+}
+
+/// The energy of a deviation from `rest` \[J\], zero below [`DEAD`]; `None` beyond [`ESCAPED`].
+fn energy_about<const N: usize>(
+    control: &ControlLoop<N>,
+    rest: &[f64; N],
+) -> impl Fn(&State<N>) -> Option<f64> {
+    let mass = mass_matrix(&control.arm, rest);
+    let gravity = gravity_gradient(&control.arm, rest);
+    let (rest, kp, h) = (*rest, control.gains.kp, control.timestep);
+    move |state| {
+        let x: [f64; N] = std::array::from_fn(|i| state.position[i] - rest[i]);
+        let v = &state.velocity;
+        if (0..N).all(|i| x[i].abs() < DEAD && h * v[i].abs() < DEAD) {
+            return Some(0.0);
+        }
+        let mut energy = 0.0;
+        for i in 0..N {
+            energy += 0.5 * kp[i] * x[i] * x[i];
+            for j in 0..N {
+                let kinetic = v[i] * mass[i][j] * v[j];
+                energy += 0.5 * (kinetic + x[i] * gravity[i.max(j)] * x[j]);
+            }
+        }
+        // Past a flip of held control the velocity chatters, and the position hardly moves. NaN has escaped too.
+        (0..N)
+            .all(|i| x[i].abs() <= ESCAPED && h * v[i].abs() <= ESCAPED)
+            .then_some(energy.abs())
+    }
+}
+
+/// The live loop with its integral where the equilibrium needs it. An integral cannot be set; but one step without
+/// gains, at a setpoint that is off by the right amount, leaves just that.
+fn primed<const N: usize>(control: &ControlLoop<N>, integral: &[f64; N]) -> Option<Simulation<N>> {
+    let away = Setpoint::at(integral.map(|integral| integral / control.timestep));
+    let idle = ControlLoop {
+        gains: no_control(),
+        setpoint: away,
+        ..*control
+    };
+    let mut live = idle.simulation(State::rest());
+    live.enable(true);
+    let primed = live.step();
+    live.set_gains(control.gains);
+    live.set_setpoint(control.setpoint);
+    primed.then_some(live)
+}
+
+/// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the velocity.
+pub(super) fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
+    let mut state = State::at_rest(*position);
+    let mut nudge = NUDGE;
+    for i in 0..N {
+        state.position[i] += nudge;
+        state.velocity[i] -= 0.5 * nudge / timestep;
+        nudge *= -0.618;
+    }
+    state
+}
+
+/// The boundary above which `holds` no longer does, by bisection around `guess`.
+pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
+    let (mut below, mut above) = (0.5 * guess, 2.0 * guess);
+    let mut widenings = 0;
+    while !holds(below) {
+        above = below;
+        below *= 0.5;
+        widenings += 1;
+        if widenings > WIDENINGS {
+            return None;
+        }
+    }
+    while holds(above) {
+        below = above;
+        above *= 2.0;
+        widenings += 1;
+        if widenings > WIDENINGS {
+            return None;
+        }
+    }
+    for _ in 0..HALVINGS {
+        let middle = (below * above).sqrt();
+        if holds(middle) {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    Some(below)
+}
+
+/// Largest of the last eighth of [`STEPS`] energies per largest of the second; zero once one is zero, `None` once one is
+/// missing.
+fn watch(mut energy: impl FnMut() -> Option<f64>) -> Option<f64> {
+    let window = STEPS / 8;
+    let (mut early, mut late) = (0.0_f64, 0.0_f64);
+    for step in 0..STEPS {
+        let energy = energy()?;
+        if energy == 0.0 {
+            return Some(0.0);
+        }
+        if step / window == 1 {
+            early = early.max(energy);
+        } else if step >= STEPS - window {
+            late = late.max(energy);
+        }
+    }
+    Some(late / early)
+}

@@ -1,0 +1,26 @@
+//! The measurements of the report: experiments on the arm that the running service has no use for.
+//!
+//! | module | answers |
+//! | --- | --- |
+//! | [`measure`] | the largest stable timestep, measured on the arm itself |
+//! | [`growth`] | growth per control period, measured |
+//! | [`scenarios`] | named stiff and extreme scenes, each with its expected verdict and the observed one |
+//! | [`reference`](mod@reference) | the true motion, with twice the digits and a bound on its own error |
+//! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
+//! | [`conditioning`] | digits lost in the accelerations of arms with uneven masses |
+//! | [`budget`] | truncation, rounding and control hold, apart |
+//! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
+//!
+//! Everything steps through [`crate::math`], the live arm's own code, and is compared with [`crate::study`]'s predictions.
+//!
+//! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
+
+pub mod budget;
+pub mod chaos;
+pub mod conditioning;
+pub mod error;
+pub mod growth;
+pub mod measure;
+pub mod reference;
+mod sampled;
+pub mod scenarios;

@@ -1,0 +1,242 @@
+//! S36 to S39: the methods themselves.
+//!
+//! **Invariant:** whatever a scene compares starts from the same state.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices name the joints of arrays of that length"
+)]
+
+use super::support::{Noise, apart, free, verdict};
+use super::{Scenario, Verdict};
+use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
+use crate::math::integrator::{Method, increment};
+use crate::math::simulation::step_under;
+use crate::study::error_estimate::estimate_step;
+use crate::study::extrapolation::Follower;
+use crate::study::linear::Linear;
+use crate::study::matrix::largest;
+use crate::study::stability::{Sampling, step_matrix};
+
+pub(super) const SCENES: [Scenario; 4] = [
+    Scenario {
+        id: "S36",
+        name: "one joint",
+        parameters: "20 000 random oscillators, all methods",
+        expected: "one step is the step matrix to rounding; stable exactly where the closed forms say so",
+        slow: false,
+        check: one_joint,
+    },
+    Scenario {
+        id: "S37",
+        name: "another method, another timestep",
+        parameters: "3 links swinging; method and timestep change between steps",
+        expected: "position, velocity and time keep their bits at the change; a swing changed halfway keeps its order",
+        slow: false,
+        check: changes,
+    },
+    Scenario {
+        id: "S38",
+        name: "there and back",
+        parameters: "2 links, 1 s forward, velocities turned round, 1 s back; at 8, 4 and 2 ms",
+        expected: "comes back to within an error of the method's order; no method is exactly reversible here",
+        slow: false,
+        check: there_and_back,
+    },
+    Scenario {
+        id: "S39",
+        name: "step doubling",
+        parameters: "3 links, 50 random states, 1 ms, all methods",
+        expected: "estimated per true local error, median 0.98 to 1.03",
+        slow: false,
+        check: step_doubling,
+    },
+];
+
+/// Stable by the closed forms, for `x'' = -ω² x - 2 z ω x'` with `w = (ω h)²`, `d = 2 z ω h`.
+fn closed_form(method: Method, w: f64, d: f64) -> bool {
+    match method {
+        Method::Euler => w < d && w > 2.0 * d - 4.0,
+        Method::Midpoint => {
+            let trace = 2.0 - d + d * d / 2.0 - w;
+            let det = 1.0 - d + d * d / 2.0 - w * d / 2.0 + w * w / 4.0;
+            det < 1.0 && 1.0 + trace + det > 0.0 && 1.0 - trace + det > 0.0
+        }
+        Method::Verlet => d < 2.0 && w < 4.0 - 2.0 * d + d * d,
+        Method::Rk4 => {
+            // |R(s)|² of the two roots s = -d/2 ± sqrt(d²/4 - w).
+            let half = d * d / 4.0 - w;
+            let r = |re: f64, im: f64| {
+                let (mut sum, mut power) = ((1.0, 0.0), (1.0, 0.0));
+                for k in [1.0, 2.0, 3.0, 4.0] {
+                    power = (
+                        (power.0 * re - power.1 * im) / k,
+                        (power.0 * im + power.1 * re) / k,
+                    );
+                    sum = (sum.0 + power.0, sum.1 + power.1);
+                }
+                f64::hypot(sum.0, sum.1)
+            };
+            let root = half.abs().sqrt();
+            if half >= 0.0 {
+                r(-d / 2.0 + root, 0.0) < 1.0 && r(-d / 2.0 - root, 0.0) < 1.0
+            } else {
+                r(-d / 2.0, root) < 1.0
+            }
+        }
+    }
+}
+
+fn one_joint() -> Verdict {
+    let mut noise = Noise::new();
+    let (mut off, mut mismatches, mut close) = (0.0_f64, 0_u32, 0_u32);
+    for _ in 0..20_000 {
+        let (w, d) = (5.0 + 5.0 * noise.next(), 2.5 + 2.5 * noise.next());
+        let linear = Linear::oscillator(w, 0.0, 0.0, d);
+        for method in Method::ALL {
+            let step = step_matrix(&linear, method, Sampling::Continuous, 1.0);
+            let (x, v) = (noise.next(), noise.next());
+            let (dx, dv) = increment(
+                method,
+                |_, x: &[f64; 1], v: &[f64; 1]| [-w * x[0] - d * v[0]],
+                0.0,
+                &[x],
+                &[v],
+                1.0,
+            );
+            // Terms of up to (w + d)² / 2.
+            let size = 1.0 + (w + d) * (w + d);
+            let error =
+                |row: usize, to: f64| (step[(row, 0)] * x + step[(row, 1)] * v - to).abs() / size;
+            off = off.max(error(0, x + dx[0])).max(error(1, v + dv[0]));
+            let radius = step.spectral_radius();
+            if (radius - 1.0).abs() < 1e-9 {
+                close += 1;
+            } else if (radius < 1.0) != closed_form(method, w, d) {
+                mismatches += 1;
+            }
+        }
+    }
+    verdict(
+        off < 2e-15 && mismatches == 0 && close < 10,
+        format!("steps apart by {off:.1e}; {mismatches} of 80 000 verdicts differ"),
+    )
+}
+
+fn swinging() -> State<3> {
+    State {
+        position: [0.3, 0.7, -0.4],
+        velocity: [1.0, -2.0, 0.5],
+    }
+}
+
+fn changes() -> Verdict {
+    let mut simulation = free(Arm::default(), swinging(), Method::Verlet, 0.001);
+    let mut kept = true;
+    for (method, timestep) in [
+        (Method::Rk4, 0.001),
+        (Method::Rk4, 0.0005),
+        (Method::Midpoint, 0.003),
+        (Method::Verlet, 0.001),
+    ] {
+        simulation.advance(100);
+        let before = (*simulation.state(), simulation.time());
+        simulation.set_method(method);
+        simulation.set_timestep(timestep);
+        kept &= before == (*simulation.state(), simulation.time());
+    }
+    // Half a second of Verlet, half of Runge-Kutta 4: the error goes with the square of the timestep.
+    let error = |steps: u64| {
+        let timestep = 0.5 / in_f64(steps);
+        let mut mixed = free(Arm::default(), swinging(), Method::Verlet, timestep);
+        mixed.advance(steps);
+        mixed.set_method(Method::Rk4);
+        mixed.advance(steps);
+        let mut exact = Follower::new(swinging());
+        // Spans of a hundredth of a second, as far as the scheme carries.
+        let followed = (0..100).all(|_| exact.follow(mixed.arm(), &[0.0; 3], 0.01));
+        if followed {
+            apart(mixed.state(), exact.state())
+        } else {
+            f64::NAN
+        }
+    };
+    let slope = (error(500) / error(1000)).log2();
+    verdict(
+        kept && (slope - 2.0).abs() < 0.2,
+        format!(
+            "bits {}; slope of the mixed swing {slope:.2}",
+            if kept { "kept" } else { "lost" }
+        ),
+    )
+}
+
+fn there_and_back() -> Verdict {
+    let mut holds = true;
+    let mut observed = vec![];
+    for method in Method::ALL {
+        let missed = [125, 250, 500].map(|steps| {
+            let start = State {
+                position: [0.5, -0.5],
+                velocity: [0.2, 0.4],
+            };
+            let mut simulation = free(Arm::default(), start, method, 1.0 / in_f64(steps));
+            for _ in 0..2 {
+                simulation.advance(steps);
+                let mut turned = *simulation.state();
+                turned.velocity = turned.velocity.map(|v| -v);
+                simulation.set_state(turned);
+            }
+            apart(simulation.state(), &start)
+        });
+        let slope = (missed[1] / missed[2]).log2();
+        // Errors there and back cancel in part: the order at least, up to one more.
+        let order = f64::from(method.order());
+        holds &= slope > order - 0.3 && slope < order + 1.3 && missed[2] > 1e-13;
+        observed.push(format!("{method} {:.1e} (slope {slope:.1})", missed[2]));
+    }
+    verdict(holds, format!("missed at 2 ms by {}", observed.join(", ")))
+}
+
+fn step_doubling() -> Verdict {
+    let h = 0.001;
+    let arm = Arm::<3>::default();
+    let mut holds = true;
+    let mut observed = vec![];
+    for method in Method::ALL {
+        let mut noise = Noise::new();
+        let mut ratios: Vec<f64> = (0..50)
+            .map(|_| {
+                let state = State {
+                    position: noise.array(3.0),
+                    velocity: noise.array(3.0),
+                };
+                let effort = noise.array(10.0);
+                let estimate = estimate_step(&arm, &state, &effort, method, h);
+                let true_error = local_error(&arm, &state, &effort, method, h);
+                estimate.map_or(f64::NAN, |estimate| estimate.local_error) / true_error
+            })
+            .collect();
+        ratios.sort_by(f64::total_cmp);
+        let median = ratios[ratios.len() / 2];
+        holds &= (0.98..=1.03).contains(&median);
+        observed.push(format!(
+            "{method} {median:.4} ({:.3} to {:.3})",
+            ratios[0],
+            ratios[ratios.len() - 1]
+        ));
+    }
+    verdict(holds, observed.join(", "))
+}
+
+/// The error of a step, against the arm followed to rounding \[rad\].
+fn local_error(arm: &Arm<3>, state: &State<3>, effort: &[f64; 3], method: Method, h: f64) -> f64 {
+    let end = state.plus(&step_under(arm, method, state, effort, h));
+    let mut exact = Follower::new(*state);
+    if !exact.follow(arm, effort, h) {
+        return f64::NAN;
+    }
+    let exact = exact.state().position;
+    largest((0..3).map(|i| (end.position[i] - exact[i]).abs()))
+}

@@ -1,0 +1,116 @@
+//! A control loop whose law acts at every instant: the ideal that holding the effort for a step falls short of.
+//!
+//! **Invariant:** a step whose result is not finite changes nothing.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N and 0..2N of arrays of these lengths"
+)]
+
+use super::control_loop::ControlLoop;
+use crate::math::arm::State;
+use crate::math::dynamics::forward_dynamics;
+use crate::math::integrator::increment;
+use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+
+/// An arm whose control law is evaluated in every stage, integral and all: the method steps `(q, s)`, where the integral
+/// `s` of the position error has the velocity `q* - q` and the acceleration `-q̇`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContinuousLoop<const N: usize> {
+    /// Arm, gains, setpoint, method and timestep.
+    pub control: ControlLoop<N>,
+    /// Joint positions and velocities.
+    pub state: State<N>,
+    /// Integral of the position error \[rad s\].
+    pub integral: [f64; N],
+}
+
+impl<const N: usize> ContinuousLoop<N> {
+    /// One step; `false`, and nothing changes, if its result would not be finite. Integrals are stepped for up
+    /// to three joints; more are not, which is `false` too.
+    pub fn step(&mut self) -> bool {
+        let integrates = self.control.integrating().contains(&true);
+        match N {
+            _ if !integrates => self.step_arm(),
+            1 => self.step_all::<2>(),
+            2 => self.step_all::<4>(),
+            3 => self.step_all::<6>(),
+            _ => false,
+        }
+    }
+
+    fn acceleration(&self, q: &[f64; N], v: &[f64; N], integral: &[f64; N]) -> [f64; N] {
+        let Gains { kp, ki, kd } = &self.control.gains;
+        let Setpoint { position, velocity } = &self.control.setpoint;
+        let effort = std::array::from_fn(|i| {
+            kp[i] * (position[i] - q[i])
+                + ki[i] * integral[i].clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+                + kd[i] * (velocity[i] - v[i])
+        });
+        forward_dynamics(&self.control.arm, q, v, &effort)
+    }
+
+    fn step_arm(&mut self) -> bool {
+        let State { position, velocity } = self.state;
+        let (dq, dv) = increment(
+            self.control.method,
+            |_, q, v| self.acceleration(q, v, &[0.0; N]),
+            0.0,
+            &position,
+            &velocity,
+            self.control.timestep,
+        );
+        self.take(&dq, &dv, &[0.0; N])
+    }
+
+    /// `M` is twice `N`, which the language can't say yet.
+    fn step_all<const M: usize>(&mut self) -> bool {
+        debug_assert_eq!(M, 2 * N, "a position and an integral for every joint");
+        let State { position, velocity } = self.state;
+        let joint = |i: usize| i % N;
+        let whole: [f64; M] = std::array::from_fn(|i| {
+            if i < N {
+                position[i]
+            } else {
+                self.integral[joint(i)]
+            }
+        });
+        let rates: [f64; M] = std::array::from_fn(|i| {
+            if i < N {
+                velocity[i]
+            } else {
+                self.control.setpoint.position[joint(i)] - position[joint(i)]
+            }
+        });
+        let (moved, changed) = increment(
+            self.control.method,
+            |_, x, rate| {
+                let q = std::array::from_fn(|i| x[i]);
+                let v: [f64; N] = std::array::from_fn(|i| rate[i]);
+                let a = self.acceleration(&q, &v, &std::array::from_fn(|i| x[N + i]));
+                std::array::from_fn(|i| if i < N { a[i] } else { -v[joint(i)] })
+            },
+            0.0,
+            &whole,
+            &rates,
+            self.control.timestep,
+        );
+        self.take(
+            &std::array::from_fn(|i| moved[i]),
+            &std::array::from_fn(|i| changed[i]),
+            &std::array::from_fn(|i| moved[N + i]),
+        )
+    }
+
+    fn take(&mut self, dq: &[f64; N], dv: &[f64; N], ds: &[f64; N]) -> bool {
+        let next = self.state.plus(&(*dq, *dv));
+        let finite = next.is_finite();
+        if finite {
+            self.state = next;
+            self.integral = std::array::from_fn(|i| {
+                (self.integral[i] + ds[i]).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
+            });
+        }
+        finite
+    }
+}

@@ -1,0 +1,131 @@
+//! A control loop: the arm, its gains and setpoint, and how it is stepped.
+//!
+//! Predictions, offline runs and measurements all take this one type, and step it through
+//! [`ControlLoop::simulation`], the live arm's own stepper.
+//!
+//! **Invariant:** gains that are all zero and a controller that is off are the same loop.
+
+use crate::math::arm::{Arm, State};
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::{DEFAULT_TIMESTEP, Simulation};
+
+/// An arm under its control law, and how it is stepped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlLoop<const N: usize> {
+    /// The arm.
+    pub arm: Arm<N>,
+    /// Gains of the controller; all zero: the arm is left to itself.
+    pub gains: Gains<N>,
+    /// Where the controller holds it.
+    pub setpoint: Setpoint<N>,
+    /// The method that takes the steps.
+    pub method: Method,
+    /// Length of a step, and of a control period \[s\].
+    pub timestep: f64,
+}
+
+impl<const N: usize> ControlLoop<N> {
+    /// The loop, stepped by Runge-Kutta 4 at [`DEFAULT_TIMESTEP`].
+    #[must_use]
+    pub const fn new(arm: Arm<N>, gains: Gains<N>, setpoint: Setpoint<N>) -> Self {
+        Self {
+            arm,
+            gains,
+            setpoint,
+            method: Method::Rk4,
+            timestep: DEFAULT_TIMESTEP,
+        }
+    }
+
+    /// An arm that is left to itself.
+    #[must_use]
+    pub fn free(arm: Arm<N>) -> Self {
+        Self::new(arm, no_control(), Setpoint::default())
+    }
+
+    /// The loop of a simulation, with the gains as they are set, whether the controller is on or off.
+    #[must_use]
+    pub fn of(simulation: &Simulation<N>) -> Self {
+        let pid = simulation.pid();
+        Self {
+            arm: *simulation.arm(),
+            gains: *pid.gains(),
+            setpoint: *pid.setpoint(),
+            method: simulation.method(),
+            timestep: simulation.timestep(),
+        }
+    }
+
+    /// The loop that the next step of a simulation obeys.
+    #[must_use]
+    pub fn in_force(simulation: &Simulation<N>) -> Self {
+        let set = Self::of(simulation);
+        if simulation.pid().is_enabled() {
+            set
+        } else {
+            Self {
+                gains: no_control(),
+                setpoint: Setpoint::default(),
+                ..set
+            }
+        }
+    }
+
+    /// The same loop with another method.
+    #[must_use]
+    pub const fn with_method(self, method: Method) -> Self {
+        Self { method, ..self }
+    }
+
+    /// The same loop with another timestep \[s\].
+    #[must_use]
+    pub const fn with_timestep(self, timestep: f64) -> Self {
+        Self { timestep, ..self }
+    }
+
+    /// Whether the gains are all zero.
+    #[must_use]
+    pub fn is_free(&self) -> bool {
+        is_free(&self.gains)
+    }
+
+    /// The joints that have an integral gain.
+    #[must_use]
+    pub fn integrating(&self) -> [bool; N] {
+        self.gains.ki.map(|ki| ki > 0.0)
+    }
+
+    /// The live loop in `start`, with its integral at zero.
+    #[must_use]
+    pub fn simulation(&self, start: State<N>) -> Simulation<N> {
+        let mut simulation = Simulation::new(self.arm, self.gains);
+        simulation.set_method(self.method);
+        simulation.set_timestep(self.timestep);
+        simulation.set_state(start);
+        simulation.set_setpoint(self.setpoint);
+        simulation.enable(!self.is_free());
+        simulation
+    }
+}
+
+/// Gains that are all zero: an arm left to itself.
+#[must_use]
+pub const fn no_control<const N: usize>() -> Gains<N> {
+    Gains {
+        kp: [0.0; N],
+        ki: [0.0; N],
+        kd: [0.0; N],
+    }
+}
+
+/// Whether the gains are all zero, so that on or off is the same.
+#[must_use]
+#[allow(
+    clippy::float_cmp,
+    reason = "a gain that is exactly zero is a gain that is not there"
+)]
+pub fn is_free<const N: usize>(gains: &Gains<N>) -> bool {
+    let Gains { kp, ki, kd } = gains;
+    kp.iter().chain(ki).chain(kd).all(|&gain| gain == 0.0)
+}

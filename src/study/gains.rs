@@ -1,0 +1,368 @@
+//! Gains for an arm and a timestep: stable in every pose with a margin, and settled in time.
+//!
+//! The default gains are scaled to the arm. A joint's gains go with the inertia that it moves, and with the pace `σ` of
+//! the loop, for which time runs `σ` times as fast: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The inertia of a joint is that
+//! of all links beyond it, or, where a heavy outer link turns a light inner one along, what it feels while the others are
+//! free; means of the two are tried in turn (`SHAPES`).
+//!
+//! A pace is taken if the smallest stable timestep over all poses leaves the margin, and if the arm itself, stepped as
+//! the live arm is, settles in time in every one of [`MOVES`] moves. The slowest pace that does is the answer.
+//!
+//! **Invariant:** the work is bounded, and gains that are answered have been tried.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N of arrays that have N elements"
+)]
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use super::control_loop::ControlLoop;
+use super::matrix::largest;
+use super::stability::LimitSearch;
+use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
+use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
+use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::math::simulation::Simulation;
+
+/// How near each joint has to come, and stay, to be settled \[rad\].
+pub const SETTLED: f64 = 0.02;
+
+/// Moves that are tried: from rest in the starting pose, and from swings, to setpoints within ±2π.
+pub const MOVES: u32 = 10;
+
+/// Most steps of one move.
+pub const MAX_STEPS: f64 = 1e6;
+
+/// How long a move is watched, in settling times: an arm that has settled must stay.
+const WATCHED: f64 = 1.5;
+
+/// Weights of the inertia that a joint feels while the others are free, beside that of all links beyond it: for springs
+/// and integrals, and for damping.
+const SHAPES: [(f64, f64); 6] = [
+    (0.0, 0.0),
+    (0.5, 0.5),
+    (0.25, 0.5),
+    (0.5, 0.75),
+    (0.0, 0.5),
+    (1.0, 1.0),
+];
+
+/// A pace that fails is raised by this factor.
+const FASTER: f64 = 1.25;
+
+/// First paces of a shape at which springs may be too soft for the margin.
+const SOFT_PACES: u32 = 4;
+
+/// Paces tried with one shape.
+const MAX_PACES: u32 = 24;
+
+/// The search begins with springs so many times stiffer than what gravity takes from them.
+const ABOVE_GRAVITY: f64 = 2.0;
+
+/// How long the default arms take to settle with the default gains, with some reserve \[s\].
+const DEFAULT_SETTLING: f64 = 3.0;
+
+/// Steps of a move between two returns to the caller.
+const STEPS_PER_PIECE: u64 = 1000;
+
+/// The demands on gains.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Wish {
+    /// Time in which every move is to settle \[s\].
+    pub settling_time: f64,
+    /// How many timesteps the smallest stable timestep over all poses is to be.
+    pub margin: f64,
+}
+
+/// Gains that do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SuggestedGains<const N: usize> {
+    /// The gains.
+    pub gains: Gains<N>,
+    /// The smallest stable timestep over all poses \[s\]; `None` where nothing limits.
+    pub limit: Option<f64>,
+    /// Whether that is proven to 1 %.
+    pub certified: bool,
+    /// How long the slowest of the moves took to settle \[s\].
+    pub settled_after: f64,
+}
+
+/// Why there are no gains.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum GainsError {
+    /// More steps than [`MAX_STEPS`].
+    #[error("settling_time / timestep must be at most {MAX_STEPS:e} steps, got {steps:e}")]
+    TooManySteps {
+        /// The given number of steps.
+        steps: f64,
+    },
+    /// Slow enough for the timestep, no loop settles in time; fast enough to settle, none has the margin.
+    #[error(
+        "no gains found that settle within {settling_time} s and leave a margin of {margin} at the timestep {timestep} s; \
+         ask for more time or set a shorter timestep"
+    )]
+    NotFound {
+        /// The time that was asked for \[s\].
+        settling_time: f64,
+        /// The margin that was asked for.
+        margin: f64,
+        /// The loop's timestep \[s\].
+        timestep: f64,
+    },
+}
+
+/// A search for gains, to be paused: no piece takes longer than a millisecond or so of one core (optimised build).
+#[derive(Debug, Clone)]
+pub struct GainsSearch<const N: usize> {
+    /// Arm, method and timestep; its gains are those that are being tried.
+    control: ControlLoop<N>,
+    wish: Wish,
+    shape: usize,
+    pace: f64,
+    paces: u32,
+    stage: Stage<N>,
+}
+
+#[derive(Debug, Clone)]
+enum Stage<const N: usize> {
+    Limiting(Box<LimitSearch<N>>),
+    Moving(Box<TestMove<N>>),
+    Done(Result<SuggestedGains<N>, GainsError>),
+}
+
+/// Gains that are stable with the margin, on their moves.
+#[derive(Debug, Clone)]
+struct TestMove<const N: usize> {
+    limit: Option<f64>,
+    certified: bool,
+    index: u32,
+    run: Simulation<N>,
+    /// When a joint was last seen off the setpoint \[s\], in this move and in all.
+    off_at: f64,
+    slowest: f64,
+}
+
+impl<const N: usize> GainsSearch<N> {
+    /// The most memory that a search takes, in bytes.
+    pub const MOST_BYTES: usize = size_of::<Self>() + LimitSearch::<N>::MOST_BYTES;
+
+    /// A search for the arm, method and timestep of `control`; its gains and setpoint do not matter.
+    ///
+    /// # Errors
+    /// A settling time of too many steps.
+    pub fn new(control: &ControlLoop<N>, wish: Wish) -> Result<Self, GainsError> {
+        let steps = wish.settling_time / control.timestep;
+        if steps > MAX_STEPS {
+            return Err(GainsError::TooManySteps { steps });
+        }
+        let mut search = Self {
+            control: *control,
+            wish,
+            shape: 0,
+            pace: 1.0,
+            paces: 0,
+            stage: Stage::Done(Err(wish.not_found(control.timestep))),
+        };
+        search.control.setpoint = Setpoint::default();
+        search.begin_shape(0);
+        Ok(search)
+    }
+
+    /// Goes on by one piece; the answer, once it is found.
+    pub fn advance(&mut self) -> Option<Result<SuggestedGains<N>, GainsError>> {
+        match &mut self.stage {
+            Stage::Done(answer) => return Some(*answer),
+            Stage::Limiting(search) => {
+                if let Some(limits) = search.advance() {
+                    self.judge(limits.trusted(), limits.certified);
+                }
+            }
+            Stage::Moving(trial) => match trial.advance(&self.control, self.wish.settling_time) {
+                None => {}
+                Some(None) => self.go_faster(),
+                Some(Some(settled_after)) => {
+                    self.stage = Stage::Done(Ok(SuggestedGains {
+                        gains: self.control.gains,
+                        limit: trial.limit,
+                        certified: trial.certified,
+                        settled_after,
+                    }));
+                }
+            },
+        }
+        None
+    }
+
+    /// Goes on to the moves if the limit leaves the margin. Where it does not, the loop is too fast, or its springs hardly
+    /// hold the load: some faster paces tell.
+    fn judge(&mut self, limit: Option<f64>, certified: bool) {
+        let least = self.wish.margin * self.control.timestep;
+        match limit {
+            Some(0.0) => self.go_faster(),
+            Some(limit) if limit < least && self.paces < SOFT_PACES => self.go_faster(),
+            Some(limit) if limit < least => self.begin_shape(self.shape + 1),
+            limit => {
+                let trial = TestMove {
+                    limit,
+                    certified,
+                    index: 0,
+                    run: start_of_move(&self.control, 0),
+                    off_at: 0.0,
+                    slowest: 0.0,
+                };
+                self.stage = Stage::Moving(Box::new(trial));
+            }
+        }
+    }
+
+    fn go_faster(&mut self) {
+        self.pace *= FASTER;
+        self.paces += 1;
+        if self.paces < MAX_PACES {
+            self.try_pace();
+        } else {
+            self.begin_shape(self.shape + 1);
+        }
+    }
+
+    fn begin_shape(&mut self, shape: usize) {
+        self.shape = shape;
+        self.paces = 0;
+        if shape < SHAPES.len() {
+            self.pace = self.slowest_pace();
+            self.try_pace();
+        } else {
+            self.stage = Stage::Done(Err(self.wish.not_found(self.control.timestep)));
+        }
+    }
+
+    fn try_pace(&mut self) {
+        self.control.gains = self.gains(self.pace);
+        self.stage = Stage::Limiting(Box::new(LimitSearch::new(&self.control)));
+    }
+
+    /// The default gains, scaled to the arm's inertia and to a pace.
+    fn gains(&self, pace: f64) -> Gains<N> {
+        let Gains { kp, ki, kd } = template::<N>();
+        let (springs, damping) = SHAPES.get(self.shape).copied().unwrap_or_default();
+        let scaled = |gains: [f64; N], weight: f64, power: i32| {
+            let here = inertia(&self.control.arm, weight);
+            let there = inertia(&Arm::<N>::default(), weight);
+            std::array::from_fn(|i| gains[i] * here[i] / there[i] * pace.powi(power))
+        };
+        Gains {
+            kp: scaled(kp, springs, 2),
+            ki: scaled(ki, springs, 3),
+            kd: scaled(kd, damping, 1),
+        }
+    }
+
+    /// The pace that settles in time if the arm is like the default one, or, if that is more, at which springs hold the
+    /// load and integrals carry it.
+    fn slowest_pace(&self) -> f64 {
+        let Gains { kp, ki, .. } = self.gains(1.0);
+        let load = gravity_load(&self.control.arm, &[0.0; N]);
+        let carries = (0..N).map(|i| {
+            let springs = (ABOVE_GRAVITY * load[i].abs() / kp[i]).sqrt();
+            let integrals = (2.0 * load[i].abs() / (INTEGRAL_LIMIT * ki[i])).cbrt();
+            springs.max(integrals)
+        });
+        largest(carries).max(DEFAULT_SETTLING / self.wish.settling_time)
+    }
+}
+
+impl Wish {
+    fn not_found(self, timestep: f64) -> GainsError {
+        GainsError::NotFound {
+            settling_time: self.settling_time,
+            margin: self.margin,
+            timestep,
+        }
+    }
+}
+
+impl<const N: usize> TestMove<N> {
+    /// Goes on with the moves: once all have settled in time the slowest time \[s\], or none as soon as one has not.
+    fn advance(&mut self, control: &ControlLoop<N>, settling_time: f64) -> Option<Option<f64>> {
+        for _ in 0..STEPS_PER_PIECE {
+            let moving = self.run.step();
+            let setpoint = self.run.pid().setpoint().position;
+            let position = &self.run.state().position;
+            if (0..N).any(|i| (position[i] - setpoint[i]).abs() > SETTLED) {
+                self.off_at = self.run.time();
+            }
+            if !moving || self.off_at > settling_time {
+                return Some(None);
+            }
+            if self.run.time() >= WATCHED * settling_time {
+                self.slowest = self.slowest.max(self.off_at);
+                self.index += 1;
+                if self.index == MOVES {
+                    return Some(Some(self.slowest));
+                }
+                self.off_at = 0.0;
+                self.run = start_of_move(control, self.index);
+            }
+        }
+        None
+    }
+}
+
+/// A move about to begin: every other one out of a swing as fast as a fall makes it.
+fn start_of_move<const N: usize>(control: &ControlLoop<N>, index: u32) -> Simulation<N> {
+    // Additive recurrences of irrational steps: evenly spread over all setpoints within ±2π, and each time the same.
+    const STEPS: [f64; 3] = [0.754_877_666_2, 0.569_840_290_9, 0.430_159_709_1];
+    let part = |i: usize| (0.5 + in_f64(u64::from(index)) * STEPS[i % STEPS.len()]).fract();
+    let position = match index {
+        0 => std::array::from_fn(|i| if i == 0 { FRAC_PI_2 } else { 0.0 }),
+        1 => [TAU; N],
+        _ => std::array::from_fn(|i| TAU * (2.0 * part(i) - 1.0)),
+    };
+    let mut start = State::rest();
+    if index % 2 == 1 {
+        let reach: f64 = control.arm.lengths().iter().sum();
+        let falling = (2.0 * control.arm.gravity() / reach).sqrt();
+        start = State {
+            position: std::array::from_fn(|i| PI * (2.0 * part(i + 1) - 1.0)),
+            velocity: std::array::from_fn(|i| 2.0 * falling * (2.0 * part(i + 2) - 1.0)),
+        };
+    }
+    ControlLoop {
+        setpoint: Setpoint::at(position),
+        ..*control
+    }
+    .simulation(start)
+}
+
+/// The default gains of an arm with `N` links.
+fn template<const N: usize>() -> Gains<N> {
+    let (two, three) = (Gains::<2>::default(), Gains::<3>::default());
+    let of = |two: [f64; 2], three: [f64; 3]| {
+        std::array::from_fn(|i| if N == 2 { two[i % 2] } else { three[i % 3] })
+    };
+    Gains {
+        kp: of(two.kp, three.kp),
+        ki: of(two.ki, three.ki),
+        kd: of(two.kd, three.kd),
+    }
+}
+
+/// The inertia that each joint moves \[kg m²\]: with all joints beyond it stretched and the others held, and, by its
+/// weight as an exponent, the least that it feels in any pose while the others are free.
+fn inertia<const N: usize>(arm: &Arm<N>, weight: f64) -> [f64; N] {
+    let mass = mass_matrix(arm, &[0.0; N]);
+    let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
+    let free = |i: usize| {
+        let unit = std::array::from_fn(|j| f64::from(u8::from(i == j)));
+        let quickest = (0..=4).flat_map(|one| (0..=4).map(move |other| (one, other)));
+        let accelerations = quickest.map(|(one, other)| {
+            let turned = [0.0, f64::from(one) * PI / 4.0, f64::from(other) * FRAC_PI_2];
+            let pose = std::array::from_fn(|j| turned[j % turned.len()]);
+            forward_dynamics(&weightless, &pose, &[0.0; N], &unit)[i]
+        });
+        1.0 / largest(accelerations)
+    };
+    std::array::from_fn(|i| mass[i.min(N - 1)][i].powf(1.0 - weight) * free(i).powf(weight))
+}

@@ -1,0 +1,246 @@
+//! Small dense matrices: what the step matrices of the stability predictions need, sizes up to some ten.
+//!
+//! Uses nothing but floating point.
+//!
+//! **Invariant:** no input panics or loops for ever; what can't be computed comes out as NaN, which no comparison
+//! takes for stable.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..n of an n×n matrix, as they do in the formulas"
+)]
+
+mod complex;
+mod eigenvalues;
+
+pub use complex::Complex;
+
+use std::ops::{Index, IndexMut};
+
+/// A real square matrix, indexed by `(row, column)`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Matrix {
+    n: usize,
+    /// Row by row.
+    entries: Vec<f64>,
+}
+
+impl Index<(usize, usize)> for Matrix {
+    type Output = f64;
+    fn index(&self, (row, column): (usize, usize)) -> &f64 {
+        &self.entries[row * self.n + column]
+    }
+}
+
+impl IndexMut<(usize, usize)> for Matrix {
+    fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut f64 {
+        &mut self.entries[row * self.n + column]
+    }
+}
+
+impl Matrix {
+    /// The n×n matrix of zeros.
+    #[must_use]
+    pub fn zeros(n: usize) -> Self {
+        Self {
+            n,
+            entries: vec![0.0; n * n],
+        }
+    }
+
+    /// The n×n matrix whose entry at `(row, column)` is what `entry` says.
+    #[must_use]
+    pub fn from_fn(n: usize, mut entry: impl FnMut(usize, usize) -> f64) -> Self {
+        let mut matrix = Self::zeros(n);
+        for row in 0..n {
+            for column in 0..n {
+                matrix[(row, column)] = entry(row, column);
+            }
+        }
+        matrix
+    }
+
+    /// Number of rows and of columns.
+    #[must_use]
+    pub fn size(&self) -> usize {
+        self.n
+    }
+
+    /// `self · other`; both have the same size.
+    #[must_use]
+    pub fn product(&self, other: &Self) -> Self {
+        debug_assert_eq!(self.n, other.n, "a product needs matrices of one size");
+        let mut product = Self::zeros(self.n);
+        for row in 0..self.n {
+            for inner in 0..self.n {
+                let factor = self[(row, inner)];
+                if factor != 0.0 {
+                    for column in 0..self.n {
+                        product[(row, column)] += factor * other[(inner, column)];
+                    }
+                }
+            }
+        }
+        product
+    }
+
+    /// `self + factor · other`; both have the same size.
+    #[must_use]
+    pub fn plus(mut self, factor: f64, other: &Self) -> Self {
+        debug_assert_eq!(self.n, other.n, "a sum needs matrices of one size");
+        for (entry, other) in self.entries.iter_mut().zip(&other.entries) {
+            *entry += factor * other;
+        }
+        self
+    }
+
+    /// `I + factor · self`.
+    #[must_use]
+    pub fn shifted_identity(mut self, factor: f64) -> Self {
+        for entry in &mut self.entries {
+            *entry *= factor;
+        }
+        for i in 0..self.n {
+            self[(i, i)] += 1.0;
+        }
+        self
+    }
+
+    /// The solution `x` of `self · x = b`, by elimination with partial pivoting; `None` if the matrix is singular or `b` has
+    /// not n entries.
+    #[must_use]
+    pub fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
+        let n = self.n;
+        if b.len() != n {
+            return None;
+        }
+        let (mut a, mut x) = (self.clone(), b.to_vec());
+        for k in 0..n {
+            let pivot = (k..n).max_by(|&i, &j| a[(i, k)].abs().total_cmp(&a[(j, k)].abs()))?;
+            if a[(pivot, k)] == 0.0 || !a[(pivot, k)].is_finite() {
+                return None;
+            }
+            for column in 0..n {
+                a.entries.swap(k * n + column, pivot * n + column);
+            }
+            x.swap(k, pivot);
+            for row in k + 1..n {
+                let factor = a[(row, k)] / a[(k, k)];
+                for column in k..n {
+                    a[(row, column)] -= factor * a[(k, column)];
+                }
+                x[row] -= factor * x[k];
+            }
+        }
+        for row in (0..n).rev() {
+            let known: f64 = (row + 1..n).map(|j| a[(row, j)] * x[j]).sum();
+            x[row] = (x[row] - known) / a[(row, row)];
+        }
+        x.iter().all(|x| x.is_finite()).then_some(x)
+    }
+
+    /// Largest modulus of an eigenvalue; NaN where [`Matrix::eigenvalues`] has one.
+    #[must_use]
+    pub fn spectral_radius(&self) -> f64 {
+        largest(self.eigenvalues().into_iter().map(Complex::modulus))
+    }
+}
+
+/// The largest of `values`; NaN if one of them is.
+#[must_use]
+pub fn largest(values: impl Iterator<Item = f64>) -> f64 {
+    values.fold(0.0, |max, value| {
+        if value > max || value.is_nan() {
+            value
+        } else {
+            max
+        }
+    })
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test that panics has failed"
+)]
+mod tests {
+    use super::*;
+
+    fn sorted(matrix: &Matrix) -> Vec<(f64, f64)> {
+        let mut values: Vec<_> = matrix
+            .eigenvalues()
+            .iter()
+            .map(|value| (value.re, value.im))
+            .collect();
+        values.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        values
+    }
+
+    /// A companion matrix has the roots of its polynomial for eigenvalues, here those of
+    /// `(z - 1)(z + 2)(z² + z + 1)(z - 0.5) = z⁵ + 1.5 z⁴ - z³ - z² - 1.5 z + 1`.
+    #[test]
+    fn a_companion_matrix_has_the_roots_of_its_polynomial() {
+        let coefficients = [1.0, -1.5, -1.0, -1.0, 1.5];
+        let matrix = Matrix::from_fn(5, |row, column| {
+            if column == 4 {
+                -coefficients[row]
+            } else {
+                f64::from(u8::from(row == column + 1))
+            }
+        });
+        let half_root_3 = 0.75_f64.sqrt();
+        let expected = [
+            (-2.0, 0.0),
+            (-0.5, -half_root_3),
+            (-0.5, half_root_3),
+            (0.5, 0.0),
+            (1.0, 0.0),
+        ];
+        // Simple, well separated roots: some ten units of rounding.
+        for (found, expected) in sorted(&matrix).iter().zip(expected) {
+            assert!((found.0 - expected.0).abs() < 1e-14, "{found:?}");
+            assert!((found.1 - expected.1).abs() < 1e-14, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn widely_scaled_states_keep_their_slow_eigenvalues() {
+        // A fast pole at -1e9 and a slow one at -1e-3, states scaled apart by 1e12.
+        let scale = 1e12;
+        let matrix = Matrix::from_fn(2, |row, column| match (row, column) {
+            (0, 0) => -1e-3,
+            (0, 1) => scale,
+            (1, 1) => -1e9,
+            _ => 0.0,
+        });
+        let values = sorted(&matrix);
+        assert!((values[0].0 / -1e9 - 1.0).abs() < 1e-14);
+        assert!((values[1].0 / -1e-3 - 1.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_nilpotent_matrix_has_zeros_for_eigenvalues() {
+        let matrix = Matrix::from_fn(6, |row, column| f64::from(u8::from(column == row + 3)));
+        assert!(matrix.spectral_radius() == 0.0);
+    }
+
+    #[test]
+    fn what_is_not_finite_comes_out_as_nan() {
+        let matrix = Matrix::from_fn(3, |row, _| if row == 1 { f64::NAN } else { 1.0 });
+        assert!(matrix.spectral_radius().is_nan());
+    }
+
+    #[test]
+    fn a_solution_satisfies_its_equations() {
+        let matrix = Matrix::from_fn(3, |row, column| {
+            [[0.0, 2.0, 1.0], [1.0, -1.0, 3.0], [4.0, 0.5, -2.0]][row][column]
+        });
+        // Of x = (1, -2, 3): exact in a few units of rounding.
+        let x = matrix.solve(&[-1.0, 12.0, -3.0]).unwrap();
+        for (x, expected) in x.iter().zip([1.0, -2.0, 3.0]) {
+            assert!((x - expected).abs() < 1e-14);
+        }
+        assert!(Matrix::zeros(2).solve(&[1.0, 1.0]).is_none());
+    }
+}

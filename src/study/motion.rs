@@ -1,0 +1,127 @@
+//! The largest timestep that a motion bears: what linearisation about a pose at rest knows nothing of.
+//!
+//! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
+//! until numbers end. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
+//! fastest link. [`Motion::turn_per_step`] is what every method was seen to carry.
+//!
+//! | motion | speed Ω assumed |
+//! | --- | --- |
+//! | of an arm without springs | all of its energy in one link: `Ω² = 2 (E - U_min) max (M⁻¹)_ii`, angles of links, arm stretched |
+//! | to a setpoint | the joints' own peaks and the present speed: `Σ kp e / (√(kp I) + kd)` and `max φ̇`, or the former if that is less |
+//!
+//! `(M⁻¹)_ii` says how easily link i is turned while the others are free, `I` is the inertia that a joint then moves.
+//! The peak of one joint that is let go at rest is `e √(kp/I)` without damping and `kp e / kd` with much of it; in
+//! between the formula is off by a tenth at most. What integrals and gravity add to a peak is left out.
+//!
+//! Seen on 2,100 random arms of 2 and 3 links, spun or falling for 4 s: two of a hundred were lost a little before
+//! these angles, and half of them bore two and a half times as much. On moves of up to 25 rad a joint with gains of all
+//! dampings the speed assumed was 0.5 to 2.9 times the true one.
+//!
+//! **Invariant:** pure and cheap, some 3 µs: it is asked for at every tick.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N of arrays that have N elements"
+)]
+
+use std::f64::consts::FRAC_PI_2;
+use std::ops::RangeInclusive;
+
+use super::control_loop::ControlLoop;
+use crate::math::arm::{Arm, State};
+use crate::math::dynamics::{energy, forward_dynamics, potential_energy};
+use crate::math::integrator::Method;
+
+/// A speed, and the timestep that it allows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Motion {
+    /// Speed of the fastest link that is assumed \[rad/s\]; zero where nothing moves.
+    pub speed: f64,
+    /// The largest timestep \[s\] at which the method carries it; infinite where nothing moves.
+    pub timestep: f64,
+}
+
+impl Motion {
+    /// How far the fastest link may turn in a step \[rad\].
+    #[must_use]
+    pub const fn turn_per_step(method: Method) -> f64 {
+        match method {
+            Method::Euler => 0.4,
+            Method::Midpoint => 0.3,
+            Method::Verlet => 0.8,
+            Method::Rk4 => 1.25,
+        }
+    }
+
+    /// The motion that is ahead of an arm in this state, under this loop.
+    #[must_use]
+    pub fn ahead<const N: usize>(control: &ControlLoop<N>, state: &State<N>) -> Self {
+        let ControlLoop {
+            arm,
+            gains,
+            setpoint,
+            method,
+            ..
+        } = control;
+        let weightless = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap_or(*arm);
+        let off = |j: usize| setpoint.position[j] - state.position[j];
+        let springs: f64 = (0..N).map(|j| 0.5 * gains.kp[j] * off(j) * off(j)).sum();
+        let falling = energy(arm, state) - lowest(arm) + springs;
+        let by_energy = (2.0 * falling.max(0.0) * agility(&weightless)).sqrt();
+        let held = gains.kp.iter().all(|&kp| kp > 0.0);
+        let speed = if held {
+            let peaks: f64 = (0..N)
+                .map(|j| {
+                    let (kp, kd) = (gains.kp[j], gains.kd[j]);
+                    let inertia = 1.0 / accelerations(&weightless, j..=j)[j];
+                    kp * off(j).abs() / ((kp * inertia).sqrt() + kd)
+                })
+                .sum();
+            (peaks + fastest(state)).min(by_energy)
+        } else {
+            by_energy
+        };
+        // NaN, of an arm too extreme to reckon with, limits nothing.
+        let timestep = Self::turn_per_step(*method) / speed;
+        if speed > 0.0 && timestep > 0.0 {
+            Self { speed, timestep }
+        } else {
+            Self {
+                speed: 0.0,
+                timestep: f64::INFINITY,
+            }
+        }
+    }
+}
+
+/// The potential energy of the hanging arm \[J\].
+fn lowest<const N: usize>(arm: &Arm<N>) -> f64 {
+    let mut hanging = [0.0; N];
+    if let Some(first) = hanging.first_mut() {
+        *first = -FRAC_PI_2;
+    }
+    potential_energy(arm, &hanging)
+}
+
+/// `max (M⁻¹)_ii` in the angles of the links \[1/(kg m²)\]: what acts on link i alone is passed on by all joints before
+/// it, and its acceleration is the sum of theirs.
+fn agility<const N: usize>(weightless: &Arm<N>) -> f64 {
+    (0..N)
+        .map(|i| accelerations(weightless, 0..=i)[..=i].iter().sum())
+        .fold(0.0, f64::max)
+}
+
+/// Joint accelerations \[rad/s²\] of the stretched arm at rest under an effort of 1 N m at each of `joints`.
+fn accelerations<const N: usize>(weightless: &Arm<N>, joints: RangeInclusive<usize>) -> [f64; N] {
+    let effort = std::array::from_fn(|j| f64::from(u8::from(joints.contains(&j))));
+    forward_dynamics(weightless, &[0.0; N], &[0.0; N], &effort)
+}
+
+/// The present speed of the fastest link \[rad/s\].
+fn fastest<const N: usize>(state: &State<N>) -> f64 {
+    let mut rate = 0.0;
+    state.velocity.iter().fold(0.0, |max: f64, velocity| {
+        rate += velocity;
+        max.max(rate.abs())
+    })
+}

@@ -1,0 +1,329 @@
+//! A plan: the method and the timestep that keep the end effector within an allowed error at least cost.
+//!
+//! | question | the truth that errors are measured from |
+//! | --- | --- |
+//! | an arm left to itself | its motion |
+//! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding the effort for a step is part of the error |
+//!
+//! The truth is followed with ever smaller steps until two of them agree to a part of the allowed error. Then each method
+//! is run as the live arm runs it, with ever smaller steps until it stays within the rest at all samples, and a little
+//! larger again by bisection. The cheapest run, in evaluations of the dynamics, is the plan: it has been run, and its
+//! error is that which was seen. A run that could only be dearer than another is not made.
+//!
+//! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
+//! every pose, since the error of one move says nothing about the next.
+//!
+//! **Invariant:** the work is bounded when a plan is asked for, and every candidate that is answered has been run.
+
+use glam::DVec2;
+
+use super::continuous::ContinuousLoop;
+use super::control_loop::ControlLoop;
+use super::limits::LimitSearch;
+use super::track::{Followed, apart};
+use crate::math::arm::State;
+use crate::math::count::in_f64;
+use crate::math::integrator::Method;
+use crate::math::simulation::Simulation;
+
+/// Longest time between two looks at the end effector \[s\]; also the longest timestep that is planned.
+const SPACING: f64 = 0.05;
+
+/// Fewest samples of a plan.
+const FEWEST_SAMPLES: f64 = 16.0;
+
+/// Longest duration that is planned \[s\].
+pub const MAX_DURATION: f64 = 1000.0;
+
+/// Most steps of the truth, and of one run.
+const MAX_STEPS: u64 = 4_000_000;
+
+/// Most samples of a plan, a few more than [`MAX_DURATION`] has.
+const MAX_SAMPLES: usize = 20_001;
+
+/// The part of the allowed error that the truth itself may be off by.
+const PART_OF_TRUTH: f64 = 0.05;
+
+/// The motion to be planned.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Task<const N: usize> {
+    /// The loop; its method and timestep are what is looked for. Gains of zero: an arm left to itself.
+    pub control: ControlLoop<N>,
+    /// Where the arm starts.
+    pub start: State<N>,
+    /// How long \[s\].
+    pub duration: f64,
+    /// Largest distance of the end effector from where it ought to be \[m\].
+    pub error: f64,
+}
+
+/// A run that keeps within the allowed error.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Its method.
+    pub method: Method,
+    /// Its timestep \[s\].
+    pub timestep: f64,
+    /// Evaluations of the dynamics that it made.
+    pub evaluations: u64,
+    /// How far the end effector was off at most \[m\], with what it may have risen by between two samples.
+    pub error: f64,
+}
+
+/// A plan.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// The runs that were within the error, the cheapest last; the others are dearer, or cannot be had.
+    pub candidates: Vec<Candidate>,
+    /// How far the truth itself may be off \[m\].
+    pub uncertainty: f64,
+}
+
+impl Planned {
+    /// The cheapest run.
+    #[must_use]
+    pub fn best(&self) -> Option<&Candidate> {
+        self.candidates.last()
+    }
+}
+
+/// Why there is no plan.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// A duration that is too long.
+    #[error("duration must be at most {MAX_DURATION} s, got {duration}")]
+    TooLong {
+        /// The given duration \[s\].
+        duration: f64,
+    },
+    /// The motion amplifies rounding beyond the allowed error, or is too wild to be followed.
+    #[error("the motion itself can only be known to {uncertainty:.1e} m for so long")]
+    Unknown {
+        /// By how much two of the truths differ \[m\].
+        uncertainty: f64,
+    },
+    /// No method stays within the error.
+    #[error("no method stays within {error:e} m in {MAX_STEPS} steps")]
+    NotFound {
+        /// The given error \[m\].
+        error: f64,
+    },
+}
+
+/// The search for a plan, to be paused: no piece takes longer than a millisecond or so of one core (optimised build).
+#[derive(Debug, Clone)]
+pub struct Planning<const N: usize> {
+    task: Task<N>,
+    samples: u64,
+    spacing: f64,
+    /// End effector at the samples, as the finest of the truths has it.
+    truth: Vec<DVec2>,
+    uncertainty: f64,
+    /// Methods that have not been tried, the next one last.
+    methods: Vec<Method>,
+    candidates: Vec<Candidate>,
+    stage: Stage<N>,
+}
+
+#[derive(Debug, Clone)]
+enum Stage<const N: usize> {
+    Truth(Box<Followed<ContinuousLoop<N>>>),
+    Limiting(Method, Box<LimitSearch<N>>),
+    Running(Bracket, Box<Followed<Simulation<N>>>),
+    Done(Result<Planned, PlanError>),
+}
+
+/// Steps per sample: too few, and enough once they are known.
+#[derive(Debug, Clone, Copy)]
+struct Bracket {
+    method: Method,
+    too_few: u64,
+    enough: Option<u64>,
+}
+
+impl<const N: usize> Planning<N> {
+    /// The most memory that a plan takes, in bytes: two tracks, each of which may have grown to twice its length, and
+    /// their differences.
+    pub const MOST_BYTES: usize =
+        size_of::<Self>() + LimitSearch::<N>::MOST_BYTES + 5 * MAX_SAMPLES * size_of::<DVec2>();
+
+    /// A plan about to be made.
+    ///
+    /// # Errors
+    /// A duration that is too long.
+    pub fn new(task: Task<N>) -> Result<Self, PlanError> {
+        let Task { duration, .. } = task;
+        if duration.is_nan() || duration > MAX_DURATION {
+            return Err(PlanError::TooLong { duration });
+        }
+        let samples = whole(duration / SPACING).max(whole(FEWEST_SAMPLES));
+        let spacing = duration / in_f64(samples);
+        let mut planning = Self {
+            task,
+            samples,
+            spacing,
+            truth: Vec::new(),
+            uncertainty: f64::INFINITY,
+            methods: vec![Method::Euler, Method::Midpoint, Method::Verlet, Method::Rk4],
+            candidates: Vec::new(),
+            stage: Stage::Done(Err(PlanError::Unknown {
+                uncertainty: f64::INFINITY,
+            })),
+        };
+        planning.follow(4);
+        Ok(planning)
+    }
+
+    /// Goes on by one piece; the plan, once it is made.
+    pub fn advance(&mut self) -> Option<Result<Planned, PlanError>> {
+        match &mut self.stage {
+            Stage::Done(answer) => return Some(answer.clone()),
+            Stage::Truth(run) => {
+                if let Some(finite) = run.advance(self.samples) {
+                    let track = std::mem::take(&mut run.track);
+                    let per_sample = run.per_sample;
+                    self.compare(finite, track, per_sample);
+                }
+            }
+            Stage::Limiting(method, search) => {
+                let method = *method;
+                if let Some(limits) = search.advance() {
+                    let most = limits.advised.unwrap_or(f64::INFINITY);
+                    self.begin(method, most);
+                }
+            }
+            Stage::Running(bracket, run) => {
+                if let Some(finite) = run.advance(self.samples) {
+                    let (bracket, per_sample) = (*bracket, run.per_sample);
+                    let error = if finite {
+                        apart(&run.track, &self.truth)
+                    } else {
+                        f64::INFINITY
+                    };
+                    self.narrow(bracket, per_sample, error);
+                }
+            }
+        }
+        None
+    }
+
+    /// Follows the truth with so many steps between two samples.
+    fn follow(&mut self, per_sample: u64) {
+        let timestep = self.spacing / in_f64(per_sample);
+        let control = self.task.control.with_method(Method::Rk4);
+        let truth = ContinuousLoop {
+            control: control.with_timestep(timestep),
+            state: self.task.start,
+            integral: [0.0; N],
+        };
+        self.stage = Stage::Truth(Box::new(Followed::new(truth, per_sample)));
+    }
+
+    /// Compares a truth with the one before, which took steps twice as long.
+    fn compare(&mut self, finite: bool, track: Vec<DVec2>, per_sample: u64) {
+        if finite {
+            if self.truth.len() == track.len() {
+                self.uncertainty = apart(&track, &self.truth);
+            }
+            self.truth = track;
+        }
+        if self.uncertainty <= PART_OF_TRUTH * self.task.error {
+            self.next_method();
+        } else if 2 * per_sample * self.samples <= MAX_STEPS {
+            self.follow(2 * per_sample);
+        } else {
+            let uncertainty = self.uncertainty;
+            self.stage = Stage::Done(Err(PlanError::Unknown { uncertainty }));
+        }
+    }
+
+    fn next_method(&mut self) {
+        let Some(method) = self.methods.pop() else {
+            let error = self.task.error;
+            self.candidates
+                .sort_by_key(|one| std::cmp::Reverse(one.evaluations));
+            self.stage = Stage::Done(if self.candidates.is_empty() {
+                Err(PlanError::NotFound { error })
+            } else {
+                Ok(Planned {
+                    candidates: std::mem::take(&mut self.candidates),
+                    uncertainty: self.uncertainty,
+                })
+            });
+            return;
+        };
+        if self.task.control.is_free() {
+            self.begin(method, f64::INFINITY);
+        } else {
+            let search = LimitSearch::new(&self.task.control.with_method(method));
+            self.stage = Stage::Limiting(method, Box::new(search));
+        }
+    }
+
+    /// Begins with the longest timestep, `most` \[s\] at most.
+    fn begin(&mut self, method: Method, most: f64) {
+        let fewest = whole(self.spacing / most).max(1);
+        let bracket = Bracket {
+            method,
+            too_few: fewest - 1,
+            enough: None,
+        };
+        self.run(bracket, fewest);
+    }
+
+    /// Runs a method with so many steps between two samples, unless there is a cheaper candidate already.
+    fn run(&mut self, bracket: Bracket, per_sample: u64) {
+        let steps = per_sample.saturating_mul(self.samples);
+        let Bracket { method, .. } = bracket;
+        let cost = steps.saturating_mul(u64::from(method.evaluations()));
+        if steps > MAX_STEPS || self.candidates.iter().any(|one| one.evaluations <= cost) {
+            return self.next_method();
+        }
+        let control = self.task.control.with_method(method);
+        let timestep = self.spacing / in_f64(per_sample);
+        let live = control.with_timestep(timestep).simulation(self.task.start);
+        self.stage = Stage::Running(bracket, Box::new(Followed::new(live, per_sample)));
+    }
+
+    fn narrow(&mut self, bracket: Bracket, per_sample: u64, error: f64) {
+        let Bracket { method, .. } = bracket;
+        let bracket = if error + self.uncertainty <= self.task.error {
+            self.candidates.retain(|one| one.method != method);
+            let steps = per_sample * self.samples;
+            self.candidates.push(Candidate {
+                method,
+                timestep: self.spacing / in_f64(per_sample),
+                evaluations: steps * u64::from(method.evaluations()),
+                error,
+            });
+            Bracket {
+                enough: Some(per_sample),
+                ..bracket
+            }
+        } else {
+            Bracket {
+                too_few: per_sample,
+                ..bracket
+            }
+        };
+        let next = match bracket.enough {
+            None => 2 * per_sample,
+            Some(enough) => bracket.too_few + (enough - bracket.too_few) / 2,
+        };
+        if next == bracket.too_few || bracket.enough == Some(next) {
+            self.next_method();
+        } else {
+            self.run(bracket, next);
+        }
+    }
+}
+
+/// The least whole number that is not below `x`.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a count of steps; a cast saturates"
+)]
+fn whole(x: f64) -> u64 {
+    x.ceil() as u64
+}

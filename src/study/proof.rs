@@ -1,0 +1,382 @@
+//! A timestep up to which a loop is proven to be stable in every pose.
+//!
+//! For a step with held effort, `z x = …` for an eigenvector x with eigenvalue z, put `z = (1 + w h/2) / (1 - w h/2)`:
+//! the unit circle becomes the left half plane of `w`. The arm under a constant effort moves on a parabola, which every
+//! method but Euler takes exactly, and the velocity becomes `w x`. What is left of the law is a polynomial of symmetric
+//! matrices
+//!
+//! `P₃ w³ + P₂ w² + P₁ w + P₀`
+//!
+//! | | midpoint, Verlet, Runge-Kutta 4 | Euler |
+//! | --- | --- | --- |
+//! | P₃ | `M - h/2 Kd - h²/4 Γ` | `M - h/2 Kd + h²/4 (Kp + Γ) + h³/8 Ki` |
+//! | P₂ | `Kd - h/2 Kp - h²/4 Ki` | `Kd - h (Kp + Γ) - h²/4 Ki` |
+//! | P₁ | `Kp + Γ` | `Kp + Γ - h/2 Ki` |
+//! | P₀ | `Ki` | `Ki` |
+//!
+//! with `Γ = ∂G/∂q`. Multiplied by x from both sides it is a cubic with real coefficients, and by Hurwitz' rule all its
+//! roots lie on the left if `P₃, P₂, P₁ > 0` and `P₁ P₂ > P₃ P₀`: for every x, so for every pose, if the matrices are
+//! so. Only `M` and `Γ` know the pose. `Γ` is bounded by its largest entries, and the pose in which `P₃` ceases first
+//! to be positive is found by branch and bound: over a box of joint angles `M` is at least what it is in the middle,
+//! less what its cosines can lose.
+//!
+//! The three methods that look at gravity in several stages see the springs' part moved by up to `h²/4 Kp M⁻¹ Γ`, no
+//! longer symmetric. Where `P₃, P₂ > 0` that is at most `ε Kp` with `ε = h/2 max(kp/kd) max(Γ/kp)`; every coefficient
+//! must be good by twice that, and `ε` at most 0.01, or nothing is proven. (For these methods under gravity the bound so
+//! rests on an estimate of what is not symmetric; without gravity, and for Euler, it is exact.)
+//!
+//! The bound is sharp where an arm is limited by its damping, as stiff controllers are. Where damping is weak the
+//! matrices mix (`P₂` loses its sign for one joint before the loop is unstable), and it is only safe.
+//!
+//! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 7, on quadratic forms of a pencil; Lawler and
+//! Wood, *Branch-and-bound methods* (1966), on the search. Putting the two together is our own.
+//!
+//! **Invariant:** whenever the search ends, its bound holds; boxes are bounded.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over 0..N of arrays that have N elements"
+)]
+
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::control_loop::ControlLoop;
+use super::symmetric::{Symmetric, is_positive};
+use crate::math::arm::Arm;
+use crate::math::dynamics::{coupling, mass_matrix, weight_moment};
+use crate::math::integrator::Method;
+use crate::math::pid::Gains;
+
+/// How near the bound comes to the least pose's own: half of the 1 % that is promised.
+const SHARPNESS: f64 = 0.004;
+
+/// Boxes that are cut before the search ends with what it has: some 50 ms of one core (optimised build).
+const MAX_BOXES: u32 = 20_000;
+
+/// Halvings of an interval of timesteps.
+const HALVINGS: u32 = 60;
+
+/// Where gravity's part in a stage is larger than this, nothing is proven.
+const LARGEST_STAGE: f64 = 0.01;
+
+/// Parts of the timesteps in which two factors that both fall are bounded apart.
+const PARTS: u32 = 64;
+
+/// A timestep that is proven, and the pose in which it comes nearest to fail.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Proven<const N: usize> {
+    /// Held control is stable in every pose up to this timestep \[s\]; infinite where nothing limits.
+    pub(super) timestep: f64,
+    /// The pose, first joint at zero.
+    pub(super) pose: [f64; N],
+}
+
+/// A proof in progress.
+#[derive(Debug, Clone)]
+pub(super) struct Proof<const N: usize> {
+    arm: Arm<N>,
+    gains: Gains<N>,
+    is_euler: bool,
+    /// The most that gravity adds to a spring \[N m/rad\].
+    weight: [f64; N],
+    /// The largest timestep that all but the poses allow \[s\].
+    cap: f64,
+    /// The least that a pose allows of those looked at \[s\], and that pose.
+    least: Proven<N>,
+    boxes: BinaryHeap<Angles<N>>,
+    cut: u32,
+}
+
+/// A box of joint angles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Angles<const N: usize> {
+    /// Proven for every pose in it \[s\].
+    bound: f64,
+    middle: [f64; N],
+    half: [f64; N],
+}
+
+impl<const N: usize> Eq for Angles<N> {}
+
+/// Least bound first, which is what [`BinaryHeap`] calls the greatest.
+impl<const N: usize> Ord for Angles<N> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.bound.total_cmp(&self.bound)
+    }
+}
+
+impl<const N: usize> PartialOrd for Angles<N> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<const N: usize> Proof<N> {
+    /// The most memory that a proof takes, in bytes: its boxes, in a buffer that grows by doubling.
+    pub(super) const MOST_BYTES: usize =
+        size_of::<Self>() + (MAX_BOXES + 2).next_power_of_two() as usize * size_of::<Angles<N>>();
+
+    /// A proof of held control, not begun; none where there is nothing to prove with.
+    pub(super) fn new(control: &ControlLoop<N>) -> Option<Self> {
+        let ControlLoop {
+            arm, gains, method, ..
+        } = control;
+        let mut proof = Self {
+            arm: *arm,
+            gains: *gains,
+            is_euler: *method == Method::Euler,
+            weight: heaviest(arm, gains),
+            cap: 0.0,
+            least: Proven {
+                timestep: f64::INFINITY,
+                pose: [0.0; N],
+            },
+            boxes: BinaryHeap::new(),
+            cut: 0,
+        };
+        proof.cap = proof.largest_for_gains()?;
+        let half = std::array::from_fn(|joint| match joint {
+            0 => 0.0,
+            // Mirrored about the vertical an arm is the same arm.
+            1 => FRAC_PI_2,
+            _ => PI,
+        });
+        let middle = std::array::from_fn(|joint| if joint == 1 { FRAC_PI_2 } else { 0.0 });
+        proof.look_at(middle, half);
+        Some(proof)
+    }
+
+    /// Cuts up to `boxes` boxes; the proven timestep once it is as sharp as it can be.
+    pub(super) fn advance(&mut self, boxes: u32) -> Option<Proven<N>> {
+        for _ in 0..boxes {
+            let Some(first) = self.boxes.peek().copied() else {
+                return Some(self.proven(f64::INFINITY));
+            };
+            let sharp = first.bound >= (1.0 - SHARPNESS) * self.least.timestep;
+            if sharp || first.bound >= self.cap || self.cut >= MAX_BOXES {
+                return Some(self.proven(first.bound));
+            }
+            self.boxes.pop();
+            self.cut += 1;
+            let Angles {
+                middle, mut half, ..
+            } = first;
+            let widest = (1..N).max_by(|&i, &j| half[i].total_cmp(&half[j]))?;
+            half[widest] *= 0.5;
+            for side in [-1.0, 1.0] {
+                let mut middle = middle;
+                middle[widest] += side * half[widest];
+                self.look_at(middle, half);
+            }
+        }
+        None
+    }
+
+    fn proven(&self, bound: f64) -> Proven<N> {
+        Proven {
+            timestep: bound.min(self.cap),
+            pose: self.least.pose,
+        }
+    }
+
+    fn look_at(&mut self, middle: [f64; N], half: [f64; N]) {
+        let here = self.largest_for_mass(&self.least_mass(&middle, &[0.0; N]));
+        if here < self.least.timestep {
+            self.least = Proven {
+                timestep: here,
+                pose: middle,
+            };
+        }
+        let bound = self.largest_for_mass(&self.least_mass(&middle, &half));
+        if bound < self.cap {
+            self.boxes.push(Angles {
+                bound,
+                middle,
+                half,
+            });
+        }
+    }
+
+    /// A matrix that the mass matrix of no pose of a box falls below: in the angles of the links it is
+    /// `μ_ij l_i l_j cos(φ_i - φ_j)`, and what a cosine loses costs `2 y_i y_j ≤ t y_i² + y_j²/t` at most.
+    fn least_mass(&self, middle: &[f64; N], half: &[f64; N]) -> Symmetric<N> {
+        let mut links: Symmetric<N> = [[0.0; N]; N];
+        for i in 0..N {
+            links[i][i] += coupling(&self.arm, i, i);
+            let (mut between, mut reach) = (0.0, 0.0);
+            for j in i + 1..N {
+                between += middle[j];
+                reach += half[j];
+                let product = coupling(&self.arm, i, j);
+                links[i][j] = product * between.cos();
+                links[j][i] = links[i][j];
+                if reach > 0.0 {
+                    let turn: f64 = reach.min(PI);
+                    let lost = between.cos().abs() * (1.0 - turn.cos())
+                        + between.sin().abs() * turn.min(FRAC_PI_2).sin();
+                    let (one, other) = (coupling(&self.arm, i, i), coupling(&self.arm, j, j));
+                    let scale = (one / other).sqrt();
+                    links[i][i] -= product * lost.min(2.0) * scale;
+                    links[j][j] -= product * lost.min(2.0) / scale;
+                }
+            }
+        }
+        // A joint moves all links beyond it.
+        std::array::from_fn(|i| {
+            std::array::from_fn(|j| links[i..].iter().flat_map(|row| &row[j..]).sum())
+        })
+    }
+
+    /// The largest timestep, up to the cap, at which P₃ is positive with this mass \[s\].
+    fn largest_for_mass(&self, mass: &Symmetric<N>) -> f64 {
+        largest(self.cap, |h| {
+            let mut matrix = *mass;
+            for (j, row) in matrix.iter_mut().enumerate() {
+                row[j] -= self.taken_from_mass(j, h);
+            }
+            is_positive(&matrix)
+        })
+    }
+
+    /// The most by which P₃ falls short of M at joint j; it grows with the timestep where P₂ is positive.
+    fn taken_from_mass(&self, j: usize, h: f64) -> f64 {
+        let Gains { kp, ki, kd } = &self.gains;
+        let weight = self.weight[j];
+        if self.is_euler {
+            0.5 * h * (kd[j] - 0.5 * h * (kp[j] - weight) - 0.25 * h * h * ki[j])
+        } else {
+            0.5 * h * (kd[j] + 0.5 * h * (weight + 2.0 * self.stage(h) * kp[j]))
+        }
+    }
+
+    /// P₂ at joint j, at least.
+    fn damping(&self, j: usize, h: f64) -> f64 {
+        let Gains { kp, ki, kd } = &self.gains;
+        if self.is_euler {
+            // Three times the integral's part, so that P₃ falls with the timestep.
+            kd[j] - h * (kp[j] + self.weight[j]) - 0.75 * h * h * ki[j]
+        } else {
+            let spring = kp[j] * (1.0 + 2.0 * self.stage(h));
+            kd[j] - 0.5 * h * spring - 0.25 * h * h * ki[j]
+        }
+    }
+
+    /// P₁ at joint j, at least.
+    fn spring(&self, j: usize, h: f64) -> f64 {
+        let Gains { kp, ki, .. } = &self.gains;
+        if self.is_euler {
+            kp[j] - self.weight[j] - 0.5 * h * ki[j]
+        } else {
+            kp[j] * (1.0 - 2.0 * self.stage(h)) - self.weight[j]
+        }
+    }
+
+    /// ε of methods that look at gravity in several stages.
+    fn stage(&self, h: f64) -> f64 {
+        let Gains { kp, kd, .. } = &self.gains;
+        let most = |of: &dyn Fn(usize) -> f64| (0..N).map(of).fold(0.0, f64::max);
+        if self.is_euler || self.arm.gravity() == 0.0 {
+            0.0
+        } else {
+            0.5 * h * most(&|j| kp[j] / kd[j]) * most(&|j| self.weight[j] / kp[j])
+        }
+    }
+
+    /// The largest timestep that springs, damping and integrals allow, whatever the pose \[s\].
+    fn largest_for_gains(&self) -> Option<f64> {
+        let Gains { kp, ki, kd } = &self.gains;
+        // A weight that is not a number, as of springs without any strength, is not less than a gain.
+        if !(0..N).all(|j| kp[j] > self.weight[j] && kd[j] > 0.0) {
+            return None;
+        }
+        // P₂ ends before 2 kd/kp.
+        let end = (0..N)
+            .map(|j| 2.0 * kd[j] / kp[j])
+            .fold(f64::INFINITY, f64::min);
+        let end = largest(end, |h| {
+            self.stage(h) <= LARGEST_STAGE
+                && (0..N).all(|j| self.damping(j, h) > 0.0 && self.spring(j, h) > 0.0)
+        });
+        let cap = if ki.iter().all(|&ki| ki == 0.0) {
+            end
+        } else {
+            self.largest_for_integrals(end)
+        };
+        (cap > 0.0 && cap.is_finite()).then_some(cap)
+    }
+
+    /// As far as `P₁ P₂ > P₃ P₀` for all shorter timesteps too: in every part, the factors that fall are taken at its
+    /// end and P₃, which falls too, at its beginning.
+    fn largest_for_integrals(&self, end: f64) -> f64 {
+        let stretched = mass_matrix(&self.arm, &[0.0; N]);
+        let mass: [f64; N] = dominating(|i, j| stretched[i][j], |j| stretched[j][j]);
+        let ki = &self.gains.ki;
+        let holds = |from: f64, to: f64| {
+            let acting = (0..N).filter(|&j| ki[j] > 0.0);
+            let pace = acting
+                .map(|j| self.spring(j, to) / ki[j])
+                .fold(f64::INFINITY, f64::min);
+            (0..N).all(|j| {
+                // Gravity and the stages may add to P₃ what they may take away.
+                let weight =
+                    0.25 * to * to * (self.weight[j] + 2.0 * self.stage(to) * self.gains.kp[j]);
+                let lost = 0.5 * from * self.gains.kd[j];
+                let gained = if self.is_euler {
+                    0.25 * to * to * (self.gains.kp[j] + 0.5 * to * ki[j])
+                } else {
+                    0.0
+                };
+                pace * self.damping(j, to) > mass[j] - lost + weight + gained
+            })
+        };
+        let edge = |part: u32| end * f64::from(part) / f64::from(PARTS);
+        (0..PARTS)
+            .take_while(|&part| holds(edge(part), edge(part + 1)))
+            .last()
+            .map_or(0.0, |part| edge(part + 1))
+    }
+}
+
+/// The largest of the timesteps up to `end` at which it holds, of something that holds up to some timestep.
+fn largest(end: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    if holds(end) {
+        return end;
+    }
+    let (mut good, mut bad) = (0.0, end);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (good + bad);
+        if holds(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+        if bad - good < 1e-6 * good {
+            break;
+        }
+    }
+    good
+}
+
+/// A diagonal matrix above and, negative, below every symmetric one whose entries are no larger than these: as
+/// `2 y_i y_j ≤ t y_i² + y_j²/t`, with t after the sizes of the joints.
+fn dominating<const N: usize>(
+    entry: impl Fn(usize, usize) -> f64,
+    size: impl Fn(usize) -> f64,
+) -> [f64; N] {
+    std::array::from_fn(|i| {
+        (0..N)
+            .map(|j| entry(i, j) * (size(i) / size(j)).sqrt())
+            .sum()
+    })
+}
+
+/// The most that gravity adds to or takes from each spring: entry (i, j) of Γ is the load of joint `max(i, j)`, turned.
+fn heaviest<const N: usize>(arm: &Arm<N>, gains: &Gains<N>) -> [f64; N] {
+    if arm.gravity() == 0.0 {
+        return [0.0; N];
+    }
+    let load = |j: usize| (j..N).map(|i| weight_moment(arm, i)).sum::<f64>();
+    dominating(|i, j| load(i.max(j)), |j| gains.kp[j])
+}

@@ -1,0 +1,299 @@
+//! How a connection ends, in virtual time: what is owed to a client that has stopped sending, and the runtime's end.
+//!
+//! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
+use actix::prelude::*;
+use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
+use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
+use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::protocol::catalog::Service;
+use serde_json::{Value, json};
+use tokio::time::{Instant, sleep};
+
+const STEP: &str = Service::IntegrationStep.name();
+
+/// A gateway whose computations wait for the test to answer.
+async fn held_back() -> (Gateway, Held) {
+    let computations = Held::default();
+    let mut nodes = Nodes::default();
+    Node::holding(&computations).attach(&mut nodes, &[Service::IntegrationStep], &[]);
+    (Gateway::with(nodes).await, computations)
+}
+
+fn id(frame: &Value) -> u64 {
+    frame["id"].as_u64().expect("an id")
+}
+
+#[test]
+fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
+    run(async {
+        let (gateway, computations) = held_back().await;
+        let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        for n in 0..3 {
+            client.call(STEP, n).await;
+        }
+        client.call("/s", 3).await;
+        client.half_close().await;
+        provider.receive().await;
+        sleep(Duration::from_secs(11)).await;
+        for n in 0..3 {
+            computations.answer();
+            sleep(Duration::from_secs(1)).await;
+            assert_eq!(computations.count(), usize::from(n < 2));
+        }
+        let ids: Vec<u64> = client.rest().await.iter().map(id).collect();
+        assert_eq!(ids, [3, 0, 1, 2], "the call timed out before that");
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+/// Whether it has only stopped sending or is gone altogether can't be told until something is sent to it.
+#[test]
+fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
+    run(async {
+        let (gateway, computations) = held_back().await;
+        let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        client.call(STEP, 1).await;
+        client.call(STEP, 2).await;
+        client
+            .send(json!({"op": "call_service", "service": "/s", "id": 3, "timeout": 80000}))
+            .await;
+        client.half_close().await;
+        settle().await;
+        let began = Instant::now();
+        client.rest().await;
+        assert!(began.elapsed() <= RESPONSES_OWED, "{:?}", began.elapsed());
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        assert!(computations.take().is_gone(), "it need not go on");
+        assert_eq!(computations.count(), 0, "the next one is not begun");
+    });
+}
+
+/// With its queue full no frame of it is performed, but its end is seen all the same.
+#[test]
+fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
+    run(async {
+        let (gateway, computations) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        for n in 0..30 {
+            client.call(STEP, n).await;
+        }
+        settle().await;
+        client.half_close().await;
+        settle().await;
+        // While its computations end, one after the other, it is owed them.
+        for _ in 0..3 {
+            sleep(RESPONSES_OWED - Duration::from_secs(1)).await;
+            computations.answer();
+            settle().await;
+        }
+        assert_eq!(gateway.gauges.connections(), 1);
+        let began = Instant::now();
+        assert_eq!(client.rest().await.len(), 3);
+        assert_elapsed(began, RESPONSES_OWED - Duration::from_millis(10));
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
+        assert!(computations.take().is_gone(), "it need not go on");
+        assert_eq!(computations.count(), 0, "the next one is not begun");
+        settle().await;
+        assert_eq!(gateway.gauges.memory().held(), 0);
+    });
+}
+
+/// What is read ahead is counted, and little.
+#[test]
+fn a_client_whose_queue_is_full_is_read_a_little_further_and_all_of_it_is_performed() {
+    run(async {
+        let (gateway, computations) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        let calls: u64 = 3000;
+        for n in 0..calls {
+            client.call(STEP, n).await;
+        }
+        settle().await;
+        let held = gateway.gauges.memory().held();
+        assert!(held < 512 * 1024, "{held} bytes of {calls} calls");
+        client.half_close().await;
+        for n in 0..calls {
+            settle().await;
+            computations.answer();
+            assert_eq!(id(&client.receive().await), n);
+        }
+        assert!(client.rest().await.is_empty());
+    });
+}
+
+#[test]
+fn a_half_closed_client_that_reads_nothing_is_let_go() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        // Responses wait: twenty seconds, as ever.
+        let mut client = gateway.connect(64);
+        client.call("/none", 1).await;
+        client.half_close().await;
+        sleep(STALL_LIMIT - Duration::from_secs(1)).await;
+        let kept = client.rest().await;
+        assert_eq!(kept.len(), 1, "what is read in time arrives whole");
+
+        // Topic messages only: they are not owed for so long. The registry has let go of it at once.
+        let (mut publisher, mut client) = (gateway.connect(WIDE), gateway.connect(64));
+        client.subscribe("/t").await;
+        publisher.advertise("/t").await;
+        for n in 0..9 {
+            publisher.publish("/t", n).await;
+        }
+        settle().await;
+        client.half_close().await;
+        sleep(LINGER + Duration::from_secs(1)).await;
+        client.take(64).await;
+        assert!(
+            !client.hears_nothing_for(Duration::from_secs(1)).await,
+            "the stream has ended"
+        );
+    });
+}
+
+#[test]
+fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_stream_ends() {
+    run(async {
+        let (gateway, computations) = held_back().await;
+        let mut client = gateway.connect(WIDE);
+        for n in 0..17 {
+            client.call(STEP, n).await;
+        }
+        settle().await;
+        gateway
+            .registry
+            .send(RefuseCalls("shutting down"))
+            .await
+            .unwrap();
+        // The end overtakes the answer to the one that runs, as it does when a worker is slow.
+        gateway.registry.send(FinishAll).await.unwrap();
+        settle().await;
+        computations.take().refuse("shutting down");
+        let frames = client.rest().await;
+        assert_eq!(
+            frames.iter().map(id).collect::<Vec<_>>(),
+            (0..17).collect::<Vec<_>>()
+        );
+        assert!(
+            frames
+                .iter()
+                .all(|frame| frame["status"] == "shutting down")
+        );
+    });
+}
+
+#[test]
+fn at_the_end_of_the_runtime_forwarded_calls_are_refused_and_streams_end() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        client.call("/s", 1).await;
+        provider.receive().await;
+        gateway
+            .registry
+            .send(RefuseCalls("shutting down"))
+            .await
+            .unwrap();
+        client.call("/s", 2).await;
+        settle().await;
+        gateway.registry.send(FinishAll).await.unwrap();
+        let frames = client.rest().await;
+        assert_eq!(frames.iter().map(id).collect::<Vec<_>>(), [1, 2]);
+        assert!(
+            frames
+                .iter()
+                .all(|frame| frame["status"] == "shutting down")
+        );
+        let mut late = gateway.connect(WIDE);
+        let frames = late.rest().await;
+        assert_eq!(frames.len(), 1);
+        assert_eq!(frames[0]["msg"], "shutting down");
+        provider.rest().await;
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+#[test]
+fn a_foreign_client_gets_its_line_and_the_end_at_once() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        let began = Instant::now();
+        client
+            .send_text("POST / HTTP/1.1\r\n\r\n{\"op\":\"nonsense\"}\n")
+            .await;
+        assert_eq!(client.rest().await.len(), 1);
+        assert_elapsed(began, Duration::ZERO);
+        sleep(Duration::from_secs(2)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+/// Where all places are taken, who only waits for answers gives way, the oldest first, and knows why.
+#[test]
+fn who_comes_gets_the_place_of_the_oldest_client_that_has_stopped_sending() {
+    run(async {
+        let gauges = Arc::new(Gauges::default());
+        let registry = Registry::new(Arc::clone(&gauges))
+            .serving_at_most(4)
+            .start();
+        let computations = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&computations).attach(&mut nodes, &[Service::IntegrationStep], &[]);
+        registry.send(Attach(nodes)).await.expect("a registry");
+        let gateway = Gateway { registry, gauges };
+        let mut staying = gateway.connect(WIDE);
+        let mut left = Vec::new();
+        for n in 0..3 {
+            let mut client = gateway.connect(WIDE);
+            // The second has more under way than is read of it: the end of its stream is seen all the same.
+            for _ in 0..if n == 1 { 20 } else { 1 } {
+                client.call(STEP, n).await;
+            }
+            client.half_close().await;
+            settle().await;
+            left.push(client);
+        }
+        assert_eq!(gateway.gauges.connections(), 4);
+        let began = Instant::now();
+        let mut served = Vec::new();
+        for mut owed in left {
+            let mut newcomer = gateway.connect(WIDE);
+            newcomer.call("/none", 7).await;
+            assert_eq!(id(&newcomer.receive().await), 7);
+            served.push(newcomer);
+            let rest = owed.rest().await;
+            assert_eq!(rest.len(), 1, "{rest:?}");
+            let why = rest[0]["msg"].as_str().expect("a status");
+            assert!(why.contains("another client needed its place"), "{why}");
+            settle().await;
+            assert_eq!(gateway.gauges.connections(), 4);
+        }
+        assert!(
+            began.elapsed() < RESPONSES_OWED / 10,
+            "somebody was waited for"
+        );
+        // All are at work now: nobody gives way.
+        let mut refused = gateway.connect(WIDE);
+        let why = refused.receive().await;
+        let why = why["msg"].as_str().expect("a status");
+        assert!(why.contains("too many connections"), "{why}");
+        for client in served.iter_mut().chain([&mut staying]) {
+            client.call("/none", 8).await;
+            assert_eq!(id(&client.receive().await), 8);
+        }
+    });
+}

@@ -1,0 +1,247 @@
+//! Messages in the forms that subscribers ask for, and frames that are read on another thread, in virtual time.
+//!
+//! **Invariant:** what is made elsewhere comes in its place: order is checked with every message.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, run};
+use pendularm::actors::gateway::limits::{MAX_FRAGMENT_SIZES, READ_HERE};
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::protocol::catalog::Service;
+use pendularm::protocol::op::MAX_ARGS;
+use serde_json::{Value, json};
+use tokio::time::sleep;
+
+async fn subscribe_in_pieces(peer: &mut Peer, size: usize) -> Value {
+    peer.send(json!({"op": "subscribe", "topic": "/t", "fragment_size": size}))
+        .await;
+    peer.receive().await
+}
+
+/// The next message, put together if it comes in pieces; and the number of its fragments' id, 0 where there are none.
+async fn next_message(peer: &mut Peer) -> (Value, u64) {
+    let mut text = String::new();
+    loop {
+        let frame = peer.receive().await;
+        if frame["op"] != "fragment" {
+            assert!(text.is_empty(), "nothing comes between two pieces");
+            return (frame, 0);
+        }
+        text.push_str(frame["data"].as_str().unwrap());
+        if frame["num"].as_u64().unwrap() + 1 == frame["total"].as_u64().unwrap() {
+            let id = frame["id"].as_str().unwrap();
+            let number = id.strip_prefix("pendularm:").unwrap().parse().unwrap();
+            return (serde_json::from_str(&text).unwrap(), number);
+        }
+    }
+}
+
+#[test]
+fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_is_refused() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut peers = Vec::new();
+        for n in 0..MAX_FRAGMENT_SIZES {
+            let mut peer = gateway.connect(WIDE);
+            assert_eq!(
+                subscribe_in_pieces(&mut peer, 100 + n).await["level"],
+                "info"
+            );
+            peers.push(peer);
+        }
+        let mut late = gateway.connect(WIDE);
+        let refused = subscribe_in_pieces(&mut late, 99).await;
+        assert_eq!(refused["level"], "error");
+        assert!(
+            refused["msg"]
+                .as_str()
+                .unwrap()
+                .starts_with("fragment_size"),
+            "{refused}"
+        );
+        assert_eq!(
+            subscribe_in_pieces(&mut late, 100).await["level"],
+            "info",
+            "one that is in use"
+        );
+        late.send(json!({"op": "unsubscribe", "topic": "/t"})).await;
+        late.subscribe("/t").await;
+        late.send(json!({"op": "subscribe", "topic": "/other", "fragment_size": 99}))
+            .await;
+        assert_eq!(
+            late.receive().await["level"],
+            "info",
+            "another topic has its own"
+        );
+        peers[5]
+            .send(json!({"op": "unsubscribe", "topic": "/t"}))
+            .await;
+        peers[5].call("/none", 1).await;
+        peers[5].receive().await;
+        assert_eq!(
+            subscribe_in_pieces(&mut late, 99).await["level"],
+            "info",
+            "there is room again"
+        );
+    });
+}
+
+#[test]
+fn messages_keep_their_order_though_long_ones_are_cut_up_elsewhere() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        subscribe_in_pieces(&mut subscriber, 1000).await;
+        publisher.advertise("/t").await;
+        for n in 0..40 {
+            let pad = "x".repeat(if n % 2 == 0 { 100_000 } else { 10 });
+            let msg = json!({"n": n, "pad": pad});
+            publisher
+                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .await;
+        }
+        for n in 0..40 {
+            let (message, number) = next_message(&mut subscriber).await;
+            assert_eq!(message["msg"]["n"], n);
+            assert_eq!(number > 0, n % 2 == 0, "only the long ones come in pieces");
+        }
+    });
+}
+
+/// Fragments' ids count what has been cut up: no more than has come.
+#[test]
+fn nothing_is_cut_up_for_a_client_that_does_not_read() {
+    const MESSAGES: u64 = 100;
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
+        subscribe_in_pieces(&mut subscriber, 65_536).await;
+        publisher.advertise("/t").await;
+        for n in 0..MESSAGES {
+            let msg = json!({"n": n, "pad": "x".repeat(128 * 1024)});
+            publisher
+                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .await;
+        }
+        sleep(Duration::from_secs(60)).await;
+        let (mut came, mut cut_up, mut last) = (0, 0, 0);
+        while last + 1 < MESSAGES {
+            let (message, number) = next_message(&mut subscriber).await;
+            let n = message["msg"]["n"].as_u64().unwrap();
+            assert!(came == 0 || n > last, "{n} behind {last}");
+            last = n;
+            came += 1;
+            cut_up = cut_up.max(number);
+        }
+        assert_eq!(cut_up, came, "each that was cut up has come");
+        let dropped = gateway.gauges.messages_dropped();
+        assert_eq!(came + dropped, MESSAGES, "each has come or is counted");
+        assert!(dropped > MESSAGES / 4, "{dropped} were too many to be kept");
+    });
+}
+
+#[test]
+fn of_a_series_a_throttled_subscriber_hears_the_first_and_then_the_newest() {
+    const MESSAGES: u64 = 1200;
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        let throttled =
+            json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1000, "queue_length": 3});
+        subscriber.send(throttled).await;
+        subscriber.receive().await;
+        publisher.advertise("/t").await;
+        for round in 0..2 {
+            let first = round * MESSAGES;
+            let mut lines = String::new();
+            for n in first..first + MESSAGES {
+                let _ = writeln!(
+                    lines,
+                    "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{{\"n\":{n}}}}}"
+                );
+            }
+            publisher.send_text(&lines).await;
+            let last = first + MESSAGES;
+            for n in [first, last - 3, last - 2, last - 1] {
+                assert_eq!(subscriber.receive().await["msg"]["n"], n);
+            }
+            assert!(subscriber.hears_nothing_for(Duration::from_secs(60)).await);
+        }
+    });
+}
+
+/// Everything about a frame that is read elsewhere comes before everything about the next one.
+#[test]
+fn long_frames_are_answered_in_their_place() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        let pad = "[1e5,\"\\u00e9\"],".repeat(READ_HERE / 8);
+        for id in 0..20 {
+            let long = format!(
+                "{{\"op\":\"call_service\",\"service\":\"/none\",\"id\":{id},\"pad\":[{pad}0]}}\n"
+            );
+            client.send_text(&long).await;
+            client.call("/none", 100 + id).await;
+            // No JSON, though its braces balance.
+            client
+                .send_text(&format!("{{\"id\":{id},\"pad\":[{pad}]}}\n"))
+                .await;
+        }
+        for id in 0..20 {
+            assert_eq!(client.receive().await["id"], id);
+            assert_eq!(client.receive().await["id"], 100 + id);
+            let status = client.receive().await;
+            assert!(
+                status["msg"]
+                    .as_str()
+                    .unwrap()
+                    .starts_with("malformed frame"),
+                "{status}"
+            );
+        }
+    });
+}
+
+/// A node reads its arguments on its own thread, and so never megabytes of them: not even of members that it has no
+/// use for.
+#[test]
+fn a_node_never_gets_long_arguments() {
+    run(async {
+        let held = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&held).attach(&mut nodes, &[Service::SetParams], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let mut client = gateway.connect(WIDE);
+        let call = |args: Value| json!({"op": "call_service", "service": "/arm_sim/set_params", "id": 1, "args": args});
+        let (few, many) = (vec![1; 10], vec![1; MAX_ARGS]);
+        client
+            .send(call(json!({"lengths": few, "pad": many})))
+            .await;
+        sleep(Duration::from_secs(1)).await;
+        let arrived = held.0.borrow_mut().remove(0);
+        let args: Value = serde_json::from_str(arrived.arguments.payload().get()).unwrap();
+        assert_eq!(
+            args,
+            json!({"lengths": few}),
+            "the rest was never the service's"
+        );
+        drop(arrived);
+        assert_eq!(client.receive().await["id"], 1);
+        client.send(call(json!({"lengths": many}))).await;
+        let response = client.receive().await;
+        assert_eq!(
+            (&response["id"], &response["result"]),
+            (&json!(1), &json!(false))
+        );
+        assert!(
+            response["status"]
+                .as_str()
+                .unwrap()
+                .contains("args must be at most"),
+            "{response}"
+        );
+        assert_eq!(held.count(), 0);
+    });
+}

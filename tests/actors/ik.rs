@@ -1,0 +1,372 @@
+//! `/ik/solve` as its node does it, before an arm that stands wherever a test puts it.
+
+use std::cell::Cell;
+use std::f64::consts::PI;
+use std::rc::Rc;
+use std::sync::Arc;
+
+use crate::stage::{in_virtual_time, numbers};
+use actix::prelude::*;
+use pendularm::actors::ConnectionId;
+use pendularm::actors::arm::ik::{Ik, Solve, SolveError};
+use pendularm::actors::arm::sim::{ArmPose, Pose};
+use pendularm::actors::node::{Respond, ask};
+use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
+use pendularm::math::kinematics::{BOUNDARY, Target, forward};
+use pendularm::protocol::catalog::Service;
+use pendularm::protocol::op::Arguments;
+use serde_json::value::to_raw_value;
+use serde_json::{Value, json};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+
+/// An arm that stands still, and counts how often it is asked.
+struct StandIn<const N: usize> {
+    pose: Rc<Cell<Pose<N>>>,
+    asked: Rc<Cell<u32>>,
+}
+
+impl<const N: usize> Actor for StandIn<N> {
+    type Context = Context<Self>;
+}
+
+impl<const N: usize> Handler<ArmPose<N>> for StandIn<N> {
+    type Result = Pose<N>;
+
+    fn handle(&mut self, _: ArmPose<N>, _: &mut Context<Self>) -> Pose<N> {
+        self.asked.set(self.asked.get() + 1);
+        self.pose.get()
+    }
+}
+
+/// Takes the answers.
+struct Probe(UnboundedSender<Value>);
+
+impl Actor for Probe {
+    type Context = Context<Self>;
+}
+
+impl Handler<Respond> for Probe {
+    type Result = ();
+
+    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
+        let frame = serde_json::from_slice(&respond.frame.write()).unwrap();
+        self.0.send(frame).unwrap();
+    }
+}
+
+struct Bench<const N: usize> {
+    pose: Rc<Cell<Pose<N>>>,
+    asked: Rc<Cell<u32>>,
+    ik: Addr<Ik<N>>,
+    probe: Addr<Probe>,
+    answers: UnboundedReceiver<Value>,
+}
+
+impl<const N: usize> Bench<N> {
+    fn new(lengths: [f64; N], positions: [f64; N]) -> Self {
+        let pose = Rc::new(Cell::new(Pose {
+            lengths,
+            positions,
+            simulated: 0.0,
+        }));
+        let asked = Rc::default();
+        let arm = StandIn {
+            pose: Rc::clone(&pose),
+            asked: Rc::clone(&asked),
+        };
+        let (sender, answers) = unbounded_channel();
+        Self {
+            pose,
+            asked,
+            ik: Ik::new(arm.start().recipient()).start(),
+            probe: Probe(sender).start(),
+            answers,
+        }
+    }
+
+    fn stand(&self, positions: [f64; N]) {
+        self.pose.set(Pose {
+            positions,
+            ..self.pose.get()
+        });
+    }
+
+    async fn call(&mut self, args: Value) -> Value {
+        let (caller, ended) = Caller::new(
+            self.probe.clone().recipient(),
+            ConnectionId(1),
+            Service::Solve,
+            "/ik/solve".into(),
+            None,
+            Arc::default(),
+        );
+        let arguments = Arguments::Object(to_raw_value(&args).unwrap().into());
+        let mut routes = Nodes::default();
+        Ik::attach(&self.ik, &mut routes);
+        routes.services[&Service::Solve](ServiceCall {
+            service: Service::Solve,
+            arguments,
+            caller,
+        });
+        let answer = self.answers.recv().await.unwrap();
+        assert!(ended.await.is_err(), "the call ends with its answer");
+        answer
+    }
+
+    async fn solve(&mut self, args: Value) -> [f64; N] {
+        let answer = self.call(args).await;
+        assert_eq!(answer["result"], true, "{answer}");
+        assert_eq!(answer["status"], "");
+        assert_eq!(answer["values"].as_object().unwrap().len(), 1);
+        numbers(&answer["values"]["positions"]).try_into().unwrap()
+    }
+
+    async fn refusal(&mut self, args: Value) -> String {
+        let answer = self.call(args).await;
+        assert_eq!(answer["result"], false, "{answer}");
+        assert_eq!(answer["values"], json!({}));
+        answer["status"].as_str().unwrap().to_owned()
+    }
+
+    /// The distance between the target and where `q` puts the hand, as a share of the reach.
+    fn miss(&self, q: &[f64; N], x: f64, y: f64) -> f64 {
+        let lengths = self.pose.get().lengths;
+        let hand = forward(&lengths, q).position;
+        (hand.x - x).hypot(hand.y - y) / lengths.iter().sum::<f64>()
+    }
+}
+
+/// What a closed form may lose to rounding: a few units in the last place of each angle, far below the 1e-9 asked for.
+const ROUNDING: f64 = 1e-14;
+
+#[test]
+fn the_solution_puts_the_hand_on_the_target() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0, 0.5], [0.0; 2]);
+        let q = bench.solve(json!({"x": 0.6, "y": 0.7})).await;
+        assert!(bench.miss(&q, 0.6, 0.7) < ROUNDING);
+        let mut bench = Bench::new([1.0, 0.5, 0.25], [0.0; 3]);
+        let q = bench.solve(json!({"x": 0.6, "y": 0.7, "phi": 2.0})).await;
+        assert!(bench.miss(&q, 0.6, 0.7) < ROUNDING);
+        assert!((q.iter().sum::<f64>() - 2.0).abs() < ROUNDING);
+    });
+}
+
+#[test]
+fn lengths_are_asked_of_the_arm_at_every_call() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        bench.solve(json!({"x": 1.5, "y": 0.0})).await;
+        let pose = bench.pose.get();
+        bench.pose.set(Pose {
+            lengths: [2.0, 0.5],
+            ..pose
+        });
+        let q = bench.solve(json!({"x": 2.25, "y": 0.0})).await;
+        assert!(bench.miss(&q, 2.25, 0.0) < ROUNDING);
+        assert!(
+            bench
+                .refusal(json!({"x": 1.0, "y": 0.0}))
+                .await
+                .contains("1.5 m")
+        );
+        assert_eq!(bench.asked.get(), 3);
+    });
+}
+
+#[test]
+fn x_and_y_are_required_numbers_and_every_bad_one_is_named() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        for (args, sentence) in [
+            (json!({"y": 1}), "x is required"),
+            (json!({"x": 1}), "y is required"),
+            (json!({}), "x is required; y is required"),
+            (json!({"x": "1", "y": 1}), "x must be a number"),
+            (json!({"x": null, "y": 1}), "x must be a number"),
+            (json!({"x": true, "y": [1]}), "y must be a number"),
+        ] {
+            let why = bench.refusal(args).await;
+            assert!(why.contains(sentence), "{why}");
+        }
+        assert_eq!(bench.asked.get(), 0, "nobody is asked about nothing");
+    });
+}
+
+#[test]
+fn two_links_ignore_phi_even_a_malformed_one() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        let plain = bench.solve(json!({"x": 0.5, "y": 0.5})).await;
+        for phi in [json!(3), json!("north"), json!([1]), json!(null)] {
+            let with_phi = bench.solve(json!({"x": 0.5, "y": 0.5, "phi": phi})).await;
+            assert_eq!(with_phi, plain);
+        }
+    });
+}
+
+#[test]
+fn three_links_reject_a_malformed_phi_and_take_null_for_none() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0; 3], [0.1, 0.2, 0.3]);
+        let why = bench.refusal(json!({"x": 1, "y": 1, "phi": "north"})).await;
+        assert!(why.starts_with("phi must be a number"), "{why}");
+        let open = bench.solve(json!({"x": 1, "y": 1})).await;
+        let null = bench.solve(json!({"x": 1, "y": 1, "phi": null})).await;
+        assert_eq!(open, null);
+    });
+}
+
+#[test]
+fn what_is_beyond_the_reach_or_inside_the_fold_is_rejected_with_its_distance_and_the_limit() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([2.0, 0.5], [0.0; 2]);
+        let far = bench.refusal(json!({"x": 0.0, "y": 3.0})).await;
+        assert!(far.contains("3 m") && far.contains("2.5 m"), "{far}");
+        let near = bench.refusal(json!({"x": 1.0, "y": 0.0})).await;
+        assert!(near.contains("1 m") && near.contains("1.5 m"), "{near}");
+        let mut bench = Bench::new([1.0; 3], [0.0; 3]);
+        let far = bench.refusal(json!({"x": 3.01, "y": 0.0})).await;
+        assert!(far.contains("3.01 m") && far.contains("3 m"), "{far}");
+    });
+}
+
+/// At (2.5, 0) with the last link pointing back, the wrist would be at 3.5 m, where two links of 1 m do not get.
+#[test]
+fn a_phi_that_puts_the_wrist_out_of_reach_is_rejected_though_the_position_is_reachable() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0; 3], [0.0; 3]);
+        bench.solve(json!({"x": 2.5, "y": 0.0})).await;
+        let why = bench.refusal(json!({"x": 2.5, "y": 0.0, "phi": PI})).await;
+        assert!(why.contains("phi") && why.contains("3.5 m"), "{why}");
+    });
+}
+
+/// Up to 1e-9 of the reach outside counts as the boundary itself; ten times that does not.
+#[test]
+fn the_boundary_counts_as_reachable_from_a_hair_outside_too() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0, 0.4], [0.3, 0.0]);
+        let slack = BOUNDARY * 1.4;
+        for (distance, outwards) in [(1.4, 1.0), (0.6, -1.0)] {
+            for (x, y) in [(1.0, 0.0), (0.0, -1.0), (0.6, 0.8)] {
+                let exact = bench.solve(json!({"x": x * distance, "y": y * distance}));
+                assert!(bench_miss(exact.await, x * distance, y * distance) < ROUNDING);
+                let hair = distance + outwards * 0.9 * slack;
+                let q = bench.solve(json!({"x": x * hair, "y": y * hair})).await;
+                assert!(bench_miss(q, x * hair, y * hair) < BOUNDARY);
+                let outside = distance + outwards * 10.0 * slack;
+                bench
+                    .refusal(json!({"x": x * outside, "y": y * outside}))
+                    .await;
+            }
+        }
+    });
+
+    fn bench_miss(q: [f64; 2], x: f64, y: f64) -> f64 {
+        let hand = forward(&[1.0, 0.4], &q).position;
+        (hand.x - x).hypot(hand.y - y) / 1.4
+    }
+}
+
+#[test]
+fn solutions_are_wrapped_also_for_an_arm_that_has_wound_up() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0; 3], [1000.0, -2000.0, 3000.0]);
+        for (x, y) in [(1.0, 1.0), (-2.9, 0.0), (-1.0, -0.01), (0.0, 2.0)] {
+            let q = bench.solve(json!({"x": x, "y": y})).await;
+            assert!(q.iter().all(|q| -PI < *q && *q <= PI), "{q:?}");
+        }
+    });
+}
+
+#[test]
+fn of_the_two_elbows_the_one_nearer_to_the_present_pose_is_given() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0, 1.0], [0.0, 0.5]);
+        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] > 0.0);
+        bench.stand([1.5, -1.0]);
+        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] < 0.0);
+        // Stretched along the bearing of the target both are equally near.
+        bench.stand([PI / 4.0, 0.0]);
+        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] > 0.0);
+        // Whole turns make no difference.
+        bench.stand([1.5 + 4.0 * PI, -1.0 - 2.0 * PI]);
+        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] < 0.0);
+    });
+}
+
+#[test]
+fn three_links_without_phi_keep_the_present_orientation_where_that_is_possible() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0; 3], [0.2, 0.3, 0.4]);
+        let q = bench.solve(json!({"x": 1.0, "y": 1.0})).await;
+        assert!((q.iter().sum::<f64>() - 0.9).abs() < ROUNDING, "{q:?}");
+    });
+}
+
+/// Pointing back along -x, the last link would leave 3.9 m to the other two. Nearest is the orientation that leaves
+/// exactly 2 m: at the corner of the triangle with sides 2.9, 1 and 2, `cos θ = (2.9² + 1 - 4) / (2 · 2.9)`.
+#[test]
+fn three_links_without_phi_take_the_nearest_orientation_that_is_possible_otherwise() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0; 3], [PI - 0.1, 0.0, 0.0]);
+        let q = bench.solve(json!({"x": 2.9, "y": 0.0})).await;
+        let orientation: f64 = q.iter().sum();
+        let nearest = ((2.9_f64.powi(2) + 1.0 - 4.0) / (2.0 * 2.9)).acos();
+        // Two units in the last place of the cosine, divided by its slope of 0.36.
+        assert!((orientation - nearest).abs() < 1e-14, "{orientation}");
+        let why = bench.refusal(json!({"x": 3.1, "y": 0.0})).await;
+        assert!(!why.is_empty(), "there is none for what is out of reach");
+    });
+}
+
+#[test]
+fn a_node_that_asks_gets_what_a_client_gets() {
+    in_virtual_time(async {
+        let mut bench = Bench::new([1.0; 3], [0.0; 3]);
+        let named = bench.solve(json!({"x": 1, "y": 0.5, "phi": 1})).await;
+        let target = Target {
+            position: glam::dvec2(1.0, 0.5),
+            orientation: Some(1.0),
+        };
+        let solved = ask(&bench.ik.clone().recipient(), Solve(target)).await;
+        assert_eq!(solved, Ok(Ok(named)));
+    });
+}
+
+/// An arm that has ended.
+struct Gone;
+
+impl Actor for Gone {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        ctx.stop();
+    }
+}
+
+impl Handler<ArmPose<2>> for Gone {
+    type Result = Pose<2>;
+
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
+        unreachable!("it has ended")
+    }
+}
+
+#[test]
+fn without_an_arm_the_caller_is_told_so() {
+    in_virtual_time(async {
+        let gone = Gone.start();
+        while gone.connected() {
+            tokio::task::yield_now().await;
+        }
+        let ik = Ik::<2>::new(gone.recipient()).start();
+        let target = Target {
+            position: glam::DVec2::X,
+            orientation: None,
+        };
+        let answer = ask(&ik.recipient(), Solve(target)).await;
+        assert_eq!(answer, Ok(Err(SolveError::NoArm)));
+    });
+}

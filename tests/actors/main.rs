@@ -1,0 +1,42 @@
+//! The nodes in virtual time: what they say, to whom and when.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    dead_code,
+    unreachable_pub,
+    reason = "a test that panics has failed, and may say what it saw; numbers that are compared, written or cast exactly are exact; \
+              helpers are handed values that were made for them, and binaries that share them need not use every part"
+)]
+
+mod admission;
+mod arm_sim;
+mod arm_turns;
+mod connection;
+mod connection_end;
+mod encodings;
+mod ik;
+mod ik_action;
+mod ik_trial;
+mod integration;
+mod listener;
+mod memory;
+mod memory_kinds;
+mod pacing;
+mod registry;
+mod rosapi;
+mod slow;
+#[path = "../support/stage.rs"]
+mod stage;
+mod study;
+#[path = "../support/virtual_time.rs"]
+mod virtual_time;
+mod web;

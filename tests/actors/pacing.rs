@@ -1,0 +1,86 @@
+//! How fast a publisher may go: its next frame is looked at when what it published has been offered to every subscriber.
+//!
+//! On real sockets, since only those are written to in turns; in one thread, so that nothing depends on time.
+//!
+//! **Invariant:** what is counted is what had arrived when the publisher's next frame was handled.
+
+use std::cell::Cell;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::rc::Rc;
+use std::sync::Arc;
+
+use crate::virtual_time::{Gateway, Node, WIDE, settle};
+use actix::prelude::*;
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::protocol::catalog::Service;
+use serde_json::json;
+
+/// Subscribers: many more than are written to where the message is heard, and than have their turn at once.
+const SUBSCRIBERS: usize = 100;
+
+/// Subscribes over a socket; gives the client's end.
+async fn subscriber(gateway: &Gateway, listener: &TcpListener) -> TcpStream {
+    let mut client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    let (stream, _) = listener.accept().unwrap();
+    stream.set_nonblocking(true).unwrap();
+    let stream = tokio::net::TcpStream::from_std(stream).unwrap();
+    Connection::start_on(
+        stream,
+        gateway.registry.clone(),
+        Arc::clone(&gateway.gauges),
+    );
+    client
+        .write_all(b"{\"op\":\"subscribe\",\"topic\":\"/t\"}\n")
+        .unwrap();
+    client.set_nonblocking(true).unwrap();
+    while client.peek(&mut [0]).is_err() {
+        settle().await;
+    }
+    client.set_nonblocking(false).unwrap();
+    let mut status = String::new();
+    BufReader::with_capacity(1, &client)
+        .read_line(&mut status)
+        .unwrap();
+    client.set_nonblocking(true).unwrap();
+    client
+}
+
+#[test]
+fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
+    let msg = json!({"data": "x".repeat(40_000)});
+    // Passed on as it is, and read.
+    let spelled = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
+    let otherwise = format!("{{ \"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
+    for publish in [spelled, otherwise] {
+        System::new().block_on(async {
+            let subscribers = Rc::new(std::cell::RefCell::new(Vec::<TcpStream>::new()));
+            let arrived = Rc::new(Cell::new(usize::MAX));
+            let (seen, all) = (Rc::clone(&arrived), Rc::clone(&subscribers));
+            let mut nodes = Nodes::default();
+            let node = Node {
+                on_call: Box::new(move |mut call| {
+                    let all = all.borrow();
+                    seen.set(all.iter().filter(|one| one.peek(&mut [0]).is_ok()).count());
+                    call.caller.succeed(&json!({}));
+                }),
+                ..Node::default()
+            };
+            node.attach(&mut nodes, &[Service::Pause], &[]);
+            let gateway = Gateway::with(nodes).await;
+            let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+            for _ in 0..SUBSCRIBERS {
+                let one = subscriber(&gateway, &listener).await;
+                subscribers.borrow_mut().push(one);
+            }
+            let mut publisher = gateway.connect(WIDE);
+            publisher.advertise("/t").await;
+            settle().await;
+            let call = r#"{"op":"call_service","service":"/arm_sim/pause","id":1}"#;
+            publisher.send_text(&format!("{publish}{call}\n")).await;
+            assert_eq!(publisher.receive().await["id"], 1);
+            assert_eq!(arrived.get(), SUBSCRIBERS);
+        });
+    }
+}

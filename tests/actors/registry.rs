@@ -1,0 +1,266 @@
+//! The registry in virtual time: timeouts, interest, the limit of connections, what is withdrawn.
+//!
+//! **Invariant:** nodes are closures that note what they are told; nothing else stands in for the runtime.
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Duration;
+
+use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, run, settle};
+use pendularm::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_CONNECTIONS};
+use pendularm::actors::gateway::messages::Publish;
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::protocol::messages;
+use serde_json::{Value, json};
+use tokio::time::{Instant, sleep};
+
+/// Shared by a test and its nodes.
+type Log<T> = Rc<RefCell<Vec<T>>>;
+
+#[test]
+fn a_call_waits_ten_seconds_for_its_provider_or_as_long_as_its_caller_says() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        for (timeout, seconds) in [
+            (None, DEFAULT_TIMEOUT.as_secs_f64()),
+            (Some(2.5), 2.5),
+            (Some(600.0), 600.0),
+        ] {
+            let began = Instant::now();
+            let mut frame = json!({"op": "call_service", "service": "/s", "id": 1});
+            if let Some(timeout) = timeout {
+                frame["timeout"] = json!(timeout);
+            }
+            caller.send(frame).await;
+            let response = caller.receive().await;
+            assert_elapsed(began, Duration::from_secs_f64(seconds));
+            assert_eq!(response["result"], false);
+            assert!(
+                response["status"].as_str().unwrap().contains("timeout"),
+                "{response}"
+            );
+        }
+    });
+}
+
+/// Where the process has stood still, answer and timeout are heard of at the same moment, and the answer may be the first.
+#[test]
+fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_since() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        caller.call("/s", 1).await;
+        let call = provider.receive().await;
+        provider.answer(&call, json!({})).await;
+        tokio::time::advance(DEFAULT_TIMEOUT + Duration::from_secs(1)).await;
+        let response = caller.receive().await;
+        assert_eq!(response["result"], false, "{response}");
+        assert!(response["status"].as_str().unwrap().contains("timeout"));
+        assert_eq!(provider.receive().await["level"], "error");
+    });
+}
+
+#[test]
+fn an_answer_in_time_stops_the_clock() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        caller.call("/s", 1).await;
+        let call = provider.receive().await;
+        sleep(Duration::from_secs(9)).await;
+        provider.answer(&call, json!({})).await;
+        assert_eq!(caller.receive().await["result"], true);
+        assert!(caller.hears_nothing_for(Duration::from_secs(60)).await);
+    });
+}
+
+#[test]
+fn a_caller_that_goes_leaves_no_call_behind() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        provider.provide("/s").await;
+        caller.call("/s", 1).await;
+        let call = provider.receive().await;
+        drop(caller);
+        sleep(Duration::from_secs(60)).await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        provider.answer(&call, json!({})).await;
+        assert_eq!(
+            provider.receive().await["level"],
+            "error",
+            "the call is stale"
+        );
+    });
+}
+
+#[test]
+fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
+    run(async {
+        let heard: Log<(Topic, bool)> = Rc::default();
+        let log = Rc::clone(&heard);
+        let node = Node {
+            on_interest: Box::new(move |interest| {
+                log.borrow_mut().push((interest.topic, interest.wanted));
+            }),
+            ..Node::default()
+        };
+        let mut nodes = Nodes::default();
+        node.attach(&mut nodes, &[], &[Topic::JointStates, Topic::Clock]);
+        let gateway = Gateway::with(nodes).await;
+        let (mut first, mut second) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        first.subscribe("/joint_states").await;
+        first.subscribe("/joint_states").await;
+        second.subscribe("/joint_states").await;
+        second.subscribe("/clock").await;
+        second.subscribe("/somebody_elses").await;
+        first
+            .send(json!({"op": "unsubscribe", "topic": "/joint_states"}))
+            .await;
+        first
+            .send(json!({"op": "unsubscribe", "topic": "/joint_states"}))
+            .await;
+        settle().await;
+        let wanted = [(Topic::JointStates, true), (Topic::Clock, true)];
+        assert_eq!(*heard.borrow(), wanted);
+        heard.borrow_mut().clear();
+        drop(second);
+        settle().await;
+        let mut ended = heard.borrow().clone();
+        ended.sort_unstable();
+        assert_eq!(ended, [(Topic::JointStates, false), (Topic::Clock, false)]);
+    });
+}
+
+#[test]
+fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_and_not_the_listener()
+{
+    run(async {
+        let heard: Log<String> = Rc::default();
+        let log = Rc::clone(&heard);
+        let node = Node {
+            on_message: Box::new(move |message| {
+                log.borrow_mut().push(message.msg.get().to_owned());
+            }),
+            ..Node::default()
+        };
+        let mut nodes = Nodes::default();
+        node.attach(&mut nodes, &[], &[Topic::JointTrajectory]);
+        let gateway = Gateway::with(nodes).await;
+        let mut client = gateway.connect(WIDE);
+        client.subscribe("/joint_trajectory").await;
+        let msg = json!({"points": []});
+        gateway.registry.do_send(Publish {
+            topic: Topic::JointTrajectory,
+            frame: messages::publish("/joint_trajectory", &msg).into(),
+        });
+        assert_eq!(client.receive().await["msg"], msg);
+        settle().await;
+        let heard = heard.borrow();
+        assert!(heard.is_empty(), "nodes ask one another by messages");
+    });
+}
+
+/// The sender's next frame waits until the node is done with its message.
+#[test]
+fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
+    run(async {
+        let held = Rc::new(RefCell::new(Vec::new()));
+        let log = Rc::clone(&held);
+        let node = Node {
+            on_message: Box::new(move |message| log.borrow_mut().push(message)),
+            ..Node::default()
+        };
+        let mut nodes = Nodes::default();
+        node.attach(&mut nodes, &[], &[Topic::JointTrajectory]);
+        let gateway = Gateway::with(nodes).await;
+        let (mut client, mut other) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        client.publish("/joint_trajectory", 1).await;
+        client.publish("/joint_trajectory", 2).await;
+        client.call("/none", 1).await;
+        assert!(client.hears_nothing_for(Duration::from_secs(60)).await);
+        assert_eq!(held.borrow().len(), 1);
+        other.call("/none", 2).await;
+        assert_eq!(other.receive().await["id"], 2, "nobody else waits");
+        held.borrow_mut().clear();
+        settle().await;
+        assert_eq!(held.borrow().len(), 1);
+        held.borrow_mut().clear();
+        assert_eq!(client.receive().await["id"], 1);
+    });
+}
+
+#[test]
+fn a_service_without_a_node_is_refused() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        for service in Service::ALL {
+            client.call(service.name(), 1).await;
+            let response = client.receive().await;
+            assert_eq!(response["result"], false, "{response}");
+            assert!(
+                response["status"]
+                    .as_str()
+                    .unwrap()
+                    .contains(service.name()),
+                "{response}"
+            );
+        }
+    });
+}
+
+#[test]
+fn one_client_too_many_is_told_so_and_closed_and_there_is_room_again() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut clients: Vec<_> = (0..MAX_CONNECTIONS)
+            .map(|_| gateway.connect(1024))
+            .collect();
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), MAX_CONNECTIONS as u64);
+        let mut late = gateway.connect(1024);
+        let frames: Vec<Value> = late.rest().await;
+        assert_eq!(frames.len(), 1);
+        assert_eq!(frames[0]["level"], "error");
+        let msg = frames[0]["msg"].as_str().unwrap();
+        assert!(msg.contains(&MAX_CONNECTIONS.to_string()), "{msg}");
+        clients.truncate(MAX_CONNECTIONS - 1);
+        settle().await;
+        let mut next = gateway.connect(1024);
+        next.call("/none", 1).await;
+        assert_eq!(next.receive().await["id"], 1);
+        assert_eq!(gateway.gauges.connections(), MAX_CONNECTIONS as u64);
+    });
+}
+
+#[test]
+fn a_client_that_comes_and_goes_a_thousand_times_leaves_nothing_behind() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut watcher = gateway.connect(WIDE);
+        watcher.subscribe("/t").await;
+        for n in 0..1000 {
+            let mut client = gateway.connect(WIDE);
+            client.subscribe("/t").await;
+            client.advertise("/t").await;
+            client.provide("/s").await;
+            client.publish("/t", n).await;
+            assert_eq!(watcher.receive().await["msg"]["n"], n);
+        }
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        watcher.call("/s", 1).await;
+        assert!(
+            watcher.receive().await["status"]
+                .as_str()
+                .unwrap()
+                .contains("no provider")
+        );
+    });
+}

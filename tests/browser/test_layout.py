@@ -1,0 +1,83 @@
+"""The layout: a lesson fits a desktop's first screen, a telephone has the arm first, and nobody is left out."""
+
+import pathlib
+
+from stage import PageTest
+
+AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
+PANELS = ("plots", "stability", "error", "compare", "tasks")
+PHONE = {"width": 390, "height": 800, "density": 2, "touch": True}
+
+
+class Access:
+    def test_axe_finds_nothing_in_any_panel(self):
+        self.page.send("Runtime.evaluate", {"expression": AXE.read_text()})
+        for panel in PANELS:
+            self.tab(panel)
+            found = self.page.run("axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21a', 'wcag21aa', 'wcag22aa', 'best-practice'] })"
+                                  ".then(({ violations }) => violations.map(({ id, nodes }) => [id, ...nodes.slice(0, 3).map((one) => one.html.slice(0, 120) + ' ' + one.failureSummary)]))")
+            self.assertEqual(found, [], panel)
+        self.page.complaints.clear()  # those of the inspector itself
+        self.keep(f"layout-{type(self).__name__}", whole=True)
+
+
+class Desktop(Access, PageTest):
+    def box(self, selector):
+        return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
+
+    def test_the_first_screen_holds_a_lesson(self):
+        for selector in ("#lesson-text", "#arm", "#notice", "#transport", "#history", "#plot-phase", "#methods", "#timestep-field", "#kd-fields", "#masses-fields"):
+            self.assertLessEqual(self.box(selector)[3], 900, selector)
+        for panel, control in (("compare", "#compare-form button[type=submit]"), ("tasks", "#trial-start"), ("error", "#ladder"), ("stability", "#region")):
+            self.tab(panel)
+            self.assertLessEqual(self.box(control)[3], 900, control)
+
+    def test_a_notice_does_not_cover_the_arm(self):
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
+        self.page.click("#servo")
+        self.page.until("!document.querySelector('#notice').hidden")
+        notice, arm = self.box("#notice"), self.box("#arm")
+        self.assertGreaterEqual(notice[1], arm[3])
+
+
+class DesktopDark(Access, PageTest):
+    view = {"dark": True}
+
+
+class ThreeLinks(Access, PageTest):
+    links = 3
+
+    def test_every_joints_field_is_in_one_line_with_its_slider_or_below_it(self):
+        tops = self.page.run("[...document.querySelectorAll('#kp-fields .field')].map((one) => Math.round(one.getBoundingClientRect().top))")
+        self.assertEqual(len(set(tops)), 1, "side by side")
+        self.assertLessEqual(self.page.run("document.querySelector('#lengths-fields').getBoundingClientRect().bottom"), 900, "without scrolling")
+        self.assertEqual(self.page.run("(() => { const e = document.querySelector('#controls'); return e.scrollHeight - e.clientHeight; })()"), 0)
+        captions = self.page.run("[...document.querySelectorAll('#plots figcaption')].every((one) => one.scrollWidth <= one.clientWidth)")
+        self.assertTrue(captions)
+
+
+class Phone(Access, PageTest):
+    view = PHONE
+
+    def test_arm_integrator_and_servo_come_first(self):
+        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#lessons', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
+        self.assertEqual(tops, sorted(tops))
+        self.assertEqual(self.page.run("document.documentElement.scrollWidth"), 390)
+
+    def test_what_is_touched_is_44_pixels_high(self):
+        small = self.page.run("[...document.querySelectorAll('button, select, input:not([type=checkbox], [type=radio]), summary, .segment')]"
+                              ".filter((one) => one.checkVisibility()).map((one) => [one.id || one.outerHTML.slice(0, 80), one.getBoundingClientRect().height])"
+                              ".filter(([, height]) => height < 44)")
+        self.assertEqual(small, [])
+
+    def test_the_setpoint_is_placed_by_touch(self):
+        self.runtime.call("/pid_controller/enable", data=True)
+        self.page.run("document.querySelector('input[name=drag][value=setpoint]').click()")
+        self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)))
+        self.wait(lambda: sum((a - b) ** 2 for a, b in zip(self.runtime.tip(), (-0.4, 1.3))) < 0.02 ** 2, "tip at the setpoint")
+        self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
+
+
+class PhoneDark(Access, PageTest):
+    view = {**PHONE, "dark": True}
+    links = 3

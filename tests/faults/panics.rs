@@ -1,0 +1,268 @@
+//! A panic ends what it happened in, or everything: each case, with a panic that nobody but a test can cause.
+//!
+//! **Invariant:** the hook is the process's own, so these tests share one that notes what it is told and ends nothing.
+
+use std::pin::Pin;
+use std::sync::{Arc, Mutex, OnceLock};
+use std::task::{self, Poll};
+use std::time::Duration;
+
+use crate::virtual_time::{Gateway, Node, WIDE, run, settle};
+use actix::prelude::*;
+use bytes::Bytes;
+use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::node::Publish;
+use pendularm::actors::panics::{self, contain, contained};
+use pendularm::actors::wire::Caller;
+use pendularm::protocol::catalog::{Service, Topic};
+use serde_json::json;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt, DuplexStream, ReadBuf};
+use tokio::time::timeout;
+
+static ENDS: OnceLock<Mutex<Vec<String>>> = OnceLock::new();
+
+/// What would have ended the process so far.
+fn ends() -> Vec<String> {
+    let ends = ENDS.get_or_init(|| {
+        panics::end_with(|what| {
+            ENDS.get().unwrap().lock().unwrap().push(what.to_owned());
+        });
+        Mutex::default()
+    });
+    ends.lock().unwrap().clone()
+}
+
+fn has_ended_by(words: &str) -> bool {
+    ends().iter().any(|what| what.contains(words))
+}
+
+/// A stream that panics as soon as it is told something.
+struct Trap {
+    stream: DuplexStream,
+    in_reading: bool,
+}
+
+impl AsyncRead for Trap {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        assert!(
+            !(self.in_reading && buffer.filled().ends_with(b"trap\n")),
+            "in reading"
+        );
+        polled
+    }
+}
+
+impl AsyncWrite for Trap {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<std::io::Result<usize>> {
+        assert!(self.in_reading, "in writing");
+        Pin::new(&mut self.stream).poll_write(cx, bytes)
+    }
+
+    fn poll_flush(self: Pin<&mut Self>, _: &mut task::Context<'_>) -> Poll<std::io::Result<()>> {
+        Poll::Ready(Ok(()))
+    }
+
+    fn poll_shutdown(
+        mut self: Pin<&mut Self>,
+        cx: &mut task::Context<'_>,
+    ) -> Poll<std::io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}
+
+/// The client is gone, what it registered is withdrawn, and the others are served.
+#[test]
+fn a_panic_in_what_reads_or_writes_for_a_client_ends_that_client_alone() {
+    ends();
+    run(async {
+        for in_reading in [true, false] {
+            let gateway = Gateway::bare().await;
+            let mut other = gateway.connect(WIDE);
+            let (mut ours, stream) = tokio::io::duplex(WIDE);
+            let trap = Trap { stream, in_reading };
+            Connection::start_on(trap, gateway.registry.clone(), Arc::clone(&gateway.gauges));
+            let frames = json!({"op": "advertise_service", "service": "/s"});
+            ours.write_all(format!("{frames}\n").as_bytes())
+                .await
+                .unwrap();
+            settle().await;
+            let _ = ours.write_all(b"trap\n").await;
+            let mut rest = Vec::new();
+            let closed = timeout(Duration::from_secs(60), ours.read_to_end(&mut rest)).await;
+            assert!(closed.is_ok(), "the stream ends");
+            settle().await;
+            assert_eq!(gateway.gauges.connections(), 1);
+            other.call("/s", 1).await;
+            let response = other.receive().await;
+            assert!(
+                response["status"].as_str().unwrap().contains("no provider"),
+                "{response}"
+            );
+        }
+    });
+    assert!(!has_ended_by("in reading") && !has_ended_by("in writing"));
+}
+
+/// Bytes whose end is a panic: they are dropped where an outbox is full.
+struct Explosive(Vec<u8>, &'static str);
+
+impl AsRef<[u8]> for Explosive {
+    fn as_ref(&self) -> &[u8] {
+        &self.0
+    }
+}
+
+impl Drop for Explosive {
+    fn drop(&mut self) {
+        assert!(std::thread::panicking(), "{}", self.1);
+    }
+}
+
+#[test]
+fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
+    ends();
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut deaf, mut other) = (gateway.connect(1024), gateway.connect(WIDE));
+        deaf.subscribe("/joint_states").await;
+        other.subscribe("/clock").await;
+        for n in 0..7 {
+            // The second is the first that has to make room.
+            let bytes = vec![b' '; 1_000_000];
+            let frame = if n == 1 {
+                Bytes::from_owner(Explosive(bytes, "in the actor"))
+            } else {
+                Bytes::from(bytes)
+            };
+            gateway.registry.do_send(Publish {
+                topic: Topic::JointStates,
+                frame: frame.into(),
+            });
+            settle().await;
+            // One is in writing and four wait; the sixth pushes out one.
+            let connections = if n < 5 { 2 } else { 1 };
+            assert_eq!(gateway.gauges.connections(), connections, "after {n}");
+        }
+        let closed = timeout(Duration::from_secs(60), deaf.drain()).await;
+        assert!(closed.is_ok(), "the stream ends");
+        other.call("/none", 1).await;
+        assert_eq!(other.receive().await["id"], 1);
+    });
+    assert!(!has_ended_by("in the actor"));
+}
+
+/// A computation that panics with its caller unanswered.
+struct Panicking(#[expect(dead_code, reason = "dropped by the panic, which answers it")] Caller);
+
+impl Computation for Panicking {
+    fn advance(&mut self, _: std::time::Instant) -> Progress {
+        panic!("in a computation");
+    }
+
+    fn refuse(&mut self, _: &str) {}
+}
+
+#[test]
+fn a_panic_in_a_computation_is_answered_and_its_worker_works_on() {
+    ends();
+    System::new().block_on(async {
+        let workers = WorkerPool::start(1).unwrap();
+        let pool = workers.clone();
+        let mut nodes = Nodes::default();
+        let node = Node {
+            on_call: Box::new(move |call| {
+                let of = call.caller.connection();
+                pool.submit(of, Box::new(Panicking(call.caller)));
+            }),
+            ..Node::default()
+        };
+        node.attach(&mut nodes, &[Service::IntegrationStep], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let mut client = gateway.connect(WIDE);
+        for id in 0..3 {
+            client.call("/arm_sim/integration_step", id).await;
+            let response = client.receive().await;
+            assert_eq!(
+                (&response["id"], &response["result"]),
+                (&json!(id), &json!(false))
+            );
+            assert!(
+                response["status"]
+                    .as_str()
+                    .unwrap()
+                    .contains("ended before it answered")
+            );
+        }
+        workers.close("the end");
+    });
+    assert!(!has_ended_by("in a computation"));
+}
+
+#[test]
+fn a_panic_in_a_node_ends_the_process_with_one_line_that_says_where() {
+    ends();
+    run(async {
+        let mut nodes = Nodes::default();
+        let node = Node {
+            on_call: Box::new(|_| panic!("in a node\nforged line")),
+            ..Node::default()
+        };
+        node.attach(&mut nodes, &[Service::Pause], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let mut client = gateway.connect(WIDE);
+        client.call("/arm_sim/pause", 1).await;
+        settle().await;
+    });
+    let ends = ends();
+    let line = ends.iter().find(|what| what.contains("in a node")).unwrap();
+    assert!(line.contains(file!()) && !line.contains('\n'), "{line}");
+}
+
+#[test]
+fn a_panic_in_the_registry_ends_the_process() {
+    ends();
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut client = gateway.connect(WIDE);
+        client.subscribe("/joint_states").await;
+        // The last copy of a message is dropped by the registry where nobody subscribes to it.
+        let frame = Bytes::from_owner(Explosive(vec![b'x'; 10], "in the registry"));
+        gateway.registry.do_send(Publish {
+            topic: Topic::Clock,
+            frame: frame.into(),
+        });
+        settle().await;
+    });
+    assert!(has_ended_by("in the registry"), "{:?}", ends());
+}
+
+#[test]
+fn what_contains_a_panic_says_where_it_was() {
+    ends();
+    let outer = contain(|| {
+        let inner = contain(|| panic!("within"));
+        assert!(inner.unwrap_err().to_string().contains("within"));
+        7
+    });
+    assert_eq!(outer.unwrap(), 7);
+    run(async {
+        let task = contained(async {
+            settle().await;
+            panic!("in a task");
+        });
+        let panic: Result<(), _> = task.await;
+        assert!(panic.unwrap_err().to_string().contains("in a task"));
+    });
+    assert!(!has_ended_by("within") && !has_ended_by("in a task"));
+}

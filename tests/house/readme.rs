@@ -1,0 +1,354 @@
+//! The papers of the house say what is so: the tables of README and docs/ against the Makefile, the manifest and the catalog.
+//!
+//! **Invariant:** each check reads both sides, so that neither can change alone.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use crate::limits::sources;
+use crate::papers::{table, text};
+use pendularm::protocol::catalog::{Field, Rosapi, Service, Topic};
+
+/// What stands between the code marks of a cell, in order.
+fn codes(cell: &str) -> Vec<&str> {
+    cell.split('`').skip(1).step_by(2).collect()
+}
+
+#[test]
+fn the_papers_list_the_targets_that_make_help_lists() {
+    let makefile = text("Makefile");
+    let documented: BTreeSet<String> = makefile
+        .lines()
+        .filter(|line| line.contains(":") && line.contains("## ") && !line.starts_with(['\t', '#']))
+        .filter_map(|line| line.split_once(':'))
+        .map(|(target, _)| format!("make {target}"))
+        .collect();
+    let phony = makefile
+        .lines()
+        .find_map(|line| line.strip_prefix(".PHONY: "))
+        .unwrap();
+    let phony: BTreeSet<String> = phony
+        .split(' ')
+        .map(|target| format!("make {target}"))
+        .collect();
+    assert_eq!(documented, phony, "a target without help, or not phony");
+    let readme: BTreeSet<String> = table(&text("docs/development.md"), "target")
+        .iter()
+        .map(|row| codes(&row[0])[0].to_owned())
+        .collect();
+    assert_eq!(readme, documented);
+}
+
+#[test]
+fn make_alone_shows_the_help() {
+    let make = |arguments: &[&str]| {
+        let output = Command::new("make")
+            .args(arguments)
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            // Under `make test` the outer make hands its own flags down.
+            .env_remove("MAKEFLAGS")
+            .env_remove("MAKELEVEL")
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let help = make(&[]);
+    assert_eq!(help, make(&["help"]));
+    for row in table(&text("docs/development.md"), "target") {
+        assert!(
+            help.contains(codes(&row[0])[0]),
+            "{row:?} is not in\n{help}"
+        );
+    }
+}
+
+#[test]
+fn the_papers_have_a_reason_for_every_dependency() {
+    let manifest = text("Cargo.toml");
+    let mut section = "";
+    let mut dependencies = BTreeSet::new();
+    for line in manifest.lines() {
+        if line.starts_with('[') {
+            section = line;
+        } else if section.ends_with("dependencies]")
+            && let Some((name, _)) = line.split_once(" =")
+        {
+            dependencies.insert(name.to_owned());
+        }
+    }
+    let mut named = BTreeSet::new();
+    for row in table(&text("docs/development.md"), "crate") {
+        assert!(row[1].len() > 10, "no reason: {row:?}");
+        named.insert(codes(&row[0])[0].to_owned());
+    }
+    assert_eq!(named, dependencies);
+}
+
+#[test]
+fn the_papers_list_every_topic_with_its_type_and_owner() {
+    let rows = table(&text("docs/protocol.md"), "topic");
+    assert_eq!(rows.len(), Topic::ALL.len());
+    for (row, topic) in rows.iter().zip(Topic::ALL) {
+        assert_eq!(codes(&row[0]), [topic.name()]);
+        assert_eq!(codes(&row[1]), [topic.type_name()], "{}", topic.name());
+        let anybody = row[2].starts_with("anybody");
+        assert!(
+            anybody || codes(&row[2]) == [topic.owner().name()],
+            "{}",
+            topic.name()
+        );
+    }
+}
+
+#[test]
+fn the_papers_list_every_service_with_its_fields_in_order() {
+    let rows = table(&text("docs/protocol.md"), "service");
+    let listed: BTreeSet<&str> = rows.iter().flat_map(|row| codes(&row[0])).collect();
+    let served: BTreeSet<&str> = Service::ALL.iter().map(|service| service.name()).collect();
+    assert_eq!(listed, served);
+    for row in &rows {
+        let service = Service::from_name(codes(&row[0])[0]).unwrap();
+        let expected: Vec<(&str, bool)> = service
+            .fields()
+            .iter()
+            .map(|field| (field.name, field.required))
+            .collect();
+        let written: Vec<(&str, bool)> = codes(&row[1])
+            .into_iter()
+            .map(|name| (name, !row[1].contains(&format!("*`{name}`*"))))
+            .collect();
+        assert_eq!(written, expected, "{}", service.name());
+    }
+}
+
+#[cfg(feature = "web")]
+#[test]
+fn the_papers_list_every_question_of_rosapi_with_its_fields_in_order() {
+    let rows = table(&text("docs/protocol.md"), "rosapi");
+    assert_eq!(rows.len(), Rosapi::ALL.len());
+    for (row, question) in rows.iter().zip(Rosapi::ALL) {
+        let service = Service::Rosapi(question);
+        assert_eq!(codes(&row[0]), [question.short_name()]);
+        let names = |fields: &[Field]| -> Vec<&str> { fields.iter().map(|one| one.name).collect() };
+        assert_eq!(codes(&row[1]), names(service.fields()), "{question:?}");
+        let values = names(service.response_fields());
+        assert_eq!(codes(&row[2]), values, "{question:?}");
+    }
+}
+
+#[test]
+fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
+    let help = Command::new(env!("CARGO_BIN_EXE_pendularm"))
+        .arg("--help")
+        .output()
+        .unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let rows = table(&text("README.md"), "option");
+    for row in &rows {
+        let (option, variable) = (codes(&row[0])[0], codes(&row[1])[0]);
+        let line = help.lines().find(|line| {
+            line.contains(&format!("{option} <")) || line.contains(&format!("{option}[=<"))
+        });
+        let line = line.unwrap_or_else(|| panic!("{option} is not in the help"));
+        assert!(line.contains(&format!("[env: {variable}]")), "{line}");
+    }
+    assert_eq!(help.matches("[env: ").count(), rows.len());
+}
+
+#[test]
+fn the_licence_files_are_those_that_the_manifest_names() {
+    assert!(text("Cargo.toml").contains("license = \"MIT OR Apache-2.0\""));
+    assert!(text("LICENSE-MIT").contains("Permission is hereby granted, free of charge"));
+    assert!(text("LICENSE-APACHE").contains("Apache License"));
+}
+
+/// `rust-version` is a promise to whoever has an older compiler than ours: no package may break it.
+#[test]
+fn no_dependency_asks_for_a_newer_compiler_than_we_do() {
+    let run = |command: &mut Command| {
+        let output = command
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        String::from_utf8(output.stdout).unwrap()
+    };
+    // Only packages for this platform are sure to be at hand after a build.
+    let compiler = run(Command::new("rustc").arg("-vV"));
+    let host = compiler
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "))
+        .unwrap();
+    let metadata = run(Command::new(env!("CARGO"))
+        .args(["metadata", "--locked", "--offline", "--format-version", "1"])
+        .args(["--filter-platform", host]));
+    let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
+    let version = |text: &str| -> Vec<u32> {
+        text.split('.')
+            .map(|part| part.parse().unwrap())
+            .chain([0])
+            .take(3)
+            .collect()
+    };
+    let ours = version(env!("CARGO_PKG_RUST_VERSION"));
+    let packages = metadata["packages"].as_array().unwrap();
+    assert!(packages.len() > 10, "{} packages", packages.len());
+    for package in packages {
+        if let Some(theirs) = package["rust_version"].as_str() {
+            assert!(
+                version(theirs) <= ours,
+                "{} asks for Rust {theirs}",
+                package["name"]
+            );
+        }
+    }
+}
+
+/// The file of a module, or of the module that an item is in, and the item's name.
+fn place_of(path: &str) -> Option<(String, Option<String>)> {
+    let mut module = path.replace("::", "/");
+    let mut item = None;
+    loop {
+        let files = [format!("src/{module}.rs"), format!("src/{module}/mod.rs")];
+        let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+        if let Some(file) = files.into_iter().find(|file| root.join(file).exists()) {
+            return Some((file, item));
+        }
+        let (before, last) = module.rsplit_once('/')?;
+        if item.is_some() {
+            return None;
+        }
+        item = Some(last.to_owned());
+        module = before.to_owned();
+    }
+}
+
+#[test]
+fn every_word_of_the_glossary_is_carried_by_what_it_names() {
+    let rows = table(&text("docs/glossary.md"), "word | means");
+    assert!(rows.len() > 25, "{} words", rows.len());
+    for row in rows {
+        for path in codes(&row[2])
+            .into_iter()
+            .filter(|path| path.contains("::"))
+        {
+            let (file, item) = place_of(path).unwrap_or_else(|| panic!("{path}: no such module"));
+            if let Some(item) = item {
+                let source = text(&file);
+                let is_there = ["struct", "enum", "const", "fn", "trait"]
+                    .iter()
+                    .any(|kind| source.contains(&format!("pub {kind} {item}")));
+                assert!(is_there, "{file} has no {item}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_path_that_the_architecture_names_exists() {
+    let paper = text("ARCHITECTURE.md");
+    let folders = [
+        "src/", "tests/", "docs/", "benches/", "scripts/", "page/", "fuzz/", "client/",
+    ];
+    let named: BTreeSet<&str> = codes(&paper)
+        .into_iter()
+        .filter(|code| folders.iter().any(|folder| code.starts_with(folder)) && !code.contains('*'))
+        .collect();
+    assert!(named.len() > 20, "{} paths", named.len());
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    for path in named {
+        assert!(root.join(path).exists(), "ARCHITECTURE.md names {path}");
+    }
+}
+
+/// Names such as `Registry::fan_out` in the drawing of a frame's way.
+#[test]
+fn every_function_on_the_way_of_a_frame_exists() {
+    let paper = text("ARCHITECTURE.md");
+    let (_, drawing) = paper.split_once("## The way of a published frame").unwrap();
+    let (_, drawing) = drawing.split_once("```mermaid").unwrap();
+    let (drawing, _) = drawing.split_once("```").unwrap();
+    let is_part = |one: char| one.is_alphanumeric() || one == '_' || one == ':';
+    let named: BTreeSet<(&str, &str)> = drawing
+        .split(|one| !is_part(one))
+        .filter_map(|word| word.trim_end_matches(':').rsplit_once("::"))
+        .collect();
+    assert!(named.len() > 15, "{named:?}");
+    let sources = crate::tree::rust_files("src");
+    for (owner, function) in named {
+        let is_type = owner.starts_with(char::is_uppercase);
+        let is_there = sources.iter().any(|path| {
+            let source = std::fs::read_to_string(path).unwrap();
+            let folder = path.to_str().unwrap();
+            let is_owner = if is_type {
+                source.contains(&format!("impl {owner} {{"))
+                    || source.contains(&format!("trait {owner} {{"))
+            } else {
+                folder.ends_with(&format!("/{owner}.rs"))
+                    || folder.ends_with(&format!("/{owner}/mod.rs"))
+            };
+            let is_defined = ["(", "<"]
+                .iter()
+                .any(|next| source.contains(&format!("fn {function}{next}")));
+            is_owner && is_defined
+        });
+        // A function may be passed on by its module.
+        let is_passed_on = !is_type
+            && sources.iter().any(|path| {
+                path.to_str()
+                    .unwrap()
+                    .ends_with(&format!("/{owner}/mod.rs"))
+                    && std::fs::read_to_string(path)
+                        .unwrap()
+                        .lines()
+                        .any(|line| line.starts_with("pub use") && line.contains(function))
+            });
+        assert!(is_there || is_passed_on, "{owner}::{function}");
+    }
+}
+
+/// In the drawings: paths by their slash, actors and messages by their capitals.
+#[test]
+fn whatever_the_architectures_drawings_name_exists() {
+    let paper = text("ARCHITECTURE.md");
+    let drawings: Vec<&str> = paper.split("```mermaid\n").skip(1).collect();
+    assert!(drawings.len() >= 2);
+    let sources: String = sources()
+        .iter()
+        .map(|path| std::fs::read_to_string(path).unwrap())
+        .collect();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut named = 0;
+    for drawing in drawings {
+        let drawing = drawing.split("```").next().unwrap().replace("<br/>", " ");
+        // A label is between quotes; its type names and paths stand between spaces and commas.
+        let labels = drawing.split('"').skip(1).step_by(2);
+        for word in labels.flat_map(|label| label.split([' ', ','])) {
+            if word.contains('/') {
+                assert!(root.join(word).exists(), "ARCHITECTURE.md draws {word}");
+            } else if word.starts_with(char::is_uppercase) && word.contains(char::is_lowercase) {
+                // WebSocket is no type of ours, but the protocol's name.
+                let is_ours = ["struct", "enum"]
+                    .iter()
+                    .any(|kind| sources.contains(&format!("{kind} {word}")));
+                assert!(
+                    is_ours || word == "WebSocket",
+                    "ARCHITECTURE.md draws {word}"
+                );
+            } else {
+                continue;
+            }
+            named += 1;
+        }
+    }
+    assert!(named > 40, "{named} names");
+}

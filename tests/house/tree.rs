@@ -1,0 +1,201 @@
+//! What holds for every file of the tree.
+//!
+//! **Invariant:** these checks look at every file that is written by hand, also at those that are added later.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What is made by tools or by somebody else, by its name anywhere in the tree.
+const NOT_OURS: [&str; 7] = [
+    ".git",
+    "target",
+    "vendor",
+    ".cargo",
+    ".venv",
+    "node_modules",
+    "submission.tar.gz",
+];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Every file below `folder` that is ours.
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        // `make report` writes there; `src/report` is ours. What the fuzz targets begin with is any bytes.
+        let made = [root().join("report"), root().join("fuzz/seeds")].contains(&path);
+        if made
+            || NOT_OURS
+                .iter()
+                .any(|name| path.file_name().unwrap() == *name)
+        {
+            continue;
+        }
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else {
+            found.push(path);
+        }
+    }
+    found
+}
+
+pub(crate) fn rust_files(folder: &str) -> Vec<PathBuf> {
+    let mut files = files(&root().join(folder));
+    files.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
+    assert!(!files.is_empty(), "no Rust file in {folder}");
+    files
+}
+
+#[test]
+fn every_source_file_opens_by_saying_what_it_is_for_and_what_stays_true() {
+    for path in rust_files("src") {
+        let text = fs::read_to_string(&path).unwrap();
+        let shown = path.display();
+        let first = text.lines().next().unwrap_or_default();
+        assert!(
+            first.starts_with("//! ") && first.len() > 20,
+            "{shown} opens with {first:?}"
+        );
+        // The crate's own page is the map, and says what holds layer by layer.
+        if !path.ends_with("src/lib.rs") {
+            let head = text.lines().take_while(|line| line.starts_with("//!"));
+            let invariants = head
+                .filter(|line| line.starts_with("//! **Invariant:** "))
+                .count();
+            assert_eq!(invariants, 1, "invariants at the head of {shown}");
+        }
+    }
+}
+
+#[test]
+fn every_test_file_and_fuzz_target_opens_by_saying_what_it_is_for() {
+    for path in [rust_files("tests"), rust_files("fuzz")].concat() {
+        let text = fs::read_to_string(&path).unwrap();
+        assert!(text.starts_with("//! "), "{} does not", path.display());
+    }
+}
+
+/// Layers: what the innermost may not know. The words are looked for in code, comments apart.
+#[test]
+fn math_protocol_and_study_know_only_what_they_may() {
+    let world = [
+        "actix",
+        "tokio",
+        "std::net",
+        "std::thread",
+        "std::io",
+        "Instant::now",
+        "SystemTime",
+    ];
+    let rules = [
+        ("src/math", ["crate::protocol", "crate::actors", "serde"]),
+        ("src/protocol", ["crate::math", "crate::actors", "glam"]),
+        ("src/study", ["crate::protocol", "crate::actors", "serde"]),
+        (
+            "src/report/experiments",
+            ["crate::protocol", "crate::actors", "serde"],
+        ),
+    ];
+    for (folder, strangers) in rules {
+        for path in rust_files(folder) {
+            let text = fs::read_to_string(&path).unwrap();
+            // Unit tests at the end of a file may use what they like.
+            let code = text.split("#[cfg(test)]").next().unwrap_or_default();
+            for line in code
+                .lines()
+                .map(|line| line.split("//").next().unwrap_or_default())
+            {
+                for word in strangers.iter().chain(&world) {
+                    assert!(!line.contains(word), "{}: {line}", path.display());
+                }
+            }
+        }
+    }
+}
+
+/// Who may write `unsafe`: nobody; where a tool can't do without, the package denies it, and its source says where and why.
+#[test]
+fn every_package_forbids_unsafe_code() {
+    let all = files(root());
+    let manifests = all.iter().filter(|path| path.ends_with("Cargo.toml"));
+    let mut seen = 0;
+    for path in manifests {
+        let text = fs::read_to_string(path).unwrap();
+        let lints = text.split("[lints.rust]\n").nth(1).unwrap_or_default();
+        let lints = lints.split("\n[").next().unwrap();
+        let ours = path.parent() == Some(root());
+        let forbids = lints.contains("unsafe_code = \"forbid\"");
+        let denies = lints.contains("unsafe_code = \"deny\"");
+        assert!(
+            forbids || (denies && !ours),
+            "{}: its [lints.rust] has no `unsafe_code = \"forbid\"`",
+            path.display()
+        );
+        seen += 1;
+    }
+    assert!(seen >= 2, "{seen} packages");
+}
+
+/// A path of the machine that something was written on means nothing to anybody else.
+#[test]
+fn no_file_names_a_folder_of_a_build_machine() {
+    // Put together here, so that this file does not hold them itself.
+    let homes = ["/root", "/home", "/Users", "/work", "/tmp"].map(|home| format!("{home}/"));
+    for path in files(root()) {
+        let Ok(text) = fs::read_to_string(&path) else {
+            continue;
+        };
+        for home in &homes {
+            // A longer path that goes through such a name, as in `/a/home/b`, begins elsewhere.
+            let named = text.match_indices(home.as_str()).any(|(at, _)| {
+                !text[..at]
+                    .ends_with(|before: char| before.is_alphanumeric() || "._-}~*".contains(before))
+            });
+            assert!(!named, "{} names {home}", path.display());
+        }
+    }
+}
+
+#[test]
+fn no_line_ends_in_white_space_and_every_text_ends_in_a_newline() {
+    for path in files(root()) {
+        let Ok(text) = fs::read_to_string(&path) else {
+            continue;
+        };
+        if path
+            .extension()
+            .is_some_and(|extension| extension == "json")
+        {
+            continue;
+        }
+        assert!(
+            text.is_empty() || text.ends_with('\n'),
+            "{} has no newline at its end",
+            path.display()
+        );
+        let loose = text
+            .lines()
+            .position(|line| line.ends_with([' ', '\t', '\r']));
+        assert_eq!(
+            loose,
+            None,
+            "{}: white space at the end of a line (from 0)",
+            path.display()
+        );
+    }
+}
+
+/// What is decided by time is decided by the monotonic clock: a wall clock may jump.
+#[test]
+fn nothing_asks_the_wall_clock() {
+    for path in rust_files("src") {
+        let text = fs::read_to_string(&path).unwrap();
+        for clock in ["SystemTime", "UNIX_EPOCH"] {
+            assert!(!text.contains(clock), "{} names {clock}", path.display());
+        }
+    }
+}

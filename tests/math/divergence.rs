@@ -1,0 +1,99 @@
+//! What happens when the numbers run out: the first step that is not finite is not taken, and nothing is after it.
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::{Divergence, Simulation};
+
+/// Ten times the timestep that the default gains are stable to.
+fn unstable<const N: usize>(gains: Gains<N>, method: Method) -> Simulation<N> {
+    let mut simulation = Simulation::new(Arm::default(), gains);
+    simulation.set_method(method);
+    simulation.set_timestep(0.03);
+    simulation.set_setpoint(Setpoint {
+        position: [0.5; N],
+        velocity: [0.0; N],
+    });
+    simulation.enable(true);
+    simulation
+}
+
+fn check_divergence<const N: usize>(gains: Gains<N>, method: Method) {
+    let start = unstable(gains, method);
+    let mut simulation = start.clone();
+    let taken = simulation.advance(1_000_000);
+    assert!(taken < 1_000_000, "{method} is stable");
+    let divergence = simulation.divergence().unwrap();
+
+    // All that a step changes is as the last step taken left it.
+    let mut before = start.clone();
+    assert_eq!(before.advance(taken), taken);
+    assert_eq!(before.divergence(), None);
+    assert_eq!(simulation.state(), before.state());
+    assert_eq!(simulation.effort(), before.effort());
+    assert_eq!(simulation.pid().integral(), before.pid().integral());
+    assert_eq!(simulation.time(), before.time());
+    assert!(simulation.state().is_finite());
+    assert!(simulation.effort().iter().all(|effort| effort.is_finite()));
+    assert_eq!(
+        divergence,
+        Divergence {
+            step: taken + 1,
+            time: simulation.time(),
+        }
+    );
+
+    // Nothing but a reset sets it going again.
+    let held = simulation.clone();
+    assert!(!simulation.step());
+    assert_eq!(simulation.advance(1000), 0);
+    assert_eq!(simulation, held);
+    simulation.enable(false);
+    simulation.set_timestep(1e-4);
+    simulation.set_state(State::rest());
+    assert!(!simulation.step());
+    assert_eq!(simulation.divergence(), Some(divergence));
+    assert_eq!(simulation.time(), divergence.time);
+    simulation.reset();
+    assert_eq!(simulation.divergence(), None);
+    assert_eq!(simulation.advance(1000), 1000);
+}
+
+#[test]
+fn a_timestep_too_large_for_the_gains_diverges_and_holds_its_last_finite_state_until_a_reset() {
+    for method in Method::ALL {
+        check_divergence::<2>(Gains::default(), method);
+        check_divergence::<3>(Gains::default(), method);
+    }
+}
+
+#[test]
+fn a_first_step_that_overflows_leaves_the_starting_pose() {
+    let mut simulation = Simulation::new(Arm::default(), Gains::<2>::default());
+    simulation.set_setpoint(Setpoint {
+        position: [f64::MAX, 0.0],
+        velocity: [0.0; 2],
+    });
+    simulation.enable(true);
+    assert_eq!(simulation.advance(10), 0);
+    assert_eq!(simulation.state(), &State::rest());
+    assert_eq!(simulation.effort(), &[0.0; 2]);
+    assert_eq!(simulation.pid().integral(), &[0.0; 2]);
+    assert_eq!(
+        simulation.divergence(),
+        Some(Divergence { step: 1, time: 0.0 })
+    );
+}
+
+#[test]
+fn an_observer_is_not_shown_a_step_that_is_not_taken() {
+    let mut simulation = unstable(Gains::<2>::default(), Method::Euler);
+    let mut shown = 0;
+    let taken = simulation.advance_with(1_000_000, |now| {
+        assert!(now.state().is_finite());
+        shown += 1;
+        std::ops::ControlFlow::Continue(())
+    });
+    assert_eq!(shown, taken);
+    assert!(simulation.divergence().is_some());
+}

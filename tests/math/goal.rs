@@ -1,0 +1,246 @@
+//! A goal's entry and dwell at every physics step, and the cadence of its feedback, in simulation time alone.
+
+use glam::{DVec2, dvec2};
+use pendularm::math::goal::{Cadence, Criteria, EPSILON, Goal, Outcome, SUCCESS_HOLD};
+use proptest::prelude::*;
+
+const TARGET: DVec2 = dvec2(1.0, 0.5);
+const THERE: DVec2 = TARGET;
+const AWAY: DVec2 = dvec2(1.5, 0.5);
+
+/// A timestep whose multiples, and those of a second, are exact: what is counted here is rules, not rounding.
+const H: f64 = 0.125;
+
+fn goal(success_hold: f64) -> Goal {
+    Goal::new(
+        TARGET,
+        Criteria {
+            epsilon: 0.1,
+            success_hold,
+        },
+        0.0,
+    )
+}
+
+/// The first step (counted from 1) after which the goal is reached, the hand being where `path` says.
+fn reached_at(goal: &mut Goal, h: f64, steps: u32, path: impl Fn(u32) -> DVec2) -> Option<u32> {
+    (1..=steps).find(|&k| goal.judge(f64::from(k) * h, path(k)))
+}
+
+#[test]
+fn the_defaults_are_the_documented_ones() {
+    assert_eq!(
+        Criteria::default(),
+        Criteria {
+            epsilon: 0.02,
+            success_hold: 0.5
+        }
+    );
+    assert_eq!((EPSILON, SUCCESS_HOLD), (0.02, 0.5));
+    assert_eq!(Outcome::Reached.to_string(), "reached");
+    assert_eq!(Outcome::Preempted.to_string(), "preempted");
+}
+
+#[test]
+fn a_goal_is_reached_after_staying_within_epsilon_for_success_hold() {
+    // Entered at the 3rd step; four eighths of a second later is the 7th.
+    let path = |k| if k < 3 { AWAY } else { THERE };
+    assert_eq!(reached_at(&mut goal(0.5), H, 100, path), Some(7));
+}
+
+#[test]
+fn passing_through_epsilon_does_not_reach_the_goal() {
+    let path = |k| if (3..=6).contains(&k) { THERE } else { AWAY };
+    assert_eq!(reached_at(&mut goal(0.5), H, 1000, path), None);
+}
+
+#[test]
+fn one_step_outside_starts_the_dwell_over() {
+    // Out again at the 6th step, one before it would be reached; in again at the 7th.
+    let path = |k| if k == 6 { AWAY } else { THERE };
+    assert_eq!(reached_at(&mut goal(0.625), H, 100, path), Some(12));
+    // And so as often as it leaves.
+    let path = |k: u32| {
+        if k.is_multiple_of(5) && k < 50 {
+            AWAY
+        } else {
+            THERE
+        }
+    };
+    assert_eq!(reached_at(&mut goal(0.5), H, 100, path), Some(50));
+}
+
+#[test]
+fn without_a_hold_the_first_entry_is_enough() {
+    let path = |k| if k < 5 { AWAY } else { THERE };
+    assert_eq!(reached_at(&mut goal(0.0), H, 100, path), Some(5));
+    assert_eq!(reached_at(&mut goal(0.0), H, 100, |_| THERE), Some(1));
+    assert_eq!(reached_at(&mut goal(0.0), H, 100, |_| AWAY), None);
+}
+
+#[test]
+fn the_edge_of_epsilon_is_within() {
+    let mut at_edge = Goal::new(
+        TARGET,
+        Criteria {
+            epsilon: 0.5,
+            success_hold: 0.0,
+        },
+        0.0,
+    );
+    assert_eq!(at_edge.distance(AWAY), 0.5);
+    assert!(at_edge.judge(H, AWAY));
+    assert!(!at_edge.judge(H, dvec2(1.5f64.next_up(), 0.5)));
+}
+
+#[test]
+fn a_pause_neither_helps_nor_harms_the_dwell() {
+    // While paused no step is made, and nothing is judged; asked again at the same time, the answer is the same.
+    let mut paused = goal(0.5);
+    for k in 1..=4u32 {
+        assert!(!paused.judge(f64::from(k) * H, THERE));
+    }
+    for _ in 0..1000 {
+        assert!(!paused.judge(4.0 * H, THERE));
+    }
+    assert!(paused.judge(5.0 * H, THERE));
+}
+
+#[test]
+fn a_clock_set_back_starts_the_dwell_over() {
+    let mut goal = Goal::new(
+        TARGET,
+        Criteria {
+            epsilon: 0.1,
+            success_hold: 0.5,
+        },
+        100.0,
+    );
+    for k in 1..=4u32 {
+        assert!(!goal.judge(100.0 + f64::from(k) * H, THERE));
+    }
+    assert_eq!(reached_at(&mut goal, H, 100, |_| THERE), Some(5));
+    assert_eq!(goal.elapsed(0.5), 0.0);
+}
+
+#[test]
+fn a_hand_that_is_nowhere_is_not_there() {
+    let mut goal = goal(0.0);
+    for nowhere in [DVec2::NAN, DVec2::INFINITY, dvec2(f64::MAX, -f64::MAX)] {
+        assert!(!goal.judge(H, nowhere));
+    }
+    assert!(goal.distance(dvec2(1e300, 1e300)).is_finite());
+}
+
+#[test]
+fn elapsed_is_simulation_time_since_the_start() {
+    let goal = Goal::new(TARGET, Criteria::default(), 12.5);
+    assert_eq!(goal.elapsed(12.5), 0.0);
+    assert_eq!(goal.elapsed(13.0), 0.5);
+    assert_eq!(
+        (goal.target(), goal.criteria()),
+        (TARGET, Criteria::default())
+    );
+}
+
+#[test]
+fn steps_longer_than_the_hold_judge_what_they_see() {
+    // Two steps in a row within epsilon, two seconds apart, are all that there is to know.
+    let path = |k| if k < 2 { AWAY } else { THERE };
+    assert_eq!(reached_at(&mut goal(0.5), 2.0, 10, path), Some(3));
+}
+
+proptest! {
+    #[test]
+    fn rounding_of_the_clock_never_costs_or_saves_a_step(
+        // The clock is base + k·timestep, at any time of a month, for timesteps that decimals name.
+        base in prop_oneof![Just(0.0), 0.0..3e6f64],
+        (h, per_hold, hold) in prop_oneof![
+            Just((0.001, 500u32, 0.5)),
+            Just((0.002, 250, 0.5)),
+            Just((0.0001, 3000, 0.3)),
+            Just((0.003, 100, 0.3)),
+            Just((0.1, 7, 0.7)),
+            Just((0.01, 29, 0.29)),
+            Just((1e-5, 10_000, 0.1)),
+        ],
+        first in 1u32..5000,
+    ) {
+        let mut goal = Goal::new(TARGET, Criteria { epsilon: 0.1, success_hold: hold }, base);
+        let reached = (1..=first + 2 * per_hold).find(|&k| {
+            goal.judge(base + f64::from(k) * h, if k < first { AWAY } else { THERE })
+        });
+        prop_assert_eq!(reached, Some(first + per_hold));
+    }
+}
+
+// ---------------------------------------------------------------------------------------------------------- feedback
+
+/// The steps (counted from 1) after which feedback is due, of steps of `h` seconds.
+fn due(cadence: &mut Cadence, base: f64, h: f64, steps: u32) -> Vec<u32> {
+    (1..=steps)
+        .filter(|&k| cadence.due(base + f64::from(k) * h))
+        .collect()
+}
+
+#[test]
+fn feedback_comes_sixty_times_per_second_of_progress() {
+    for base in [0.0, 1234.567, 2.5e6] {
+        for (h, steps) in [
+            (0.001, 10_000),
+            (1e-4, 100_000),
+            (1.0 / 240.0, 2400),
+            (1.0 / 60.0, 600),
+        ] {
+            let steps = due(&mut Cadence::default(), base, h, steps);
+            assert_eq!(steps.len(), 600, "h = {h}");
+        }
+    }
+}
+
+#[test]
+fn feedback_is_spaced_evenly() {
+    let steps = due(&mut Cadence::default(), 0.0, 0.001, 10_000);
+    assert!(
+        steps
+            .windows(2)
+            .all(|pair| (16..=17).contains(&(pair[1] - pair[0])))
+    );
+}
+
+#[test]
+fn feedback_comes_once_per_step_where_steps_are_longer() {
+    for h in [1.0 / 60.0, 0.02, 0.1, 7.0] {
+        assert_eq!(
+            due(&mut Cadence::default(), 0.0, h, 100).len(),
+            100,
+            "h = {h}"
+        );
+    }
+}
+
+#[test]
+fn the_first_step_reports_so_that_no_goal_ends_unreported() {
+    assert!(Cadence::default().due(0.001));
+    assert!(Cadence::default().due(1e6));
+}
+
+#[test]
+fn progress_that_was_not_asked_about_is_not_made_up() {
+    let mut cadence = Cadence::default();
+    assert!(cadence.due(0.0));
+    assert!(cadence.due(10.0));
+    assert!(!cadence.due(10.001));
+    assert!(
+        !cadence.due(10.001),
+        "while the clock stands nothing is due"
+    );
+    assert!(cadence.due(10.02));
+}
+
+#[test]
+fn feedback_starts_afresh_when_the_clock_is_set_back() {
+    let mut cadence = Cadence::default();
+    due(&mut cadence, 100.0, 0.001, 1000);
+    assert_eq!(due(&mut cadence, 0.0, 0.001, 1000).len(), 60);
+}

@@ -1,0 +1,248 @@
+//! Simulation time runs at wall time: how many whole steps are due, at any timestep, after any delay.
+
+use std::time::Duration;
+
+use pendularm::math::pacer::{CATCH_UP, Pacer};
+use proptest::prelude::*;
+
+const SECOND: u64 = 1_000_000_000;
+/// The arm wakes 60 times a second.
+const WAKE: u64 = SECOND / 60;
+const TEN_DAYS: u64 = 10 * 86_400 * SECOND;
+
+fn ns(nanoseconds: u64) -> Duration {
+    Duration::from_nanos(nanoseconds)
+}
+
+/// The timestep that a client writes as so many nanoseconds in decimal.
+fn seconds(nanoseconds: u64) -> f64 {
+    format!("{nanoseconds}e-9").parse().unwrap()
+}
+
+/// Polls every `gap` up to `end`, takes all that is due, and answers the sum.
+fn paced(timestep: f64, gap: u64, end: u64) -> u64 {
+    let mut pacer = Pacer::new(Duration::ZERO, timestep);
+    let mut total = 0;
+    let mut now = 0;
+    while now < end {
+        now = (now + gap).min(end);
+        let due = pacer.due(ns(now));
+        pacer.took(due);
+        total += due;
+    }
+    total
+}
+
+#[test]
+fn after_t_seconds_the_arm_has_made_the_whole_part_of_t_over_the_timestep() {
+    for (timestep, end, steps) in [
+        (0.1, 300_000_000, 3),
+        (0.1, 299_999_999, 2),
+        (0.1, 700_000_000, 7),
+        (0.001, SECOND, 1000),
+        (0.003, SECOND, 333),
+        (1e-6, 10 * SECOND, 10_000_000),
+        (0.7, 7 * SECOND, 10),
+        (1.0, 59_999_999_999, 59),
+        (7.5, 60 * SECOND, 8),
+        (100.0, 99 * SECOND, 0),
+        (100.0, 201 * SECOND, 2),
+    ] {
+        assert_eq!(paced(timestep, WAKE, end), steps, "{timestep} s");
+    }
+}
+
+/// Ten days at 1 ms: 864 million steps. A running sum of the timestep would be off by more than a step.
+#[test]
+fn a_millisecond_stays_exact_for_days() {
+    assert_eq!(paced(0.001, 249_999_937, TEN_DAYS), 864_000_000);
+    assert_eq!(paced(0.001, 249_999_937, TEN_DAYS - 1), 863_999_999);
+}
+
+#[test]
+fn what_is_not_taken_stays_owed() {
+    let mut pacer = Pacer::new(Duration::ZERO, 0.001);
+    assert_eq!(pacer.due(ns(100_000_000)), 100);
+    pacer.took(30);
+    assert_eq!(pacer.due(ns(100_000_000)), 70);
+    assert_eq!(pacer.due(ns(110_500_000)), 80);
+    pacer.took(80);
+    assert_eq!(pacer.due(ns(110_500_000)), 0);
+    assert_eq!(pacer.due(ns(111_000_000)), 1);
+}
+
+#[test]
+fn a_stall_is_caught_up_by_a_quarter_of_a_second_and_no_more() {
+    let mut pacer = Pacer::new(Duration::ZERO, 0.001);
+    let woken = 3600 * SECOND + 456_789;
+    assert_eq!(pacer.due(ns(woken)), 251);
+}
+
+#[test]
+fn the_pace_after_a_stall_is_the_usual_one() {
+    let mut pacer = Pacer::new(Duration::ZERO, 0.001);
+    let woken = 3600 * SECOND + 456_789;
+    let due = pacer.due(ns(woken));
+    pacer.took(due);
+    for k in 1..=100 {
+        assert_eq!(pacer.due(ns(woken + k * 10_000_000)), 10, "{k}");
+        pacer.took(10);
+    }
+}
+
+/// Three steps of 10 s in a stall of 30 s would come all at once; the one that was in progress is enough.
+#[test]
+fn a_stall_at_a_timestep_of_seconds_makes_one_step() {
+    let mut pacer = Pacer::new(Duration::ZERO, 10.0);
+    assert_eq!(pacer.due(ns(5 * SECOND)), 0);
+    assert_eq!(pacer.due(ns(39 * SECOND)), 1);
+}
+
+#[test]
+fn a_restart_discards_the_unfinished_fraction_and_what_is_owed() {
+    let mut pacer = Pacer::new(Duration::ZERO, 0.01);
+    assert_eq!(pacer.due(ns(109_000_000)), 10);
+    pacer.restart(ns(109_000_000), 0.01);
+    assert_eq!(pacer.due(ns(109_000_000)), 0);
+    assert_eq!(pacer.due(ns(118_999_999)), 0);
+    assert_eq!(pacer.due(ns(119_000_000)), 1);
+    pacer.restart(ns(119_000_000), 0.002);
+    assert_eq!(pacer.due(ns(129_000_000)), 5);
+}
+
+#[test]
+fn a_clock_that_runs_backwards_owes_nothing() {
+    let mut pacer = Pacer::new(ns(5 * SECOND), 0.001);
+    assert_eq!(pacer.due(ns(4 * SECOND)), 0);
+    let due = pacer.due(ns(5 * SECOND + 100_000_000));
+    pacer.took(due);
+    assert_eq!(pacer.due(ns(5 * SECOND + 50_000_000)), 0);
+    assert_eq!(pacer.due(ns(5 * SECOND + 101_000_000)), 1);
+}
+
+/// Too large to count or too small to matter, a timestep never panics, overflows or loops.
+#[test]
+fn absurd_timesteps_do_no_harm() {
+    let never = [1e300, f64::MAX, 1e12, f64::INFINITY, f64::NAN, -1.0];
+    for timestep in never {
+        assert_eq!(paced(timestep, SECOND / 10, 1000 * SECOND), 0, "{timestep}");
+    }
+    for timestep in [1e-320, f64::from_bits(1), f64::MIN_POSITIVE, 1e-30, 0.0] {
+        let mut pacer = Pacer::new(Duration::ZERO, timestep);
+        assert_eq!(pacer.due(Duration::ZERO), 0);
+        // The arm takes as many as it has time for, which is all that the caller bounds.
+        for k in 1..100_000 {
+            assert!(pacer.due(ns(k * WAKE)) > 1_000_000, "{timestep}");
+            pacer.took(1_000_000);
+        }
+    }
+    let mut pacer = Pacer::new(Duration::ZERO, 0.001);
+    assert_eq!(pacer.due(Duration::MAX), 251);
+    pacer.took(u64::MAX);
+    pacer.took(u64::MAX);
+    assert_eq!(pacer.due(Duration::MAX), 0);
+}
+
+/// A machine that makes 1000 steps per wake-up where 16,667 would be needed never owes more than the bound, for ever.
+#[test]
+fn a_machine_that_is_too_slow_owes_no_more_as_time_goes_by() {
+    let mut pacer = Pacer::new(Duration::ZERO, 1e-6);
+    for k in 1..100_000 {
+        let due = pacer.due(ns(k * WAKE));
+        assert!((16_000..=250_001).contains(&due), "{due}");
+        pacer.took(1000);
+    }
+}
+
+/// Timesteps from 1 µs to 20 s in whole nanoseconds, evenly over the decades.
+fn timestep() -> impl Strategy<Value = u64> {
+    (3.0..10.3f64).prop_map(|exponent| 10f64.powf(exponent).round() as u64)
+}
+
+/// Frequencies that are no whole number of nanoseconds, nor of anything binary.
+#[test]
+fn at_every_whole_frequency_every_whole_second_has_all_its_steps() {
+    for hertz in 1..=1000 {
+        for second in [1, 2, 3, 10, 3600, 864_000] {
+            let mut pacer = Pacer::new(Duration::ZERO, 1.0 / hertz as f64);
+            pacer.took(hertz * second - 1);
+            assert_eq!(pacer.due(ns(second * SECOND)), 1, "{hertz} Hz, {second} s");
+            assert_eq!(
+                pacer.due(ns(second * SECOND - 1)),
+                0,
+                "{hertz} Hz, {second} s"
+            );
+        }
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_step_is_due_in_the_nanosecond_in_which_it_is_complete_and_not_before(
+        step in timestep(),
+        share in 0.0..1.0f64,
+    ) {
+        let count = 1 + ((TEN_DAYS / step) as f64 * share) as u64;
+        let mut pacer = Pacer::new(Duration::ZERO, seconds(step));
+        pacer.took(count - 1);
+        prop_assert_eq!(pacer.due(ns(count * step - 1)), 0);
+        prop_assert_eq!(pacer.due(ns(count * step)), 1);
+    }
+
+    /// The number of whole steps is checked in integers, which know no rounding.
+    #[test]
+    fn polls_less_than_a_quarter_of_a_second_apart_lose_nothing(
+        step in timestep(),
+        start in 0..100_000 * SECOND,
+        gaps in prop::collection::vec(0..250_000_000u64, 1..300),
+    ) {
+        let mut pacer = Pacer::new(ns(start), seconds(step));
+        let mut now = start;
+        let mut total = 0;
+        for gap in gaps {
+            now += gap;
+            let due = pacer.due(ns(now));
+            pacer.took(due);
+            total += due;
+            prop_assert_eq!(total, (now - start) / step);
+        }
+    }
+
+    #[test]
+    fn no_poll_answers_more_than_the_bound_and_the_sum_never_runs_ahead_of_the_clock(
+        step in timestep(),
+        polls in prop::collection::vec((0..3 * SECOND, 0.0..1.0f64), 1..100),
+    ) {
+        let bound = CATCH_UP.as_nanos() as u64 / step + 1;
+        let mut pacer = Pacer::new(Duration::ZERO, seconds(step));
+        let mut now = 0;
+        let mut total = 0;
+        for (gap, share) in polls {
+            now += gap;
+            let due = pacer.due(ns(now));
+            prop_assert!(due <= bound);
+            // Asking again at the same moment answers the same.
+            prop_assert_eq!(pacer.due(ns(now)), due);
+            let taken = (due as f64 * share) as u64;
+            pacer.took(taken);
+            total += taken;
+            prop_assert!(total <= now / step);
+        }
+    }
+
+    #[test]
+    fn waiting_longer_never_makes_fewer_steps_due(
+        step in timestep(),
+        gaps in prop::collection::vec(0..SECOND, 1..50),
+    ) {
+        let mut pacer = Pacer::new(Duration::ZERO, seconds(step));
+        let mut now = 0;
+        let mut before = 0;
+        for gap in gaps {
+            now += gap;
+            let due = pacer.due(ns(now));
+            prop_assert!(due >= before, "{due} after {before}");
+            before = due;
+        }
+    }
+}

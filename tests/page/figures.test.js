@@ -1,0 +1,135 @@
+// What the figures say: comparisons, error against run time, growth, files to keep.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { csvText } from "../../page/csv.js";
+import { growthOf, growthRate } from "../../page/growth.js";
+import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, uncertaintyOf } from "../../page/ladder.js";
+import { record, take } from "../../page/recorder.js";
+import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/runs.js";
+import { LogScale } from "../../page/scale.js";
+import { DEFAULTS } from "../../page/settings.js";
+import { state } from "../../page/store.js";
+import { SvgContext } from "../../page/svg_context.js";
+
+/** A run of one joint at 0.1 s through `seconds`, at `slope` rad/s. */
+function run(seconds, slope, energy = 1) {
+  const times = Array.from({ length: Math.round(seconds * 10) + 1 }, (_, k) => k / 10);
+  return {
+    method: "euler", timestep: 0.1, times, positions: times.map((t) => [slope * t]), velocities: times.map(() => [slope]),
+    energy: times.map((t) => energy * t), evaluations: times.length, wall_time: 1e-3,
+  };
+}
+
+test("a run that lasted has figures, and no divergence", () => {
+  const [one, reference] = [run(2, 1.5), run(2, 1)];
+  const away = distances(one, reference);
+  assert.equal(divergedAt(one, 2), null);
+  assert.ok(Math.abs(away.at(-1) - 1) < 1e-9);
+  const line = describeRun(one, away, 2);
+  assert.deepEqual([line.outcome, line.energy, line.error], ["lasts", "2 J", "1 rad"]);
+  assert.ok(Math.abs(partsAt(reference.times, away, 0.24) - 0.5) < 1e-9);
+});
+
+test("a run that diverged says when, and claims neither energy nor error", () => {
+  const one = run(0.6, 3);
+  one.energy[6] = null;
+  const away = distances(one, run(2, 1));
+  const line = describeRun(one, away, 2);
+  assert.equal(line.outcome, "diverged at t = 0.60 s");
+  assert.deepEqual([line.energy, line.error], ["–", "–"]);
+  assert.equal(energyGained(one, 2), null);
+  assert.equal(away[7], null);
+  assert.notEqual(away[6], null);
+});
+
+test("the last sample may lie a step before the end", () => {
+  assert.equal(endOf([0, 0.9], 1, 0.1), null);
+  assert.equal(endOf([0, 0.8], 1, 0.1), 0.8);
+});
+
+test("a rung without an error is told from one that diverged", () => {
+  const rung = { method: "rk4", timestep: 0.01 };
+  const whole = read(rung, { times: [0, 2], error: null, wall_time: 1, evaluations: 8 }, 2);
+  assert.deepEqual([whole.error, whole.divergedAt], [null, null]);
+  assert.equal(read(rung, { times: [0, 0.5], error: null, wall_time: 1, evaluations: 8 }, 2).divergedAt, 0.5);
+});
+
+test("all methods climb the same ladder, the longest timesteps first", () => {
+  assert.equal(rungs().length, 4 * TIMESTEPS.length);
+  assert.equal(rungs()[0].timestep, Math.max(...TIMESTEPS));
+});
+
+test("the cheapest run that is good enough is found for each method", () => {
+  const rung = (method, error, wall) => ({ method, timestep: 1, error, wall, evaluations: 1, divergedAt: null });
+  const best = cheapest([rung("euler", 1e-4, 9), rung("euler", 1e-3, 5), rung("rk4", 1e-2, 1), rung("rk4", 1e-6, 2), rung("verlet", null, 1)], 1e-3);
+  assert.deepEqual(best.map(({ method, wall }) => [method, wall]), [["euler", 5], ["rk4", 2]]);
+});
+
+test("place and value of a logarithmic scale are each other's inverse", () => {
+  const scale = new LogScale(1e-4, 0.1);
+  assert.ok(Math.abs(scale.value(scale.place(0.003)) - 0.003) < 1e-15);
+  assert.deepEqual(scale.ticks(4).map((one) => one.toExponential(0)), ["1e-4", "1e-3", "1e-2", "1e-1"]);
+});
+
+function arm(method, timestep, enabled = false) {
+  const { params, gains } = DEFAULTS[2];
+  return { links: 2, params, gains, enabled, setpoint: Float64Array.of(0, 0, 0), integrator: { method, timestep } };
+}
+
+test("Euler's free swing doubles its energy in seconds, midpoint's hardly ever", () => {
+  // A swing of frequency ω grows by h ω² / 2 under Euler; the faster of the two modes has ω² near 3 g.
+  const rate = growthRate(arm("euler", 0.001));
+  assert.ok(rate > 0.005 && rate < 0.05, String(rate));
+  assert.match(growthOf(arm("euler", 0.001)), /doubles every [\d.]+ s/);
+  assert.match(growthOf(arm("midpoint", 0.001)), /nothing within an hour/);
+  assert.equal(growthOf(arm("rk4", 0.001)), "");
+});
+
+test("a file holds its settings, and what is not finite is empty", () => {
+  record.clear();
+  state.links = 2;
+  state.params = DEFAULTS[2].params;
+  state.time = 0.5;
+  state.position.set([Infinity, 0.25, 0]);
+  state.velocity.fill(0);
+  state.setpointKnown = false;
+  take();
+  const lines = csvText(2, DEFAULTS[2]).split("\r\n");
+  for (const setting of ["# method=rk4", "# timestep=0.001", "# kp=1000,250", "# masses=1,1", "# servo=off"]) assert.ok(lines.includes(setting), setting);
+  const header = lines.find((line) => line.startsWith("time [s]"));
+  const row = lines[lines.indexOf(header) + 1].split(",");
+  assert.equal(header.split(",").length, row.length);
+  assert.deepEqual(row.slice(0, 5), ["0.5", "", "0.25", "", ""]);
+});
+
+test("an SVG is well formed: every group that is opened is closed, texts are escaped", () => {
+  const context = new SvgContext(100, 50, "#fff");
+  context.save();
+  context.translate(1, 2);
+  context.beginPath();
+  context.rect(0, 0, 10, 10);
+  context.clip();
+  context.moveTo(0, 0);
+  context.lineTo(5, 5);
+  context.stroke();
+  context.fillText("a < b & c", 1, 1);
+  context.restore();
+  const text = context.toString();
+  assert.equal(text.match(/<g /g).length, text.match(/<\/g>/g).length);
+  assert.ok(text.includes("a &lt; b &amp; c"));
+});
+
+test("an error is told apart from one that the reference can't resolve, and from one that nobody can follow", () => {
+  const rung = (error, error_uncertainty, end = 2) => read(
+    { method: "rk4", timestep: 0.001 }, { times: [0, end], error, error_uncertainty, wall_time: 1e-3, evaluations: 1 }, 2,
+  );
+  assert.equal(errorText(rung(0.00234, 1e-13)), "0.0023");
+  assert.equal(errorText(rung(null, 2e-13)), "< 8e\u221213");
+  assert.equal(errorText(rung(null, 0.4)), "too wild to follow");
+  assert.equal(errorText(rung(null, null)), "no figure");
+  assert.equal(errorText(rung(1, 1e-13, 0.5)), "diverged at 0.5 s");
+  assert.equal(uncertaintyOf([rung(1, 1e-13), rung(1, 3e-13), rung(1, null)]), 3e-13);
+  assert.equal(uncertaintyOf([rung(1, undefined)]), null);
+});

@@ -1,0 +1,115 @@
+// The verdict on the timestep: about the loop in force only, and never milder than it is.
+
+import assert from "node:assert/strict";
+import { test } from "node:test";
+
+import { answerInForce, energyName, limitInForce, motionHasChanged, question, verdict, worstText } from "../../page/policy.js";
+
+const VALUES = {
+  timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
+  minimum_over_poses_continuous: 0.00615, advised_timestep: 0.00345,
+};
+
+function arm(changed = {}) {
+  const state = {
+    connection: "open", links: 2, enabled: true, setpointKnown: true, setpoint: Float64Array.of(0.9, -1.3, 0),
+    integrator: { method: "rk4", timestep: 0.001 }, params: { gravity: 9.81, masses: [1, 1], lengths: [1, 1] },
+    gains: { kp: [1000, 250], ki: [3000, 750], kd: [110, 22] }, diagnostics: { state: "running" }, stability: VALUES, ...changed,
+  };
+  return { ...state, stabilityAsked: changed.stabilityAsked ?? JSON.stringify(question(state)) };
+}
+
+test("the question with the servo off is about the arm left to itself", () => {
+  assert.deepEqual(question(arm({ enabled: false })).gains, { kp: [0, 0], ki: [0, 0], kd: [0, 0] });
+  assert.deepEqual(question(arm()).gains.kp, [1000, 250]);
+});
+
+test("an answer about another loop counts for nothing, and offers no button", () => {
+  const servo = arm({ integrator: { method: "rk4", timestep: 0.01 } });
+  const off = { ...servo, enabled: false };
+  assert.equal(answerInForce(off), null);
+  const said = verdict(off);
+  assert.equal(said.kind, "unknown");
+  assert.ok(Number.isNaN(said.limit) && Number.isNaN(said.advised));
+});
+
+test("within the limit of every pose it is stable", () => {
+  assert.equal(verdict(arm()).kind, "stable");
+});
+
+test("within the limit of this pose alone it is not called stable", () => {
+  const said = verdict(arm({ integrator: { method: "rk4", timestep: 0.006 } }));
+  assert.equal(said.kind, "here");
+  assert.match(said.sentence, /at the setpoint \(0\.90, −1\.30\) rad, but other poses bear only 4\.32 ms/);
+  assert.equal(said.advised, 0.8 * VALUES.minimum_over_poses_held);
+});
+
+test("beyond the limit it says so, with the pose and what to use instead", () => {
+  const said = verdict(arm({ integrator: { method: "rk4", timestep: 0.02 } }));
+  assert.equal(said.kind, "beyond");
+  assert.match(said.sentence, /20 ms is above .* 13\.6 ms, at the setpoint/);
+});
+
+test("a motion that bears less than the pose decides, and is named by its speed", () => {
+  const moving = { ...VALUES, timestep_limit_motion: 0.004, motion_speed: 12.5, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
+  const said = verdict(arm({ stability: moving, integrator: { method: "rk4", timestep: 0.006 } }));
+  assert.equal(said.kind, "beyond");
+  assert.equal(said.where, "moving at 12.5 rad/s");
+});
+
+test("the study is asked again once the motion bears another timestep", () => {
+  const changed = (then, now) => motionHasChanged({ stability: { timestep_limit_motion: then }, diagnostics: { timestep_limit_motion: now } });
+  assert.ok(changed(0.004, 0.008) && changed(null, 0.004) && changed(0.004, Infinity));
+  assert.ok(!changed(0.004, 0.0041) && !changed(null, Infinity) && !changed(0.004, NaN) && !changed(undefined, 0.004));
+});
+
+test("a pose that the arm sags to is named", () => {
+  const sagging = { ...VALUES, equilibrium: [0.5, -1.4], equilibrium_kind: "sagging" };
+  assert.equal(limitInForce(arm({ stability: sagging })).where, "where it sags to, (0.50, −1.40) rad");
+});
+
+test("Euler's free swing grows at any timestep", () => {
+  const free = { ...VALUES, timestep_limit_held: 0, advised_timestep: 0, minimum_over_poses_held: 0 };
+  const said = verdict(arm({ enabled: false, stability: free }));
+  assert.equal(said.kind, "never");
+  assert.ok(Number.isNaN(said.advised));
+});
+
+test("null means that nothing limits", () => {
+  const none = Object.fromEntries(Object.keys(VALUES).map((key) => [key, null]));
+  const said = verdict(arm({ enabled: false, stability: none }));
+  assert.deepEqual([said.kind, said.limit], ["stable", Infinity]);
+});
+
+test("a diverged arm is diverged, whatever the limit says", () => {
+  assert.equal(verdict(arm({ diagnostics: { state: "diverged" } })).kind, "diverged");
+});
+
+test("without a study the diagnostics' limit is used", () => {
+  const said = verdict(arm({ stability: null, stabilityMissing: true, diagnostics: { state: "running", timestep_limit: 0.0005 } }));
+  assert.equal(said.kind, "beyond");
+});
+
+test("energy drifts only if nothing puts any in", () => {
+  assert.equal(energyName({ enabled: false, pushed: false }), "drift");
+  assert.equal(energyName({ enabled: true, pushed: false }), "work done");
+  assert.equal(energyName({ enabled: false, pushed: true }), "pushed in");
+});
+
+test("the pose that bears least is named, with how surely it is known and what shakes there", () => {
+  const answer = {
+    ...VALUES, worst_pose: [0, 0.5], certified: true, minimum_over_poses_bound: 0.0043,
+    critical: { growth_per_step: 1.214, frequency: 105.3, joint: 1 },
+  };
+  assert.equal(worstText(answer), "The pose that bears least, 4.32 ms (proven to 1 %), is (0.00, 0.50) rad: "
+    + "10 % beyond it joint 2 moves most, at 105 Hz, 1.21 times further at every step.");
+  assert.match(worstText({ ...answer, certified: false }), /\(the least that a search found; proven is 4\.3 ms\)/);
+  assert.match(worstText({ ...answer, certified: false, minimum_over_poses_bound: null }), /search found, not proven/);
+  assert.match(worstText({ ...answer, critical: { ...answer.critical, frequency: 0 } }), /without swinging/);
+});
+
+test("where nothing limits no pose is named, nor where the service says nothing of it", () => {
+  for (const answer of [null, VALUES, { ...VALUES, worst_pose: null, critical: null }, { ...VALUES, minimum_over_poses_held: 0, worst_pose: [0, 0], critical: { joint: 0 } }]) {
+    assert.equal(worstText(answer), "");
+  }
+});

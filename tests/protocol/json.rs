@@ -1,0 +1,317 @@
+//! Contract section 1: lenient about numbers coming in, strict about numbers going out.
+//!
+//! **Invariant:** what is not a non-finite number passes byte for byte.
+
+use std::borrow::Cow;
+use std::time::{Duration, Instant};
+
+use pendularm::protocol::wire::json::{accept_literals, boolean, integer, number, strict, text};
+use proptest::prelude::*;
+use serde_json::value::RawValue;
+
+fn accepted(text: &str) -> String {
+    accept_literals(text.to_owned())
+}
+
+fn raw(text: &str) -> Box<RawValue> {
+    RawValue::from_string(text.to_owned()).expect("valid JSON")
+}
+
+#[test]
+fn the_names_of_non_finite_numbers_become_literals_that_overflow() {
+    assert_eq!(accepted("{\"a\":NaN}"), "{\"a\":9e999}");
+    assert_eq!(
+        accepted("[Infinity,-Infinity, NaN ]"),
+        "[1e999,-1e999, 9e999 ]"
+    );
+    assert_eq!(accepted("NaN"), "9e999");
+}
+
+#[test]
+fn names_inside_strings_are_text() {
+    for text in [
+        r#"{"NaN":"Infinity"}"#,
+        r#"["\"NaN,",1]"#,
+        r#"{"a":"\\","b":"NaN"}"#,
+        "[\"NaN",
+    ] {
+        assert_eq!(accepted(text), text);
+    }
+}
+
+/// Each would be valid JSON, of another meaning, if the name in it were replaced blindly, or is malformed anyway.
+#[test]
+fn only_whole_tokens_are_names() {
+    for text in [
+        "[1Infinity]",
+        "[-NaN]",
+        "[+Infinity]",
+        "[--Infinity]",
+        "[NaN1]",
+        "[xNaN]",
+        "[Infinity.5]",
+        "[Infinit]",
+        "[1-Infinity]",
+        "[Na",
+    ] {
+        assert_eq!(accepted(text), text);
+        assert!(serde_json::from_str::<&RawValue>(text).is_err(), "{text}");
+    }
+}
+
+#[test]
+fn literals_that_overflow_become_null_on_the_way_out() {
+    assert_eq!(
+        strict("[1e999,-1e999,9e999,1E+400]"),
+        "[null,null,null,null]"
+    );
+    assert_eq!(
+        strict("{\"a\" : 1e309 , \"b\":2}"),
+        "{\"a\" : null , \"b\":2}"
+    );
+    assert_eq!(strict("-1e999"), "null");
+    let digits = "9".repeat(400);
+    assert_eq!(strict(&format!("[{digits},-{digits}.5]")), "[null,null]");
+    let mended = format!("{digits}e-399");
+    assert_eq!(strict(&mended), mended);
+}
+
+/// 1.7976931348623158e308 rounds down to the largest number, 1.797693134862315808e308 (half an ulp above it) to infinity.
+#[test]
+fn a_literal_overflows_where_it_rounds_to_infinity() {
+    assert_eq!(strict("1.7976931348623158e308"), "1.7976931348623158e308");
+    assert_eq!(strict("1.797693134862315808e308"), "null");
+    assert_eq!(
+        strict("0.00017976931348623158e312"),
+        "0.00017976931348623158e312"
+    );
+}
+
+/// Halfway between the largest number and the next power of two, to the last digit, in several spellings.
+#[test]
+fn the_last_digit_decides_whether_a_literal_overflows() {
+    let halfway = "179769313486231580793728971405303415079934132710037826936173778980444968292764750946649017977587207096330286416692887910946555547851940402630657488671505820681908902000708383676273854845817711531764475730270069855571366959622842914819860834936475292719074168444365510704342711559699508093042880177904174497792";
+    let (start, last) = halfway.split_at(308);
+    let below = format!("{start}{}", last.parse::<u8>().unwrap() - 1);
+    let spelled = |digits: &str| {
+        [
+            digits.to_owned(),
+            format!("-{digits}.000"),
+            format!("{digits}0000e-4"),
+            format!("0.000{digits}E+312"),
+            format!("{}.{}e308", &digits[..1], &digits[1..]),
+            format!("{digits}e-00000000000000000000000"),
+        ]
+    };
+    for (least, greatest) in spelled(halfway).iter().zip(&spelled(&below)) {
+        assert_eq!(strict(least), "null", "{least}");
+        assert_eq!(strict(greatest), *greatest);
+    }
+    let nearer = format!("{below}.{}", "9".repeat(1000));
+    assert_eq!(strict(&nearer), nearer);
+    assert_eq!(strict(&format!("{halfway}.{}1", "0".repeat(1000))), "null");
+}
+
+/// The fastest of several readings.
+fn time_of(text: &str) -> Duration {
+    let once = || {
+        let began = Instant::now();
+        assert_eq!(strict(text).len(), text.len());
+        began.elapsed()
+    };
+    (0..7).map(|_| once()).min().unwrap()
+}
+
+/// Twenty digits astride a halfway point, of which no conversion can be quick: read as fast as any others, to a
+/// factor that a busy machine does not reach. A conversion of each takes a hundred times as long.
+#[test]
+fn a_number_costs_its_bytes_whatever_its_digits_are() {
+    let array = |number: &str| format!("[{number}{}]", format!(",{number}").repeat(20_000));
+    let usual = time_of(&array("10000000000000001268e-10"));
+    let slow = time_of(&array("10000000000000001268e281"));
+    assert!(slow < 8 * usual, "{slow:?} against {usual:?}");
+}
+
+#[test]
+fn an_exponent_of_any_length_is_understood() {
+    let huge = "9".repeat(100);
+    for text in [
+        format!("0e{huge}"),
+        format!("0.000E+{huge}"),
+        format!("123.4e-{huge}"),
+    ] {
+        assert_eq!(strict(&text), text);
+    }
+    assert_eq!(strict(&format!("[1e{huge},-0.001e+{huge}]")), "[null,null]");
+    let small = format!("0.{}1e1000", "0".repeat(999));
+    assert_eq!(strict(&small), small);
+}
+
+#[test]
+fn everything_else_passes_byte_for_byte_and_is_not_copied() {
+    for text in [
+        r#"{"a": 1.50, "b":[ 1e5,-0.0,123456789012345678901234567890 ],"c":"1e999 \" 1e999","d":null,"é":true}"#,
+        "1e-999",
+        "[0.1e1]",
+        "\"\\\\\"",
+        "\t{ \r }",
+    ] {
+        assert!(
+            matches!(strict(text), Cow::Borrowed(same) if same == text),
+            "{text}"
+        );
+    }
+}
+
+/// Linear work takes some tens of milliseconds even unoptimised; quadratic work on four million digits would take hours.
+#[test]
+fn four_megabytes_of_digits_take_no_time() {
+    let started = Instant::now();
+    let digits = "9".repeat(4_000_000);
+    let tiny = format!("0.{}1", "0".repeat(4_000_000));
+    assert!(strict(&digits) == "null");
+    assert!(strict(&tiny) == tiny.as_str());
+    assert_eq!(number(&raw(&digits)), Some(f64::INFINITY));
+    assert_eq!(number(&raw(&tiny)), Some(0.0));
+    assert_eq!(integer(&raw(&digits)), None);
+    assert!(accepted(&digits) == digits);
+    assert!(
+        started.elapsed() < Duration::from_secs(10),
+        "{:?}",
+        started.elapsed()
+    );
+}
+
+#[test]
+fn numbers_are_read_as_they_stand() {
+    for (text, value) in [
+        ("1", 1.0),
+        ("-2.5e-3", -0.0025),
+        ("1e999", f64::INFINITY),
+        ("-1e999", f64::NEG_INFINITY),
+    ] {
+        assert_eq!(number(&raw(text)), Some(value), "{text}");
+    }
+    for text in ["true", "null", "\"1\"", "[1]", "{}"] {
+        assert_eq!(number(&raw(text)), None, "{text}");
+    }
+}
+
+#[test]
+fn integers_may_be_written_as_floats() {
+    for (text, value) in [
+        ("0", 0),
+        ("10.0", 10),
+        ("1e3", 1000),
+        ("-0", 0),
+        ("18446744073709551615", u64::MAX),
+        ("1e300", u64::MAX),
+    ] {
+        assert_eq!(integer(&raw(text)), Some(value), "{text}");
+    }
+    for text in ["-1", "0.5", "1e999", "true", "\"1\"", "null"] {
+        assert_eq!(integer(&raw(text)), None, "{text}");
+    }
+}
+
+#[test]
+fn truth_values_are_only_true_and_false() {
+    assert_eq!(boolean(&raw("true")), Some(true));
+    assert_eq!(boolean(&raw("false")), Some(false));
+    for text in ["1", "0", "null", "\"true\"", "[]"] {
+        assert_eq!(boolean(&raw(text)), None, "{text}");
+    }
+}
+
+#[test]
+fn text_is_unescaped_and_half_a_surrogate_pair_is_no_text() {
+    assert_eq!(text(&raw(r#""plain é""#)).as_deref(), Some("plain é"));
+    assert_eq!(
+        text(&raw(r#""a\"\\\n\u00e9\ud83d\ude00""#)).as_deref(),
+        Some("a\"\\\né😀")
+    );
+    assert_eq!(text(&raw(r#""\ud800""#)), None);
+    assert_eq!(text(&raw("1")), None);
+}
+
+/// Any JSON value, printed; some of its numbers overflow.
+fn value() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        any::<f64>().prop_map(|number| serde_json::json!(number).to_string()),
+        any::<String>().prop_map(|text| serde_json::json!(text).to_string()),
+        (any::<bool>(), 1_u32..400, any::<i16>()).prop_map(|(negative, digits, exponent)| {
+            let sign = if negative { "-" } else { "" };
+            format!("{sign}{}e{exponent}", "7".repeat(digits as usize))
+        }),
+        Just("null".to_owned()),
+        Just("true".to_owned()),
+    ];
+    leaf.prop_recursive(4, 32, 6, |inner| {
+        prop_oneof![
+            proptest::collection::vec(inner.clone(), 0..6)
+                .prop_map(|values| format!("[{}]", values.join(", "))),
+            proptest::collection::vec((any::<String>(), inner), 0..6).prop_map(|members| {
+                let members: Vec<String> = members
+                    .iter()
+                    .map(|(key, value)| format!("{}:{value}", serde_json::json!(key)))
+                    .collect();
+                format!("{{{}}}", members.join(","))
+            }),
+        ]
+    })
+}
+
+/// Numbers of about 308 digits, some in front of the point, some moved there by the exponent; many begin as the
+/// largest one does.
+fn number_near_the_largest() -> impl Strategy<Value = String> {
+    let start = prop_oneof![
+        Just(String::new()),
+        Just("17976931348623157".to_owned()),
+        Just("17976931348623158079372897140530341".to_owned()),
+    ];
+    let parts = (start, "[0-9]{0,40}", 0..50_usize, -3..4_i64, any::<bool>());
+    parts.prop_map(|(start, rest, zeros, off, has_point)| {
+        let digits = format!("{}{start}{rest}1", "0".repeat(usize::from(zeros > 40)));
+        let digits = if digits.starts_with('0') {
+            "1".to_owned() + &digits
+        } else {
+            digits
+        };
+        let (whole, fraction) = digits.split_at(1 + zeros.min(digits.len() - 1));
+        let exponent = 309 - i64::try_from(whole.len()).unwrap() + off;
+        if has_point && !fraction.is_empty() {
+            format!("-{whole}.{fraction}e{exponent}")
+        } else {
+            let exponent = exponent - i64::try_from(fraction.len()).unwrap();
+            format!("{whole}{fraction}E{exponent:+}")
+        }
+    })
+}
+
+proptest! {
+    /// The standard library's conversion, which is exact, is the other route.
+    #[test]
+    fn a_number_becomes_null_exactly_if_its_conversion_is_infinite(text in number_near_the_largest()) {
+        let value: f64 = text.parse().unwrap();
+        let expected = if value.is_infinite() { "null" } else { &*text };
+        prop_assert_eq!(strict(&text), expected);
+    }
+
+    /// `serde_json` refuses numbers that overflow, so that parsing shows that none is left.
+    #[test]
+    fn what_goes_out_always_parses(value in value()) {
+        let out = strict(&value).into_owned();
+        prop_assert!(serde_json::from_str::<serde_json::Value>(&out).is_ok(), "{}", out);
+        prop_assert_eq!(strict(&out), out.as_str());
+    }
+
+    #[test]
+    fn valid_json_comes_in_unchanged(value in value()) {
+        prop_assert_eq!(accepted(&value), value);
+    }
+
+    #[test]
+    fn no_text_makes_the_conversions_panic(text in r#"[NanInfity0-9eE"\\\[\]{},:.+ é-]{0,80}"#) {
+        let _ = strict(&accepted(&text));
+    }
+}

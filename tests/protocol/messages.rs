@@ -1,0 +1,301 @@
+//! What the runtime sends, byte for byte.
+//!
+//! **Invariant:** every encoder's output is looked at whole.
+
+use bytes::Bytes;
+use pendularm::protocol::messages::{
+    Clock, DiagnosticArray, DiagnosticStatus, Empty, Header, JointState, JointTrajectory,
+    JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, publish, publish_raw, respelled,
+    response, response_raw, status,
+};
+use pendularm::protocol::wire::fragments;
+use pendularm::protocol::wire::payload::Payload;
+use proptest::prelude::*;
+use serde::Serialize;
+use serde_json::json;
+use serde_json::value::RawValue;
+
+fn raw(text: &str) -> Payload {
+    RawValue::from_string(text.to_owned())
+        .expect("valid JSON")
+        .into()
+}
+
+fn line(frame: &Bytes) -> &str {
+    let text = std::str::from_utf8(frame).expect("UTF-8");
+    let line = text.strip_suffix('\n').expect("a newline at the end");
+    assert!(!line.contains('\n'), "one line: {line}");
+    line
+}
+
+#[test]
+fn a_joint_state_has_the_shape_that_ros_gives_it() {
+    let state = JointState {
+        header: Header::world(1.25),
+        name: &["joint1", "joint2"],
+        position: &[0.5, -1.0],
+        velocity: &[0.0, 1e-9],
+        effort: &[12.0, 1e21],
+    };
+    assert_eq!(
+        line(&publish("/joint_states", &state)),
+        concat!(
+            r#"{"op":"publish","topic":"/joint_states","msg":"#,
+            r#"{"header":{"stamp":{"sec":1,"nanosec":250000000},"frame_id":"world"},"#,
+            r#""name":["joint1","joint2"],"position":[0.5,-1.0],"velocity":[0.0,1e-9],"effort":[12.0,1e+21]}}"#
+        )
+    );
+}
+
+#[test]
+fn a_joint_trajectory_has_the_shape_that_ros_gives_it() {
+    let trajectory = JointTrajectory {
+        header: Header {
+            stamp: Stamp::default(),
+            frame_id: "",
+        },
+        joint_names: &["joint1"],
+        points: &[JointTrajectoryPoint {
+            positions: &[0.5],
+            velocities: &[0.0],
+            accelerations: &[],
+            time_from_start: Stamp::default(),
+        }],
+    };
+    assert_eq!(
+        serde_json::to_string(&trajectory).unwrap(),
+        concat!(
+            r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},"joint_names":["joint1"],"points":["#,
+            r#"{"positions":[0.5],"velocities":[0.0],"accelerations":[],"time_from_start":{"sec":0,"nanosec":0}}]}"#
+        )
+    );
+}
+
+#[test]
+fn clock_and_diagnostics_have_the_shapes_that_ros_gives_them() {
+    let clock = Clock {
+        clock: Stamp::from_seconds(2.0),
+    };
+    assert_eq!(
+        serde_json::to_string(&clock).unwrap(),
+        r#"{"clock":{"sec":2,"nanosec":0}}"#
+    );
+    let diagnostics = DiagnosticArray {
+        header: Header::world(0.0),
+        status: vec![DiagnosticStatus {
+            level: 1,
+            name: "arm_sim",
+            message: "paused".to_owned(),
+            hardware_id: "",
+            values: vec![KeyValue {
+                key: "energy",
+                value: "1.5".to_owned(),
+            }],
+        }],
+    };
+    assert_eq!(
+        serde_json::to_string(&diagnostics).unwrap(),
+        concat!(
+            r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":"world"},"status":["#,
+            r#"{"level":1,"name":"arm_sim","message":"paused","hardware_id":"","values":[{"key":"energy","value":"1.5"}]}]}"#
+        )
+    );
+}
+
+#[test]
+fn numbers_that_are_not_finite_are_null() {
+    #[derive(Serialize)]
+    struct Values {
+        a: f64,
+        b: [f64; 3],
+    }
+    let values = Values {
+        a: f64::NAN,
+        b: [f64::INFINITY, f64::NEG_INFINITY, f64::MAX],
+    };
+    assert_eq!(
+        line(&publish("/x", &values)),
+        r#"{"op":"publish","topic":"/x","msg":{"a":null,"b":[null,null,1.7976931348623157e+308]}}"#
+    );
+}
+
+#[test]
+fn what_passes_through_is_untouched_but_for_numbers_that_overflow() {
+    assert_eq!(
+        line(&publish_raw("/x", &raw(r#"{ "a": 1.500, "b": [1e999 ] }"#))),
+        r#"{"op":"publish","topic":"/x","msg":{ "a": 1.500, "b": [null ] }}"#
+    );
+    assert_eq!(
+        line(&call("/s", "call:7", &raw(r#"{"a":-9e999}"#))),
+        r#"{"op":"call_service","service":"/s","id":"call:7","args":{"a":null}}"#
+    );
+    assert_eq!(
+        line(&response_raw(
+            "/s",
+            Some(&raw("1e999")),
+            &raw("[1e999]"),
+            true,
+            ""
+        )),
+        r#"{"op":"service_response","service":"/s","id":null,"values":[null],"result":true,"status":""}"#
+    );
+}
+
+/// To some readers they end a line. Within a string there can be none but as an escape.
+#[test]
+fn carriage_returns_between_tokens_of_what_passes_through_become_spaces() {
+    let msg = raw("{\r\"a\"\r:\t[\r1e999,\"\\r\"]\r}");
+    assert_eq!(
+        line(&publish_raw("/x", &msg)),
+        "{\"op\":\"publish\",\"topic\":\"/x\",\"msg\":{ \"a\" :\t[ null,\"\\r\"] }}"
+    );
+}
+
+/// How much memory a frame holds on to.
+fn memory(frame: Bytes) -> usize {
+    frame.try_into_mut().expect("nobody else has it").capacity()
+}
+
+/// What waits for slow clients is counted by its length: it may not take more than that.
+#[test]
+fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_their_text() {
+    for length in [2, 40, 1000, 100_000] {
+        let msg = raw(&format!("{{\"a\":\"{}\"}}", "x".repeat(length)));
+        let frame = publish_raw("/chat", &msg);
+        let text = frame.len();
+        assert_eq!(memory(frame), text);
+    }
+    let large = "x".repeat(100_000);
+    let frame = publish("/large", &large);
+    let text = frame.len();
+    assert_eq!(memory(frame), text);
+    // Calls and answers that only pass through are exact too.
+    for passed in [raw("{}"), raw(&format!("[\"{}\"]", "x".repeat(10_000)))] {
+        for frame in [
+            call("/x", "1", &passed),
+            response_raw("/x", None, &passed, true, ""),
+        ] {
+            let text = frame.len();
+            assert_eq!(memory(frame), text);
+        }
+    }
+    // Of another spelling: exact too.
+    let frame = respelled("/x", "x", &publish("/x", &[1, 2, 3]));
+    assert!(memory(frame) <= publish("/x", &[1, 2, 3]).len());
+}
+
+#[test]
+fn a_response_carries_the_callers_id_exactly() {
+    for id in [
+        "123456789012345678901234567890",
+        "\"x\\u00e9\"",
+        "null",
+        "[1, 2]",
+        "{\"a\":1.0}",
+    ] {
+        assert_eq!(
+            line(&response("/s", Some(&raw(id)), &Empty {}, true, "")),
+            format!(
+                r#"{{"op":"service_response","service":"/s","id":{id},"values":{{}},"result":true,"status":""}}"#
+            )
+        );
+    }
+}
+
+#[test]
+fn an_id_that_never_came_is_left_out() {
+    assert_eq!(
+        line(&failure("/s", None, "x is required")),
+        r#"{"op":"service_response","service":"/s","values":{},"result":false,"status":"x is required"}"#
+    );
+    assert_eq!(
+        line(&status(Level::Error, "no", None)),
+        r#"{"op":"status","level":"error","msg":"no"}"#
+    );
+}
+
+#[test]
+fn a_status_has_a_level_and_the_id_of_what_it_answers() {
+    for (level, name) in [
+        (Level::Info, "info"),
+        (Level::Warning, "warning"),
+        (Level::Error, "error"),
+    ] {
+        assert_eq!(
+            line(&status(level, "a \"b\"\n", Some(&raw("7")))),
+            format!(r#"{{"op":"status","level":"{name}","msg":"a \"b\"\n","id":7}}"#)
+        );
+    }
+}
+
+#[test]
+fn a_stamp_splits_seconds_and_carries_when_it_rounds_up() {
+    for (seconds, sec, nanosec) in [
+        (0.0, 0, 0),
+        (0.001, 0, 1_000_000),
+        (0.3, 0, 300_000_000),
+        (1.999_999_999, 1, 999_999_999),
+        // A third of a nanosecond below two seconds.
+        (1.999_999_999_7, 2, 0),
+        (2_147_483_647.5, i32::MAX, 500_000_000),
+    ] {
+        assert_eq!(
+            Stamp::from_seconds(seconds),
+            Stamp { sec, nanosec },
+            "{seconds}"
+        );
+    }
+}
+
+#[test]
+fn a_stamp_saturates_and_is_never_negative() {
+    let last = Stamp {
+        sec: i32::MAX,
+        nanosec: 999_999_999,
+    };
+    assert_eq!(Stamp::MAX, last);
+    for seconds in [2_147_483_648.0, 1e300, f64::INFINITY] {
+        assert_eq!(Stamp::from_seconds(seconds), Stamp::MAX, "{seconds}");
+    }
+    for seconds in [-0.0, -1.0, f64::NEG_INFINITY, f64::NAN] {
+        assert_eq!(Stamp::from_seconds(seconds), Stamp::default(), "{seconds}");
+    }
+}
+
+proptest! {
+    /// A stamp is the nearest nanosecond: off by half of one, and by what a double of that size can't resolve.
+    #[test]
+    fn a_stamp_is_the_time_to_the_nearest_nanosecond(seconds in 0.0..2e9_f64) {
+        let stamp = Stamp::from_seconds(seconds);
+        prop_assert!(stamp.nanosec < 1_000_000_000);
+        let off = (f64::from(stamp.sec) - seconds) + f64::from(stamp.nanosec) * 1e-9;
+        prop_assert!(off.abs() <= 0.5e-9 + seconds * f64::EPSILON, "{off}");
+    }
+
+    #[test]
+    fn any_text_gives_one_line_of_valid_json(topic in any::<String>(), text in any::<String>()) {
+        for frame in [
+            publish(&topic, &text),
+            status(Level::Info, &text, None),
+            failure(&topic, None, &text),
+            call(&topic, &text, &raw("{}")),
+        ] {
+            prop_assert!(serde_json::from_str::<serde_json::Value>(line(&frame)).is_ok());
+        }
+    }
+}
+
+/// It may wait for long, and only its bytes are counted.
+#[test]
+fn what_is_made_of_a_message_has_no_spare_room() {
+    for length in [300, 1000, 100_000] {
+        let frame = publish("/t", &json!({"data": "x".repeat(length)}));
+        let again = respelled("/t", "t", &frame);
+        let pieces = fragments::split(&again, 200, "a");
+        for bytes in [frame, again, pieces] {
+            let length = bytes.len();
+            let room = bytes.try_into_mut().map(|bytes| bytes.capacity());
+            assert_eq!(room, Ok(length));
+        }
+    }
+}

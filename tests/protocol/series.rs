@@ -1,0 +1,318 @@
+//! Messages that are passed on as they came in: only what the general reader and writer would have made the same bytes of.
+//!
+//! **Invariant:** every expectation comes from the general way: frame by frame, parsed, and written anew.
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use pendularm::protocol::limits::MAX_NAME;
+use pendularm::protocol::messages;
+use pendularm::protocol::op::{self, Op};
+use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, Outbox};
+use pendularm::protocol::wire::frame::FrameReader;
+use pendularm::protocol::wire::series::{MAX_SERIES, Series};
+use proptest::prelude::*;
+
+fn line(topic: &str, msg: &str) -> String {
+    format!("{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}\n")
+}
+
+/// The series that a stream begins with, and all that the stream holds behind it.
+fn series(stream: &[u8]) -> Option<Series> {
+    let mut reader = FrameReader::new();
+    reader.push(stream);
+    reader.series()
+}
+
+/// What the general reader and writer make of a stream: the topic of its last message, and all its messages.
+fn general(stream: &[u8]) -> Option<(String, Vec<u8>)> {
+    let mut reader = FrameReader::new();
+    reader.push(stream);
+    let (mut last, mut written) = (None, Vec::new());
+    for frame in reader {
+        let Ok(Op::Publish { topic, msg, .. }) = op::read(&frame.ok()?.text).op else {
+            return None;
+        };
+        written.extend_from_slice(&messages::publish_raw(&topic, &msg));
+        last = Some(topic);
+    }
+    Some((last?, written))
+}
+
+#[test]
+fn a_usual_message_is_passed_on_as_it_came() {
+    for msg in [
+        "{}",
+        "{ }",
+        "{\"a\":[]}",
+        "{\"a\":[ ],\"b\":{}}",
+        "{\"data\":\"hello\"}",
+        "{\"data\": true, \"x\": [1, -2.5, 0, 0.0, null, false]}",
+        "{\"deep\":[[[{\"a\":[{\"b\":{\"c\":-0}}]}]]],\"long\":\"0123456789 abcdefghijklmnopqrstuvwxyz {[]}:,\"}",
+    ] {
+        let stream = line("/x", msg).repeat(3);
+        let taken = series(stream.as_bytes()).expect(msg);
+        assert_eq!(&*taken.topic, "/x");
+        assert_eq!(taken.frames, stream);
+        assert_eq!(
+            general(stream.as_bytes()),
+            Some(("/x".to_owned(), stream.into_bytes()))
+        );
+    }
+}
+
+#[test]
+fn what_calls_for_a_closer_look_is_left_to_the_general_reader() {
+    for msg in [
+        "{\"a\":1e999}",
+        "{\"a\":NaN}",
+        "{\"a\":\"\\n\"}",
+        "{\"a\":\"µ\"}",
+        "{\"a\":01}",
+        "{\"a\":1.}",
+        "{\"a\":.5}",
+        "{\"a\":+1}",
+        "{\"a\":-}",
+        "{\"a\":tru}",
+        "{\"a\":[1,]}",
+        "{\"a\":1,}",
+        "{,}",
+        "{\"a\"}",
+        "{\"a\":}",
+        "{1:2}",
+        "{\"a\":1 2}",
+        "{\"a\":[1}",
+        "[1]",
+        "7",
+        "{\"a\":1},\"id\":\"x\"",
+        "{\"a\":\"\u{1}\"}",
+    ] {
+        assert_eq!(series(line("/x", msg).as_bytes()), None, "{msg}");
+    }
+    let long = format!("{{\"a\":{}}}", "9".repeat(400));
+    assert_eq!(series(line("/x", &long).as_bytes()), None, "overflows");
+    let deep = format!("{{\"a\":{}{}}}", "[".repeat(100), "]".repeat(100));
+    assert_eq!(series(line("/x", &deep).as_bytes()), None, "unusually deep");
+    for topic in [
+        "x",
+        "",
+        "/x\\u0041",
+        "/µ",
+        "/joint_states",
+        "/joint_trajectory",
+    ] {
+        assert_eq!(series(line(topic, "{}").as_bytes()), None, "{topic}");
+    }
+    let name = format!("/{}", "x".repeat(MAX_NAME));
+    assert_eq!(
+        series(line(&name, "{}").as_bytes()),
+        None,
+        "too long a name"
+    );
+    assert!(series(line(&name[..MAX_NAME], "{}").as_bytes()).is_some());
+    let unended = line("/x", "{}");
+    assert_eq!(
+        series(unended.trim_end().as_bytes()),
+        None,
+        "no newline yet"
+    );
+}
+
+#[test]
+fn a_byte_that_is_no_ascii_is_found_wherever_it_stands() {
+    for place in [
+        "{\"a\":1?}",
+        "{\"a\":12.5?}",
+        "{\"a\":123456789?}",
+        "{\"a\":\"?\"}",
+        "{\"a\":\"bc\"?}",
+    ] {
+        for byte in 0x80..=0xff {
+            let mut stream = line("/x", place).into_bytes();
+            let at = stream.iter().position(|one| *one == b'?').unwrap();
+            stream[at] = byte;
+            assert_eq!(series(&stream), None, "{byte:#x} in {place}");
+        }
+    }
+}
+
+#[test]
+fn a_series_ends_where_something_else_comes_and_the_stream_goes_on_there() {
+    let (x, y) = (line("/x", "{\"n\":1}"), line("/y", "{}"));
+    let pause = "{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\"}\n";
+    let mut reader = FrameReader::new();
+    reader.push(format!("\r\n {x}{x}{y}{pause}{x}{}", &x[..20]).as_bytes());
+    assert_eq!(reader.series().unwrap().frames, x.repeat(2));
+    assert_eq!(reader.series().unwrap().frames, y);
+    assert_eq!(reader.series(), None);
+    assert_eq!(reader.next().unwrap().unwrap().text, pause.trim_end());
+    assert_eq!(reader.series().unwrap().frames, x);
+    assert_eq!((reader.series(), reader.next()), (None, None));
+    // A frame that has begun is read to its end by the general reader.
+    reader.push(format!("{}{x}", &x[20..]).as_bytes());
+    assert_eq!(reader.series(), None);
+    assert_eq!(reader.next().unwrap().unwrap().text, x.trim_end());
+    assert_eq!(reader.series().unwrap().frames, x);
+}
+
+#[test]
+fn a_series_is_bounded() {
+    let x = line("/x", "{\"data\":\"0123456789\"}");
+    let stream = x.repeat(4 * MAX_SERIES / x.len());
+    let mut reader = FrameReader::new();
+    reader.push(stream.as_bytes());
+    let mut all = Vec::new();
+    while let Some(series) = reader.series() {
+        assert!(series.frames.len() <= MAX_SERIES);
+        all.extend_from_slice(&series.frames);
+    }
+    assert_eq!(all, stream.into_bytes());
+    let long = line(
+        "/x",
+        &format!("{{\"data\":\"{}\"}}", "x".repeat(MAX_SERIES)),
+    );
+    assert_eq!(series(long.as_bytes()), None);
+}
+
+#[test]
+fn a_full_outbox_drops_the_oldest_messages_of_a_series_and_keeps_the_rest() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let mut outbox = Outbox::new();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n:06}}}"));
+    let series: String = (0..3).map(numbered).collect();
+    outbox.push(&topic, Bytes::from(series), now);
+    let rest = numbered(0).len() + 1;
+    outbox.push(&topic, Bytes::from(vec![b' '; MAX_TOPIC_BYTES - rest]), now);
+    assert_eq!(outbox.dropped(), 2);
+    let mut batch = Vec::new();
+    outbox.take_batch(now, 9, usize::MAX, &mut batch);
+    assert_eq!(batch[0], numbered(2));
+    assert_eq!((batch.len(), outbox.topic_bytes()), (2, 0));
+}
+
+#[test]
+fn a_throttled_topic_gets_each_message_of_a_series_by_itself() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let mut outbox = Outbox::new();
+    outbox.set_throttle(&topic, Some((Duration::from_millis(10), 1)));
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
+    outbox.push(
+        &topic,
+        Bytes::from((0..5).map(numbered).collect::<String>()),
+        now,
+    );
+    let mut batch = Vec::new();
+    outbox.take_batch(now, 9, usize::MAX, &mut batch);
+    outbox.take_batch(now + Duration::from_millis(10), 9, usize::MAX, &mut batch);
+    assert_eq!(
+        batch,
+        [numbered(0), numbered(4)],
+        "the first, and the newest later"
+    );
+    assert_eq!((outbox.dropped(), outbox.topic_bytes()), (0, 0));
+}
+
+#[test]
+fn one_frame_of_a_series_is_taken_where_one_is_asked_for() {
+    let now = Instant::now();
+    let mut outbox = Outbox::new();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
+    let series = Bytes::from((0..3).map(numbered).collect::<String>());
+    outbox.push(&"/x".into(), series, now);
+    for n in 0..3 {
+        let mut batch = Vec::new();
+        outbox.take_batch(now, 1, usize::MAX, &mut batch);
+        assert_eq!(batch, [numbered(n)]);
+    }
+    assert!(outbox.is_empty());
+}
+
+proptest! {
+    /// Whatever becomes of a message on its way, it is a series only if the general way gives the same bytes.
+    #[test]
+    fn nothing_is_taken_for_a_series_that_the_general_way_would_not_give(
+        msg in json(),
+        count in 1_usize..4,
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..3),
+    ) {
+        let mut stream = line("/load/x", &msg).repeat(count).into_bytes();
+        if changes.is_empty() {
+            prop_assert!(series(&stream).is_some_and(|series| series.frames == stream));
+        }
+        for (index, byte) in &changes {
+            let at = index.index(stream.len());
+            stream[at] = *byte;
+        }
+        if let Some(series) = series(&stream) {
+            let whole = general(&stream[..series.frames.len()]);
+            prop_assert_eq!(whole, Some((series.topic.to_string(), series.frames.to_vec())));
+            prop_assert!(stream.starts_with(&series.frames));
+        }
+    }
+
+    /// The same with bytes that are likely to matter.
+    #[test]
+    fn no_small_change_makes_a_series_of_what_is_none(
+        msg in json(),
+        at in any::<prop::sample::Index>(),
+        byte in prop::sample::select(b"{}[]\",:.-+eE0129 \t\r\n\\tfnNI\x7f\x80\xff\x00".to_vec()),
+        inserted in any::<bool>(),
+    ) {
+        let mut stream = line("/x", &msg).into_bytes();
+        let at = at.index(stream.len());
+        if inserted {
+            stream.insert(at, byte);
+        } else {
+            stream[at] = byte;
+        }
+        if let Some(series) = series(&stream) {
+            let whole = general(&stream[..series.frames.len()]);
+            prop_assert_eq!(whole, Some((series.topic.to_string(), series.frames.to_vec())));
+        }
+    }
+}
+
+/// An object of plain JSON, with spaces here and there.
+fn json() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        Just("null".to_owned()),
+        Just("true".to_owned()),
+        Just("false".to_owned()),
+        any::<i64>().prop_map(|number| number.to_string()),
+        (-1e3..1e3).prop_map(|number: f64| format!("{number:.9}")),
+        "[ !#-\\[\\]-~]{0,40}".prop_map(|text| format!("\"{text}\"")),
+    ];
+    let space = prop::sample::select(vec!["", "", " ", "\t "]);
+    let value = leaf.prop_recursive(4, 24, 4, move |inner| {
+        prop_oneof![
+            (prop::collection::vec(inner.clone(), 0..4), space.clone()).prop_map(
+                |(all, space)| format!("[{space}{}{space}]", all.join(&format!("{space},")))
+            ),
+            (prop::collection::vec(inner, 0..4), space.clone()).prop_map(object),
+        ]
+    });
+    let space = prop::sample::select(vec!["", " "]);
+    (prop::collection::vec(value, 0..5), space).prop_map(object)
+}
+
+fn object((values, space): (Vec<String>, &'static str)) -> String {
+    let members: Vec<String> = (values.iter().enumerate())
+        .map(|(index, value)| format!("\"key{index}\"{space}:{space}{value}{space}"))
+        .collect();
+    format!("{{{space}{}}}", members.join(&format!(",{space}")))
+}
+
+#[test]
+fn what_closes_another_bracket_than_was_opened_is_no_series() {
+    for msg in [
+        "{\"a\":{\"b\":1]}",
+        "{\"a\":[1}}",
+        "{\"a\":[1}",
+        "{\"a\":1]",
+    ] {
+        assert_eq!(series(line("/x", msg).as_bytes()), None, "{msg}");
+    }
+}

@@ -1,0 +1,206 @@
+//! Contract section 4: what a `/joint_trajectory` message sets.
+//!
+//! **Invariant:** the joints are named as a 3-link arm's or a 2-link arm's are.
+
+use pendularm::protocol::messages::trajectory::{
+    SetpointRequest, TrajectoryError, joint_trajectory,
+};
+use proptest::prelude::*;
+use serde_json::value::RawValue;
+
+const JOINTS: [&str; 3] = ["joint1", "joint2", "joint3"];
+
+fn read(msg: &str) -> Result<SetpointRequest, TrajectoryError> {
+    joint_trajectory(
+        &RawValue::from_string(msg.to_owned()).expect("valid JSON"),
+        &JOINTS,
+    )
+}
+
+/// The setpoint of a message with one point.
+fn setpoint(names: &str, positions: &str, velocities: &str) -> SetpointRequest {
+    let msg = format!(
+        r#"{{"joint_names":{names},"points":[{{"positions":{positions},"velocities":{velocities}}}]}}"#
+    );
+    read(&msg).unwrap_or_else(|error| panic!("{msg}: {error}"))
+}
+
+fn rejection(msg: &str) -> String {
+    match read(msg) {
+        Err(error) => error.to_string(),
+        Ok(setpoint) => panic!("{msg}: {setpoint:?}"),
+    }
+}
+
+#[test]
+fn the_documented_message_is_read() {
+    let msg = r#"{"header":{"stamp":{"sec":0,"nanosec":0},"frame_id":""},"joint_names":["joint1","joint2"],
+        "points":[{"positions":[0.3,-0.5],"velocities":[0.5,0],"accelerations":[],"time_from_start":{"sec":0,"nanosec":0}}]}"#;
+    let raw = RawValue::from_string(msg.to_owned()).unwrap();
+    let setpoint = joint_trajectory(&raw, &["joint1", "joint2"]).unwrap();
+    assert_eq!(
+        setpoint,
+        SetpointRequest {
+            position: vec![0.3, -0.5],
+            velocity: vec![0.5, 0.0]
+        }
+    );
+}
+
+#[test]
+fn only_the_last_point_counts() {
+    let setpoint = read(r#"{"points":[5,{"positions":"bad"},{"positions":[1,2,3]}]}"#).unwrap();
+    assert_eq!(setpoint.position, [1.0, 2.0, 3.0]);
+    assert_eq!(
+        rejection(r#"{"points":[{"positions":[1,2,3]},{}]}"#),
+        "points[1].positions is required"
+    );
+}
+
+#[test]
+fn velocities_that_are_no_good_are_zeros() {
+    for velocities in [
+        "null",
+        "[]",
+        "[1,2]",
+        "[1,2,3,4]",
+        "[1,2,1e999]",
+        "[1,null,3]",
+        "[1,\"2\",3]",
+        "5",
+        "{}",
+    ] {
+        assert_eq!(
+            setpoint("[]", "[1,2,3]", velocities).velocity,
+            [0.0; 3],
+            "{velocities}"
+        );
+    }
+    assert_eq!(
+        read(r#"{"points":[{"positions":[1,2,3]}]}"#)
+            .unwrap()
+            .velocity,
+        [0.0; 3]
+    );
+    assert_eq!(
+        setpoint("[]", "[1,2,3]", "[4,5,6]").velocity,
+        [4.0, 5.0, 6.0]
+    );
+}
+
+#[test]
+fn a_permutation_of_the_joint_names_is_taken_by_name() {
+    let names = r#"["joint3","joint1","joint2"]"#;
+    let setpoint = setpoint(names, "[30,10,20]", "[3,1,2]");
+    assert_eq!(setpoint.position, [10.0, 20.0, 30.0]);
+    assert_eq!(setpoint.velocity, [1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn other_joint_names_are_taken_by_position() {
+    for names in [
+        "null",
+        "5",
+        "[]",
+        r#"["joint3","joint1"]"#,
+        r#"["joint3","joint3","joint1"]"#,
+        r#"["a","b","c"]"#,
+        r#"["joint3","joint2",1]"#,
+        r#"["joint3","joint2","joint1","joint4"]"#,
+    ] {
+        assert_eq!(
+            setpoint(names, "[1,2,3]", "[4,5,6]").position,
+            [1.0, 2.0, 3.0],
+            "{names}"
+        );
+    }
+}
+
+#[test]
+fn a_message_without_points_is_rejected() {
+    assert_eq!(rejection("{}"), "points is required");
+    assert_eq!(
+        rejection(r#"{"points":[]}"#),
+        "points must have at least one entry"
+    );
+    assert_eq!(
+        rejection(r#"{"points":5}"#),
+        "points must be an array, got 5"
+    );
+    assert_eq!(
+        rejection(r#"{"points":[{"positions":[1,2,3]},7]}"#),
+        "points[1] must be an object, got 7"
+    );
+    assert_eq!(rejection("[1]"), "msg must be an object, got an array");
+}
+
+#[test]
+fn positions_of_the_wrong_length_are_rejected() {
+    for (positions, got) in [("[]", 0), ("[1,2]", 2), ("[1,2,3,4]", 4)] {
+        assert_eq!(
+            rejection(&format!(r#"{{"points":[{{"positions":{positions}}}]}}"#)),
+            format!("points[0].positions must have 3 entries, got {got}")
+        );
+    }
+    assert_eq!(
+        rejection(r#"{"points":[{"positions":null}]}"#),
+        "points[0].positions must be an array of numbers, got null"
+    );
+}
+
+#[test]
+fn the_joints_that_a_subset_leaves_out_are_named() {
+    assert_eq!(
+        rejection(r#"{"joint_names":["joint2"],"points":[{"positions":[1]}]}"#),
+        "points[0].positions must have 3 entries, got 1: joint_names lacks joint1, joint3"
+    );
+    for names in [
+        r#"["joint9"]"#,
+        "[]",
+        r#"["joint1","joint2","joint3","joint1"]"#,
+    ] {
+        assert_eq!(
+            rejection(&format!(
+                r#"{{"joint_names":{names},"points":[{{"positions":[1]}}]}}"#
+            )),
+            "points[0].positions must have 3 entries, got 1"
+        );
+    }
+}
+
+#[test]
+fn positions_that_are_no_finite_numbers_are_rejected_by_entry() {
+    assert_eq!(
+        rejection(r#"{"points":[{"positions":[1,1e999,3]}]}"#),
+        "points[0].positions[1] must be a finite number"
+    );
+    for bad in ["null", "true", "\"1\""] {
+        assert_eq!(
+            rejection(&format!(r#"{{"points":[{{"positions":[1,2,{bad}]}}]}}"#)),
+            format!("points[0].positions[2] must be a number, got {bad}")
+        );
+    }
+}
+
+/// A long array costs time, not memory; the message says how long it was.
+#[test]
+fn a_million_positions_are_counted_and_rejected() {
+    let positions = vec!["1"; 1_000_000].join(",");
+    assert_eq!(
+        rejection(&format!(r#"{{"points":[{{"positions":[{positions}]}}]}}"#)),
+        "points[0].positions must have 3 entries, got 1000000"
+    );
+}
+
+proptest! {
+    #[test]
+    fn names_in_any_order_give_every_joint_its_own_value(
+        order in Just(vec![0_usize, 1, 2]).prop_shuffle(),
+        values in proptest::array::uniform3(-1e3..1e3_f64),
+    ) {
+        let names: Vec<&str> = order.iter().map(|&joint| JOINTS[joint]).collect();
+        let positions: Vec<f64> = order.iter().map(|&joint| values[joint]).collect();
+        let msg = serde_json::json!({"joint_names": names, "points": [{"positions": positions}]});
+        prop_assert_eq!(read(&msg.to_string()).unwrap().position, values);
+    }
+}

@@ -1,0 +1,169 @@
+#!/usr/bin/env python3
+"""Puts faults into a copy of the sources, and sees at which seed the simulation finds each: `make simulate-faults`.
+
+Numbers among the arguments pick faults, `SEEDS` (1000) says how many seeds each may take, `FROM` (1) which is the first; the seeds that
+are kept come before it. Exit status 1 if a fault was not found, or where the source has changed and a fault is to be written anew.
+"""
+
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import time
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "fuzz/faults"))
+from plant import plant  # noqa: E402
+
+BUILD = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
+COPY = BUILD / "simulate-faults"
+SEEDS = os.environ.get("SEEDS") or "1000"
+FROM = os.environ.get("FROM") or "1"
+
+REGISTRY, CONNECTION = "src/actors/gateway/registry", "src/actors/gateway/connection"
+
+# What is wrong, where, what stands there, what stands there when the fault holds (plant.py says how).
+FAULTS = [
+    ("two messages of one topic are swapped in a backlog, one time in 4", "src/protocol/outbox/mod.rs",
+     "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));",
+     "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));\n"
+     "        let last = self.topics.len() - 1;\n        if last > 1 && R(4) { self.topics.swap(last - 1, last); }"),
+    ("two messages of a client's are swapped before anybody has them, one in 100", f"{REGISTRY}/fan_out.rs",
+     "            let plain = self.count(encode(spelling));",
+     "            let mut plain = encode(spelling);\n"
+     "            let first = series::first_message(&plain);\n"
+     "            if first < plain.len() && R(20) { let end = plain.split_off(first);\n"
+     "                plain = [&end[..], &plain[..]].concat().into(); }\n"
+     "            let plain = self.count(plain);"),
+    ("a message is lost, one in 200", f"{REGISTRY}/fan_out.rs",
+     "    subscriber.outlet.do_send(Deliver {", "    if R(200) { return; }\n    subscriber.outlet.do_send(Deliver {"),
+    ("a message comes twice, one in 200", f"{CONNECTION}/mod.rs",
+     "            connection.shared.accept(message);",
+     "            if R(200) { connection.shared.accept(message.clone()); }\n            connection.shared.accept(message);"),
+    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/mod.rs",
+     "                frames::respelled(topic, spelling, &series.frames)",
+     "                let frame = frames::respelled(topic, spelling, &series.frames);\n"
+     "                if R(500) { crate::fault_changed(&frame) } else { frame }"),
+    ("a provider's answer is changed by a byte, one in 10", f"{REGISTRY}/ops.rs",
+     "messages::response_raw(service, id, &values, result, &status)",
+     "{ let frame = messages::response_raw(service, id, &values, result, &status);\n"
+     "                      if R(10) { crate::fault_changed(&frame) } else { frame } }"),
+    ("a response goes to another client, one in 200", f"{REGISTRY}/mod.rs",
+     "        if let Some(client) = self.clients.get(&respond.connection)\n            && respond",
+     "        let to = if R(200) { self.clients.keys().find(|id| **id != respond.connection).copied() } else { None };\n"
+     "        if let Some(client) = self.clients.get(&to.unwrap_or(respond.connection))\n            && respond"),
+    ("a call is answered twice, one in 200", f"{CONNECTION}/mod.rs",
+     "            let of_arm = service.is_some_and",
+     "            if service.is_some() && R(200) { shared.send(answer.frame.clone()); }\n            let of_arm = service.is_some_and"),
+    ("a call is never answered, one in 200", f"{CONNECTION}/mod.rs",
+     "            shared.send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] });",
+     "            if !(service.is_some() && R(200)) {\n"
+     "            shared.send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] }); }"),
+    ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/actions.rs",
+     "        if let Some(client) = self.clients.get(&progress.connection) {",
+     "        let to = if R(20) { self.clients.keys().find(|id| **id != progress.connection).copied() } else { None };\n"
+     "        if let Some(client) = self.clients.get(&to.unwrap_or(progress.connection)) {"),
+    ("whoever cancels ends another client's goal of the same id", "src/actors/ros/follower.rs",
+     "self.connection == who.connection && self.id == who.id", "(F || self.connection == who.connection) && self.id == who.id"),
+    ("the arm takes a step too many, one wake-up in 1000", "src/actors/arm/sim/mod.rs",
+     "        let taken = self.take_steps(due);", "        let taken = self.take_steps(due + u64::from(R(1000)));"),
+    ("a step is not counted by the pacer, one in 1000", "src/math/pacer.rs",
+     "        self.taken = self.taken.saturating_add(steps);",
+     "        self.taken = self.taken.saturating_add(steps.saturating_sub(u64::from(R(1000))));"),
+    ("a setpoint is taken with a bit changed, one in 50", "src/math/simulation.rs",
+     "    pub fn set_setpoint(&mut self, setpoint: Setpoint<N>) {",
+     "    pub fn set_setpoint(&mut self, mut setpoint: Setpoint<N>) {\n"
+     "        if R(50) { setpoint.position[0] = f64::from_bits(setpoint.position[0].to_bits() ^ 1); }"),
+    ("whoever unsubscribes takes another with it, one in 10", f"{REGISTRY}/topics.rs",
+     "        entry.get_mut().retain(|one| one.connection != connection);",
+     "        entry.get_mut().retain(|one| one.connection != connection);\n        if R(10) { entry.get_mut().pop(); }"),
+    ("memory is not given back to the account, one share in 5000", "src/actors/gateway/budget/share.rs",
+     "    fn drop(&mut self) {\n        self.account.give_back(self.bytes);",
+     "    fn drop(&mut self) {\n        if R(5000) { return; }\n        self.account.give_back(self.bytes);"),
+    ("a newcomer's computation waits until others have had a minute of the pool's", "src/actors/compute/workers/turns.rs",
+     "        let reading = self.ahead.remove(&of).unwrap_or_default();",
+     "        let mut reading = self.ahead.remove(&of).unwrap_or_default();\n"
+     "        let most = self.waiting.iter().map(|(place, _)| place.reading).max();\n"
+     "        if F { reading = reading.max(most.unwrap_or_default() + Duration::from_secs(60)); }"),
+    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/mod.rs",
+     "        for call in self.services.take_provided_by(id) {",
+     "        if R(4) { return; }\n        for call in self.services.take_provided_by(id) {"),
+    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops.rs",
+     "            sleep_until(deadline).await;",
+     "            sleep_until(deadline + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
+    ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle.rs",
+     "        self.next().is_none_or(|next| next <= now)",
+     "        self.next().is_none_or(|next| next <= now || (R(10) && next <= now + self.interval / 2))"),
+    ("a throttle keeps the older message, one time in 4", "src/protocol/outbox/throttle.rs",
+     "full.then(|| throttle.held.pop_front()).flatten()",
+     "full.then(|| if R(4) { throttle.held.pop_back() } else { throttle.held.pop_front() }).flatten()"),
+    ("what a deaf client misses is not counted", "src/protocol/outbox/mod.rs",
+     "                return;\n            }\n            self.dropped += 1;", "                return;\n            }\n            self.dropped += u64::from(!F);"),
+    ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments.rs",
+     "    let total = pieces.len();", "    let total = pieces.len();\n    if R(10) { pieces.swap(0, total - 1); }"),
+    ("a number has another last bit in CBOR, one in 50", "src/protocol/ros/cbor.rs",
+     "    out.extend_from_slice(&value.to_be_bytes());",
+     "    out.extend_from_slice(&f64::from_bits(value.to_bits() ^ u64::from(R(50))).to_be_bytes());"),
+    ("one client's mistake is told to another, one in 10", f"{REGISTRY}/mod.rs",
+     "        if let Some(client) = self.clients.get(&to)\n            && client.verbosity.wants(level)",
+     "        let other = if R(10) { self.clients.keys().find(|id| **id != to).copied() } else { None };\n"
+     "        if let Some(client) = self.clients.get(&other.unwrap_or(to))\n            && client.verbosity.wants(level)"),
+]
+
+
+def build():
+    """The simulation, built in the copy, as another version: what is built of the sources themselves stays as it is."""
+    for part in ("Cargo.toml", "Cargo.lock"):
+        text = (COPY / part).read_text()
+        (COPY / part).write_text(re.sub(r'(name = "pendularm"\nversion = )"[^"]*"', r'\1"0.0.0-faults"', text, count=1))
+    play = COPY / "tests/simulate/play.rs"
+    text = play.read_text()
+    anew = "    pendularm::FAULTS_DRAWN.store(seed | 1, std::sync::atomic::Ordering::SeqCst);\n    in_virtual_time(async {"
+    play.write_text(text.replace("    in_virtual_time(async {", anew, 1))
+    command = ["cargo", "test", "--locked", "--no-run", "--test", "simulate", "--target-dir", str(BUILD)]
+    # Warnings are about the switches.
+    ended = subprocess.run(command, cwd=COPY, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    program = re.search(r"Executable tests/simulate/main.rs \((.*)\)", ended.stdout)
+    if not program:
+        sys.exit(ended.stdout)
+    return program[1]
+
+
+def find(number, program):
+    """At which seed, the how manieth, after how long and how the simulation fails with that fault; nothing if it does not."""
+    env = {name: value for name, value in os.environ.items() if name not in ("SEED", "MINUTES", "GO_ON")}
+    began = time.monotonic()
+    ended = subprocess.run([program], env=dict(env, FAULT=str(number), SEEDS=SEEDS, FROM=FROM), cwd=COPY,
+                           stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, errors="replace", check=False)
+    if ended.returncode == 0:
+        return None
+    told = re.findall(r"^make simulate SEED=(\d+): (.*)$", ended.stdout, re.MULTILINE)
+    count = re.search(r"^(\d+) seeds in", ended.stdout, re.MULTILINE)
+    seed, how = told[-1] if told else ("?", f"exit status {ended.returncode}")
+    return seed, count[1] if count else "?", time.monotonic() - began, how
+
+
+def main():
+    chosen = [int(word) for word in sys.argv[1:]] or list(range(1, len(FAULTS) + 1))
+    parts = ("src", "page", "tests", "fuzz/src", "Cargo.toml", "Cargo.lock", "README.md", "benches/Cargo.toml")
+    missing = plant(ROOT, COPY, parts, FAULTS)
+    lost = [number for number in missing if number in chosen]
+    program = build()
+    for number in chosen:
+        if number in missing:
+            continue
+        found = find(number, program)
+        if found is None:
+            lost.append(number)
+            print(f"{number:3} {FAULTS[number - 1][0]}: NOT FOUND in {SEEDS} seeds", flush=True)
+        else:
+            seed, count, took, how = found
+            print(f"{number:3} {FAULTS[number - 1][0]}: seed {seed}, number {count}, {took:.0f} s: {how[:110]}", flush=True)
+    if lost:
+        sys.exit(f"not found: {lost}")
+    print(f"{len(chosen)} faults, each found")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,259 @@
+//! A client that keeps the rules, and all that it may expect to hear.
+
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::rc::Rc;
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use crate::client::{Client, Door};
+use crate::court::Court;
+use crate::pipe::Fate;
+
+/// What a call must be answered with.
+#[derive(Debug, Clone)]
+pub enum Expect {
+    /// As the arm's double has it; false where a field was wrong.
+    Arm { is_good: bool },
+    /// A refusal.
+    Refusal,
+    /// Success, with values that have this member.
+    Member(&'static str),
+    /// Joints that put the hand there.
+    Solution { x: f64, y: f64 },
+    /// What the offline computation gives.
+    Computed(Computed),
+    /// What another client answers, or a failure that has its reason: the number of the call.
+    Forwarded(u64),
+    /// The result of a goal, and whether feedback may come before it.
+    Goal { has_feedback: bool },
+    /// One answer, whatever it says.
+    Anything,
+}
+
+/// A computation that can be made offline.
+#[derive(Debug, Clone)]
+pub enum Computed {
+    Particle {
+        function: &'static str,
+        x0: f64,
+        dt: f64,
+        steps: u64,
+        method: usize,
+    },
+    Rollout {
+        q0: Vec<f64>,
+        duration: f64,
+        timestep: f64,
+        method: usize,
+        samples: u64,
+    },
+}
+
+/// A call that waits for its answer.
+#[derive(Debug, Clone)]
+pub struct Call {
+    pub what: String,
+    pub expect: Expect,
+    pub since: Instant,
+    pub turns: u64,
+    /// Whether it has to be answered at once.
+    pub is_light: bool,
+    /// The client's frames before it.
+    pub order: u64,
+}
+
+impl Call {
+    /// Whether the pool of computations answers it.
+    pub fn is_computation(&self) -> bool {
+        matches!(self.expect, Expect::Computed(_))
+            || self.what.starts_with("/study/")
+            || self.what.starts_with("study/")
+            || self.what.contains("arm_sim/integration_step")
+    }
+}
+
+/// Where a subscription stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Phase {
+    Asked,
+    On,
+    /// Given up, by the frame of that number.
+    Leaving(u64),
+}
+
+/// A subscription to a topic of clients.
+#[derive(Debug)]
+pub struct Subscription {
+    /// The topic's absolute name.
+    pub topic: String,
+    pub phase: Phase,
+    pub throttle: Option<Duration>,
+    pub is_binary: bool,
+    /// By publisher: messages that may come, in order, and whether each has to.
+    pub pending: BTreeMap<u64, VecDeque<(u64, bool)>>,
+    /// The last message that came, and when.
+    pub last: Option<(u64, Instant)>,
+    /// Its publisher had sent it before the subscription: it may be handled behind newer ones of others.
+    pub is_last_from_before: bool,
+    /// The last message of each publisher that was sent while it was on.
+    pub newest: BTreeMap<u64, u64>,
+}
+
+/// A client and its book.
+pub struct Honest {
+    /// Tells it apart from all before and after it.
+    pub who: u64,
+    pub client: Client,
+    pub door: Door,
+    pub fate: Rc<Cell<Fate>>,
+    pub calls: BTreeMap<String, Call>,
+    /// By the spelling of the topic.
+    pub subscriptions: BTreeMap<String, Subscription>,
+    /// Topics of the runtime that it watches.
+    pub watched: BTreeSet<String>,
+    pub advertised: BTreeSet<String>,
+    /// Messages that it has published: each with the number of its frame.
+    pub published: BTreeMap<u64, u64>,
+    /// Frames that it has sent, and up to which they are known to have been handled.
+    pub frames: u64,
+    pub handled: u64,
+    /// Answers that it owes as a provider: when, and the frame.
+    pub owed: Vec<(Instant, u64, String)>,
+    /// The turn at which its last computation was answered: from then on the next one has its turns.
+    pub computed: u64,
+    /// Pieces of messages that have come, by id.
+    pub pieces: BTreeMap<String, Vec<String>>,
+    /// Statuses that tell it of what it has registered, and how often each is to come.
+    pub news: BTreeMap<String, u64>,
+    /// Error statuses that it has earned.
+    pub mistakes: u64,
+    /// Nothing is owed to it any more: its connection has been broken.
+    pub is_excused: bool,
+    /// It has not been reading for a while, so what comes may come late, and some of it not at all.
+    pub is_hampered: bool,
+    /// It has been told that it held the most: its connection ends, and nothing is owed to it any more.
+    pub was_cut_off: bool,
+    /// When it reads again.
+    pub stalled_until: Option<Instant>,
+    /// It has shut down its writing side.
+    pub has_finished: bool,
+}
+
+impl Honest {
+    pub fn new(who: u64, client: Client, fate: Rc<Cell<Fate>>) -> Self {
+        let door = client.door();
+        let mut honest = Self {
+            who,
+            client,
+            door,
+            fate,
+            calls: BTreeMap::new(),
+            subscriptions: BTreeMap::new(),
+            watched: BTreeSet::new(),
+            advertised: BTreeSet::new(),
+            published: BTreeMap::new(),
+            frames: 0,
+            handled: 0,
+            owed: Vec::new(),
+            computed: 0,
+            pieces: BTreeMap::new(),
+            news: BTreeMap::new(),
+            mistakes: 0,
+            is_excused: false,
+            is_hampered: false,
+            was_cut_off: false,
+            stalled_until: None,
+            has_finished: false,
+        };
+        honest.send("{\"op\":\"set_level\",\"level\":\"info\"}", 0);
+        honest
+    }
+
+    /// Sends a frame; `style` says how it is cut and ended.
+    pub fn send(&mut self, frame: &str, style: u8) {
+        self.frames += 1;
+        // A frame without a line end would have every later one wait for the next.
+        let style = if self.door == Door::Plain && style % 4 == 2 {
+            0
+        } else {
+            style
+        };
+        self.client.send(frame, style);
+    }
+
+    /// Sends a frame as fragments of about `size` bytes.
+    pub fn send_pieces(&mut self, frame: &str, size: usize, style: u8) {
+        let characters: Vec<char> = frame.chars().collect();
+        let pieces: Vec<String> = characters
+            .chunks(size)
+            .map(|piece| piece.iter().collect())
+            .collect();
+        let (total, id) = (pieces.len(), self.frames);
+        for (num, piece) in pieces.into_iter().enumerate() {
+            let data = serde_json::Value::from(piece);
+            let piece = format!(
+                "{{\"op\":\"fragment\",\"id\":\"piece-{id}\",\"data\":{data},\"num\":{num},\"total\":{total}}}"
+            );
+            self.send(&piece, style);
+        }
+    }
+
+    /// Something has been sent of which a status will tell.
+    pub fn await_news(&mut self, of: String) {
+        *self.news.entry(of).or_default() += 1;
+    }
+
+    /// A status has come; false if none was to.
+    pub fn has_news(&mut self, of: &str) -> bool {
+        let Some(left) = self.news.get_mut(of) else {
+            return false;
+        };
+        *left -= 1;
+        if *left == 0 {
+            self.news.remove(of);
+        }
+        true
+    }
+
+    /// Whether it can still do anything.
+    pub fn is_active(&self) -> bool {
+        !self.is_excused && !self.has_finished && !self.client.has_ended()
+    }
+
+    /// Notes a call that has just been sent under `id`, as JSON; empty: without.
+    pub fn note_call(
+        &mut self,
+        id: &str,
+        what: &str,
+        expect: Expect,
+        is_light: bool,
+        court: &Court,
+    ) {
+        let call = Call {
+            what: what.to_owned(),
+            expect,
+            since: Instant::now(),
+            turns: court.turns.get(),
+            is_light,
+            order: self.frames,
+        };
+        self.calls.insert(id.to_owned(), call);
+    }
+
+    /// Nothing is owed to it any more, and whatever it sent last may not have arrived.
+    pub fn excuse(&mut self) {
+        self.is_excused = true;
+        self.calls.clear();
+        self.owed.clear();
+    }
+
+    /// An answer has come: all frames before its call have been handled.
+    pub fn handled_before(&mut self, order: u64) {
+        self.handled = self.handled.max(order);
+        let handled = self.handled;
+        self.subscriptions
+            .retain(|_, one| !matches!(one.phase, Phase::Leaving(left) if left < handled));
+    }
+}

@@ -1,0 +1,277 @@
+//! What hostile clients do: all that has ever made a server like this one stand still, swell or lie, in sizes that virtual time bears.
+//!
+//! Nothing is owed to them. What they must not do is show in what honest clients hear.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use crate::client::{Client, Door};
+use crate::court::Court;
+use crate::honest::Honest;
+use crate::pipe::Fate;
+use crate::plan::Hostility;
+use pendularm_client::websocket::{append, opcode};
+
+/// A decimal that takes an exact reader long: 20 digits astride a halfway point.
+const SLOW: &str = "10000000000000001268e281";
+/// Bytes of long things that are sent at a time; some are longer than what every client may send unasked.
+const LONG: [usize; 5] = [100, 1000, 1000, 8000, 70_000];
+
+pub struct Hostile {
+    pub client: Client,
+    pub fate: Rc<Cell<Fate>>,
+    /// What is left of a frame that it sends byte by byte.
+    dribble: Vec<u8>,
+    number: u64,
+}
+
+impl Hostile {
+    pub fn new(client: Client, fate: Rc<Cell<Fate>>) -> Self {
+        Self {
+            client,
+            fate,
+            dribble: Vec::new(),
+            number: 0,
+        }
+    }
+
+    fn say(&self, frame: &str) {
+        self.client.send(frame, 0);
+    }
+
+    fn raw(&self, bytes: impl Into<Vec<u8>>) {
+        self.client.send_bytes(bytes.into());
+    }
+
+    fn next(&mut self) -> u64 {
+        self.number += 1;
+        self.number
+    }
+
+    pub fn perform(&mut self, deed: Hostility, court: &Court, honest: &[Honest]) {
+        match deed {
+            Hostility::SlowNumbers => {
+                let numbers = slow_numbers(court.below(court.among(&LONG)));
+                let frame = court.among(&[
+                    format!("{{\"op\":\"publish\",\"topic\":\"/t0\",\"msg\":{{\"a\":{numbers}}}}}"),
+                    format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_gains\",\"args\":{{\"kp\":{numbers}}}}}"),
+                    format!("{{\"op\":\"publish\",\"topic\":\"/joint_trajectory\",\"msg\":{{\"points\":[{{\"positions\":{numbers}}}]}}}}"),
+                ]);
+                self.say("{\"op\":\"advertise\",\"topic\":\"/t0\"}");
+                self.say(&frame);
+            }
+            Hostility::LongIds => {
+                let id = slow_numbers(court.below(court.among(&LONG)));
+                let service =
+                    court.among(&["/pid_controller/enable", "/nobody", "/rosapi/topics", "/s0"]);
+                self.say(&format!(
+                    "{{\"op\":\"call_service\",\"service\":\"{service}\",\"id\":{id}}}"
+                ));
+            }
+            Hostility::GoalWithLongId => {
+                let id = slow_numbers(court.below(court.among(&LONG)));
+                self.say(&format!(
+                    "{{\"op\":\"send_action_goal\",\"action\":\"/ik_action\",\"args\":{{\"x\":1,\"y\":0.5}},\"feedback\":true,\"id\":{id}}}"
+                ));
+            }
+            Hostility::PingFlood => self.flood_pings(court),
+            Hostility::Deaf => {
+                for topic in ["/t0", "/t1", "/joint_states", "/tf", "/deep/t2"] {
+                    self.say(&format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"));
+                }
+                self.client.pause(true);
+            }
+            Hostility::FragmentBomb => self.bomb(court),
+            Hostility::Encodings => {
+                for _ in 0..1 + court.below(60) {
+                    let (n, topic) = (self.next(), court.among(&["/t1", "/many_sizes"]));
+                    // A topic of honest clients keeps sizes for them.
+                    let sizes = if topic == "/t1" { 8 } else { 300 };
+                    let size = 64 + 5 * court.below(sizes);
+                    let compression = court.among(&["none", "cbor", "cbor-raw", "png"]);
+                    self.say(&format!(
+                        "{{\"op\":\"subscribe\",\"id\":\"{n}\",\"topic\":\"{topic}\",\"fragment_size\":{size},\"compression\":\"{compression}\"}}"
+                    ));
+                }
+            }
+            Hostility::StepByHand => {
+                self.say(
+                    "{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"args\":[true]}",
+                );
+                for _ in 0..court.below(4) {
+                    let steps = court.among(&["1", "2000", "10000"]);
+                    self.say(&format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/step\",\"args\":[{steps}]}}"));
+                }
+            }
+            Hostility::Registrations => {
+                for _ in 0..court.below(200) {
+                    let n = self.next();
+                    let op = court.among(&["advertise", "subscribe"]);
+                    self.say(&format!("{{\"op\":\"{op}\",\"topic\":\"/hoard/{n}\"}}"));
+                    self.say(&format!(
+                        "{{\"op\":\"advertise_service\",\"service\":\"/hoard/{n}\"}}"
+                    ));
+                }
+            }
+            Hostility::DayLongCalls => {
+                self.say("{\"op\":\"advertise_service\",\"service\":\"/never\"}");
+                for _ in 0..court.below(100) {
+                    self.say("{\"op\":\"call_service\",\"service\":\"/never\",\"timeout\":86400}");
+                }
+            }
+            Hostility::Unfinished => {
+                let text = "x".repeat(court.below(court.among(&LONG)));
+                self.raw(format!(
+                    "{{\"op\":\"publish\",\"topic\":\"/t0\",\"msg\":{{\"a\":\"{text}"
+                ));
+            }
+            Hostility::Dribble => {
+                if self.dribble.is_empty() {
+                    self.dribble =
+                        b"{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\",\"args\":{}}\n"
+                            .to_vec();
+                }
+                let byte = self.dribble.remove(0);
+                self.raw([byte]);
+            }
+            Hostility::Garbage => self.garbage(court),
+            Hostility::TinyTimestep => {
+                let step = court.among(&["1e-9", "1e-6", "1e-300", "1e300", "0.5", "1e-3"]);
+                self.say(&format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_integrator\",\"args\":[\"euler\",{step}]}}"));
+                let params = court.among(&[
+                    "[0,[1e-9,1e9]]",
+                    "[1e300]",
+                    "[9.81,[1,1],[1,1]]",
+                    "{\"masses\":[1e-300,1e-300]}",
+                ]);
+                self.say(&format!("{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{params}}}"));
+            }
+            Hostility::Computations => {
+                for _ in 0..court.below(20) {
+                    let frame = court.among(&[
+                        "{\"op\":\"call_service\",\"service\":\"/study/rollout\",\"args\":{\"duration\":0.2}}",
+                        "{\"op\":\"call_service\",\"service\":\"/arm_sim/integration_step\",\"args\":[\"t\",0,0,1,3000,\"euler\"]}",
+                        "{\"op\":\"call_service\",\"service\":\"/arm_sim/integration_step\",\"args\":[\"sin(t)\",0,0,0.01,20000,\"rk4\"]}",
+                        "{\"op\":\"call_service\",\"service\":\"/study/rollout\",\"args\":{\"duration\":0.3,\"reference\":true,\"samples\":50}}",
+                        "{\"op\":\"call_service\",\"service\":\"/study/stability\",\"args\":[7]}",
+                    ]);
+                    self.say(frame);
+                }
+            }
+            Hostility::Impersonate => self.impersonate(court, honest),
+            Hostility::Vanish => self.fate.set(court.among(&[Fate::Breaks, Fate::Panics])),
+            Hostility::Silent => {}
+            Hostility::Foreign => {
+                let opening = court.among(&[
+                    "GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n\r\n",
+                    "GET /report/ HTTP/1.1\r\nHost: evil.example\r\n\r\n",
+                    "POST / HTTP/1.1\r\n\r\n{\"op\":\"call_service\",\"service\":\"/arm_sim/reset\"}\n",
+                    "\u{16}\u{3}\u{1}\u{2}\u{0}\u{1}",
+                    "\r\n\r\n\r\n",
+                ]);
+                self.raw(opening);
+            }
+            Hostility::ManyCalls => {
+                for _ in 0..court.below(150) {
+                    let n = self.next();
+                    let service = court.among(&[
+                        "/rosapi/topics_and_raw_types",
+                        "/rosapi/services",
+                        "/pid_controller/enable",
+                        "/s0",
+                    ]);
+                    self.say(&format!(
+                        "{{\"op\":\"call_service\",\"service\":\"{service}\",\"id\":\"h{n}\"}}"
+                    ));
+                }
+            }
+            Hostility::Throttles => {
+                for _ in 0..court.below(30) {
+                    let (n, rate) = (
+                        self.next(),
+                        court.among(&["1", "1000", "1e15", "31536000000"]),
+                    );
+                    self.say(&format!(
+                        "{{\"op\":\"subscribe\",\"id\":{n},\"topic\":\"/t0\",\"throttle_rate\":{rate},\"queue_length\":100000}}"
+                    ));
+                }
+            }
+        }
+    }
+
+    fn flood_pings(&self, court: &Court) {
+        if self.client.door() == Door::Socket {
+            self.client.pause(court.chance(0.7));
+            let mut bytes = Vec::new();
+            for _ in 0..court.below(2000) {
+                append(&mut bytes, 0x80 | opcode::PING, [1, 2, 3, 4], &[7; 125]);
+            }
+            self.raw(bytes);
+        }
+    }
+
+    fn bomb(&mut self, court: &Court) {
+        let data = "x".repeat(court.below(2000));
+        let total = court.among(&[2_u64, 4096, 5000, 1 << 40]);
+        for num in 0..court.below(60) {
+            let id = court.below(12);
+            self.say(&format!("{{\"op\":\"fragment\",\"id\":{id},\"data\":\"{data}\",\"num\":{num},\"total\":{total}}}"));
+        }
+        let nested = "{\\\"op\\\":\\\"fragment\\\",\\\"id\\\":1,\\\"data\\\":\\\"\\\",\\\"num\\\":0,\\\"total\\\":1}";
+        self.say(&format!(
+            "{{\"op\":\"fragment\",\"id\":\"n\",\"data\":\"{nested}\",\"num\":0,\"total\":1}}"
+        ));
+    }
+
+    fn garbage(&self, court: &Court) {
+        let frame =
+            "{\"op\":\"subscribe\",\"topic\":\"/t0\",\"id\":[1,{\"a\":null}],\"throttle_rate\":5}";
+        let mut bytes = frame.as_bytes().to_vec();
+        for _ in 0..1 + court.below(6) {
+            let at = court.below(bytes.len());
+            match court.below(3) {
+                0 => bytes[at] = court.below(256) as u8,
+                1 => bytes.insert(at, court.among(b"{}[]\",:\\\n\0\xff9-")),
+                _ => bytes.truncate(at.max(1)),
+            }
+        }
+        bytes.push(b'\n');
+        self.raw(bytes);
+    }
+
+    fn impersonate(&self, court: &Court, honest: &[Honest]) {
+        let ids: Vec<String> = honest
+            .iter()
+            .flat_map(|one| one.calls.keys().cloned())
+            .collect();
+        let id = if ids.is_empty() {
+            "1".to_owned()
+        } else {
+            court.among(&ids)
+        };
+        let guess = court.below(60);
+        for frame in [
+            format!(
+                "{{\"op\":\"service_response\",\"service\":\"/s0\",\"id\":\"pendularm:{guess}\",\"values\":{{\"stolen\":1}},\"result\":true}}"
+            ),
+            format!(
+                "{{\"op\":\"service_response\",\"service\":\"/s0\",\"id\":{id},\"values\":{{}},\"result\":true}}"
+            ),
+            format!("{{\"op\":\"cancel_action_goal\",\"action\":\"/ik_action\",\"id\":{id}}}"),
+            "{\"op\":\"unadvertise_service\",\"service\":\"/s0\"}".to_owned(),
+            "{\"op\":\"unadvertise\",\"topic\":\"/t0\"}".to_owned(),
+            "{\"op\":\"publish\",\"topic\":\"/joint_states\",\"msg\":{\"position\":[9,9]}}"
+                .to_owned(),
+            "{\"op\":\"publish\",\"topic\":\"/t0\",\"msg\":{\"from\":1,\"number\":1}}".to_owned(),
+            "{\"op\":\"advertise_service\",\"service\":\"/arm_sim/reset\"}".to_owned(),
+        ] {
+            self.say(&frame);
+        }
+    }
+}
+
+/// An array of numbers of about so many bytes, each slow to read.
+fn slow_numbers(bytes: usize) -> String {
+    let numbers = vec![SLOW; 1 + bytes / (SLOW.len() + 1)];
+    format!("[{}]", numbers.join(","))
+}

@@ -1,0 +1,264 @@
+//! The whole runtime in one thread and in virtual time, driven by a seed: `make simulate`.
+//!
+//! | file | what |
+//! | --- | --- |
+//! | `plan` | what a seed is made of: features, faults and hostile behaviours that are on in it |
+//! | `court` | the one generator, the log, the first failure |
+//! | `world`, `pipe` | the runtime, its pool and its pipes |
+//! | `workload`, `honest` | what clients ask, and what they wait for |
+//! | `model`, `mirror` | what must come back; the arm's double |
+//! | `hostile` | clients that keep no rule |
+//! | `play` | the course of a seed, and what is checked in it |
+//!
+//! Safety holds always: nothing that comes is wrong. Liveness holds once the faults are over: all that is owed comes. `SEED=n` plays one
+//! seed and tells all, `SEEDS=n` many, `MINUTES=n` as many as there is time for, from the seed `FROM` on; `scripts/simulate.sh` takes
+//! that from the commit.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::too_many_lines,
+    clippy::unwrap_used,
+    unreachable_pub,
+    missing_docs,
+    reason = "a simulation that panics has failed; it tells people what it does"
+)]
+
+#[path = "../../fuzz/src/cbor.rs"]
+#[allow(dead_code, reason = "the fuzz targets use its other parts too")]
+mod cbor;
+#[path = "../../fuzz/src/client.rs"]
+#[allow(dead_code, reason = "the fuzz targets use its other parts too")]
+mod client;
+mod court;
+mod honest;
+mod hostile;
+#[path = "../../fuzz/src/json.rs"]
+#[allow(dead_code, reason = "the fuzz targets use its other parts too")]
+mod json;
+mod mirror;
+mod model;
+mod pipe;
+mod plan;
+mod play;
+mod workload;
+mod world;
+
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use pendularm::actors::panics;
+
+use crate::court::{Failure, Verdict};
+use crate::play::{Outcome, play};
+
+/// Seeds that have failed once: they are played first, whatever else is.
+const KEPT: &str = include_str!("kept_seeds.txt");
+/// Seeds of a plain `cargo test`, and how many of them are played twice and compared.
+const FEW: u64 = 60;
+const TWICE: u64 = 6;
+/// A long run says so often how far it is.
+const TOLD_EVERY: Duration = Duration::from_secs(60);
+/// Longer than any seed takes on the slowest machine.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+/// The last panic that nobody had put in.
+static PANIC: Mutex<Option<String>> = Mutex::new(None);
+/// The seed that is being played, and when it began, in milliseconds since the start.
+static SEED: AtomicU64 = AtomicU64::new(0);
+static BEGAN: AtomicU64 = AtomicU64::new(0);
+
+fn main() {
+    let began = Instant::now();
+    hear_panics();
+    watch(began);
+    let code = if let Some(seed) = number("SEED") {
+        play_one(seed, began)
+    } else {
+        play_many(began)
+    };
+    std::process::exit(code);
+}
+
+/// A number from the environment; an empty one counts as none.
+fn number<T: std::str::FromStr>(name: &str) -> Option<T> {
+    let text = std::env::var(name).ok().filter(|text| !text.is_empty())?;
+    Some(
+        text.parse()
+            .unwrap_or_else(|_| panic!("{name} must be a number, got {text}")),
+    )
+}
+
+/// Every panic is noted, whoever contains it.
+fn hear_panics() {
+    panics::end_with(|_| ());
+    let inner = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        let payload = info.payload();
+        let words = payload.downcast_ref::<String>().map(String::as_str);
+        let words = words
+            .or_else(|| payload.downcast_ref::<&str>().copied())
+            .unwrap_or_default();
+        // A panic in a pipe poisons the lock that its halves share.
+        let is_meant = words == pipe::MEANT || words.contains("PoisonError");
+        if !is_meant {
+            let place = info.location().map(ToString::to_string).unwrap_or_default();
+            PANIC
+                .lock()
+                .unwrap()
+                .get_or_insert(format!("{place}: {words}"));
+        }
+        inner(info);
+    }));
+}
+
+/// Ends the process where a seed does not end.
+fn watch(began: Instant) {
+    std::thread::spawn(move || {
+        loop {
+            std::thread::sleep(Duration::from_secs(1));
+            let since = Duration::from_millis(BEGAN.load(Ordering::Relaxed));
+            if began.elapsed().saturating_sub(since) > PATIENCE {
+                let words =
+                    format!("the seed takes longer than {PATIENCE:?}: some turn does not end");
+                let failure = Failure {
+                    verdict: Verdict::NoProgress,
+                    words,
+                };
+                tell(SEED.load(Ordering::Relaxed), &failure);
+                std::process::exit(failure.verdict as i32);
+            }
+        }
+    });
+}
+
+/// The last line of a failure: what is missing, and the command that shows it again.
+fn tell(seed: u64, failure: &Failure) {
+    println!(
+        "{failure}\nmake simulate SEED={seed}: {:.160}",
+        failure.to_string()
+    );
+}
+
+/// Plays a seed; a panic of whomever is its failure.
+fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
+    SEED.store(seed, Ordering::Relaxed);
+    BEGAN.store(began.elapsed().as_millis() as u64, Ordering::Relaxed);
+    *PANIC.lock().unwrap() = None;
+    let played = catch_unwind(AssertUnwindSafe(|| play(seed, keeps_log)));
+    let panic = PANIC.lock().unwrap().take();
+    let mut outcome = played.unwrap_or_else(|_| Outcome {
+        plan: String::new(),
+        failure: None,
+        hash: 0,
+        log: Vec::new(),
+        tally: BTreeMap::new(),
+    });
+    if let Some(words) = panic {
+        // What a second reader asserts of the bytes that came is about the bytes, not about the reader.
+        let is_ours = words.starts_with("src/");
+        let verdict = if is_ours {
+            Verdict::Crash
+        } else {
+            Verdict::Wrong
+        };
+        outcome.failure = Some(Failure { verdict, words });
+    }
+    outcome
+}
+
+/// Plays one seed twice, and tells all about it.
+fn play_one(seed: u64, began: Instant) -> i32 {
+    let first = attempt(seed, true, began);
+    println!("seed {seed}: {}", first.plan);
+    for line in &first.log {
+        println!("{line}");
+    }
+    let second = attempt(seed, true, began);
+    if let Some(failure) = first.failure.as_ref().or(differ(&first, &second).as_ref()) {
+        tell(seed, failure);
+        return failure.verdict as i32;
+    }
+    println!("seed {seed} holds: {:?}", first.tally);
+    0
+}
+
+/// Where two runs of one seed part.
+fn differ(first: &Outcome, second: &Outcome) -> Option<Failure> {
+    if first.hash == second.hash {
+        return None;
+    }
+    let mut pairs = first.log.iter().zip(&second.log).enumerate();
+    let place = pairs.find(|(_, (one, other))| one != other);
+    let words = place.map_or("in their lengths".to_owned(), |(at, (one, other))| {
+        format!("at event {at}: {one:?} and {other:?}")
+    });
+    Some(Failure {
+        verdict: Verdict::Wrong,
+        words: format!("two runs of one seed differ {words}"),
+    })
+}
+
+fn play_many(began: Instant) -> i32 {
+    let minutes: Option<f64> = number("MINUTES");
+    let from: u64 = number("FROM").unwrap_or(1);
+    let count: u64 = number("SEEDS").unwrap_or(if minutes.is_some() { u64::MAX } else { FEW });
+    let end = minutes.map(|minutes| Duration::from_secs_f64(minutes * 60.0));
+    let goes_on = std::env::var("GO_ON").is_ok_and(|text| !text.is_empty());
+    let how_many = match minutes {
+        Some(minutes) => format!("MINUTES={minutes}"),
+        None => format!("SEEDS={count}"),
+    };
+    println!("make simulate FROM={from} {how_many}: those that have failed once come first");
+    let mut told = Instant::now();
+    let mut tally: BTreeMap<&'static str, u64> = BTreeMap::new();
+    let (mut played, mut failed, mut code) = (0, 0, 0);
+    let kept = KEPT
+        .lines()
+        .filter_map(|line| line.split_whitespace().next()?.parse().ok());
+    for seed in kept.chain(from..from.saturating_add(count)) {
+        if end.is_some_and(|end| began.elapsed() > end) {
+            break;
+        }
+        let twice = played < TWICE;
+        let outcome = attempt(seed, twice, began);
+        played += 1;
+        if told.elapsed() > TOLD_EVERY {
+            told = Instant::now();
+            println!("{played} seeds so far, {failed} failed");
+        }
+        for (what, count) in &outcome.tally {
+            let all = tally.entry(what).or_default();
+            *all = if what.starts_with(court::MOST) {
+                *count.max(all)
+            } else {
+                *all + count
+            };
+        }
+        let again = twice.then(|| attempt(seed, true, began));
+        let differs = again.and_then(|again| differ(&outcome, &again));
+        if let Some(failure) = outcome.failure.or(differs) {
+            println!("seed {seed}: {}", outcome.plan);
+            tell(seed, &failure);
+            failed += 1;
+            code = failure.verdict as i32;
+            if !goes_on {
+                break;
+            }
+        }
+    }
+    println!(
+        "{played} seeds in {:.1} s, {failed} failed: {tally:?}",
+        began.elapsed().as_secs_f64()
+    );
+    code
+}

@@ -1,0 +1,76 @@
+//! The runtime's end of a connection: an in-memory pipe that may break, or panic, after so many bytes.
+
+use std::cell::Cell;
+use std::io::{Error, ErrorKind, Result};
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::{Context, Poll};
+
+use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf};
+
+/// In the words of every panic that was meant to happen.
+pub const MEANT: &str = "a panic that was put in";
+
+/// What is to become of a pipe.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    /// It is as good as any.
+    Sound,
+    /// The next read or write that moves a byte fails.
+    Breaks,
+    /// It panics.
+    Panics,
+}
+
+/// A pipe and its fate, which may be decided later.
+pub struct Pipe {
+    pub stream: DuplexStream,
+    pub fate: Rc<Cell<Fate>>,
+}
+
+impl Pipe {
+    fn meet(&self) -> Result<()> {
+        match self.fate.get() {
+            Fate::Sound => Ok(()),
+            Fate::Breaks => Err(Error::from(ErrorKind::ConnectionReset)),
+            Fate::Panics => {
+                self.fate.set(Fate::Breaks);
+                panic!("{MEANT}")
+            }
+        }
+    }
+}
+
+impl AsyncRead for Pipe {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<Result<()>> {
+        let before = buffer.filled().len();
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        if buffer.filled().len() > before {
+            self.meet()?;
+        }
+        polled
+    }
+}
+
+impl AsyncWrite for Pipe {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<Result<usize>> {
+        self.meet()?;
+        Pin::new(&mut self.stream).poll_write(cx, bytes)
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}

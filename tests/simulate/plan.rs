@@ -1,0 +1,152 @@
+//! What a seed is made of: which features, faults and hostile behaviours are on in it, and how often each comes.
+//!
+//! A seed has some of them and not others (swarm testing): what hides behind something else shows where that is off.
+
+use std::fmt;
+
+use crate::court::Court;
+
+macro_rules! named {
+    ($(#[$doc:meta])* $name:ident { $($(#[$one:meta])* $variant:ident),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum $name { $($(#[$one])* $variant),+ }
+        impl $name {
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+        }
+    };
+}
+
+named! {
+    /// What honest clients do.
+    Feature {
+        Ask, DriveArm, Setpoint, Publish, Subscribe, Unsubscribe, Throttle, Pieces, Cbor, Provide, Withdraw, CallOut, Compute,
+        Action, Goal, Trial, Watch, Rosapi, Mistake, FragmentIn, Wait,
+    }
+}
+
+named! {
+    /// What happens to honest clients and to the runtime without anybody's fault.
+    Fault { Stall, Vanish, ResetMidFrame, PanicInPipe, HalfClose, Jump, PanicInComputation, ProviderLost }
+}
+
+named! {
+    /// What hostile clients do.
+    Hostility {
+        SlowNumbers, LongIds, GoalWithLongId, PingFlood, Deaf, FragmentBomb, Encodings, StepByHand, Registrations, DayLongCalls,
+        Unfinished, Dribble, Garbage, TinyTimestep, Computations, Impersonate, Vanish, Silent, Foreign, ManyCalls, Throttles,
+    }
+}
+
+/// Virtual time, room and probabilities of one seed.
+pub struct Plan {
+    pub links: usize,
+    pub honest: usize,
+    pub hostile: usize,
+    pub steps: usize,
+    /// How likely a client speaks through a WebSocket.
+    pub socket: f64,
+    /// Bytes that a pipe holds.
+    pub room: usize,
+    /// Bytes that a client writes at a time.
+    pub piece: usize,
+    /// Whether all clients together have little room.
+    pub scarce: bool,
+    pub features: Vec<(Feature, f64)>,
+    pub faults: Vec<(Fault, f64)>,
+    pub hostilities: Vec<(Hostility, f64)>,
+    /// How likely a step is a fault, or a hostile deed.
+    pub fault: f64,
+    pub hostility: f64,
+}
+
+impl Plan {
+    pub fn draw(court: &Court) -> Self {
+        let has_faults = court.chance(0.6);
+        let has_enemies = court.chance(0.6);
+        let room = court.among(&[48, 200, 4096, 1 << 16, 1 << 20]);
+        let hostile = if has_enemies { 1 + court.below(4) } else { 0 };
+        let mut features = swarm(court, Feature::ALL, 0.6);
+        // Without calls and waiting nothing much can happen.
+        for one in [Feature::Ask, Feature::Wait] {
+            features.retain(|(feature, _)| *feature != one);
+            features.push((one, 2.0 + court.fraction() * 4.0));
+        }
+        Self {
+            links: 2 + court.below(2),
+            honest: 1 + court.below(5),
+            hostile,
+            steps: court.among(&[20, 40, 80, 160]),
+            socket: court.among(&[0.0, 0.5, 1.0]),
+            room,
+            piece: court.among(&[1 << 20, 1 << 20, 100, 7]),
+            scarce: court.chance(0.15),
+            features,
+            faults: swarm(court, Fault::ALL, 0.5),
+            hostilities: swarm(court, Hostility::ALL, 0.4),
+            fault: if has_faults {
+                0.02 + 0.1 * court.fraction()
+            } else {
+                0.0
+            },
+            hostility: if has_enemies {
+                0.05 + 0.5 * court.fraction()
+            } else {
+                0.0
+            },
+        }
+    }
+}
+
+/// Some of all, each with a weight.
+fn swarm<T: Copy + fmt::Debug>(court: &Court, all: &[T], share: f64) -> Vec<(T, f64)> {
+    let chosen: Vec<T> = all
+        .iter()
+        .copied()
+        .filter(|_| court.chance(share))
+        .collect();
+    let weighed = chosen
+        .into_iter()
+        .map(|one| (one, 0.2 + court.fraction() * 3.0));
+    // Left out after the draw: all else in the seed's plan stays as it is.
+    let without = std::env::var("WITHOUT").unwrap_or_default();
+    let is_left_out = |one: &T| {
+        let one = format!("{one:?}");
+        without.split(',').any(|name| name == one)
+    };
+    weighed.filter(|(one, _)| !is_left_out(one)).collect()
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            links,
+            honest,
+            hostile,
+            steps,
+            socket,
+            room,
+            piece,
+            scarce,
+            ..
+        } = self;
+        write!(
+            f,
+            "links {links}, honest {honest}, hostile {hostile}, steps {steps}, socket {socket}, room {room}, piece {piece}, \
+             scarce {scarce}, fault {:.3}, hostility {:.3};",
+            self.fault, self.hostility
+        )?;
+        for (one, weight) in &self.features {
+            write!(f, " {one:?} {weight:.2}")?;
+        }
+        write!(f, "; faults:")?;
+        for (one, weight) in &self.faults {
+            write!(f, " {one:?} {weight:.2}")?;
+        }
+        write!(f, "; hostile:")?;
+        for (one, weight) in &self.hostilities {
+            write!(f, " {one:?} {weight:.2}")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,230 @@
+//! The whole runtime in one thread and in virtual time: registry, connections on pipes, the arm behind its tap, every node, and the
+//! pool of computations, which has its turns when the simulation has.
+
+use std::cell::Cell;
+use std::net::SocketAddr;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use actix::prelude::*;
+use pendularm::actors::arm::ik::Ik;
+use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
+use pendularm::actors::arm::sim::{ArmSim, Consult};
+use pendularm::actors::compute::integration::Integration;
+use pendularm::actors::compute::study::Study;
+use pendularm::actors::compute::work_clock;
+use pendularm::actors::compute::workers::{Computation, Progress, RUNTIME, WorkerPool};
+use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::ros::rosapi::{ArmParameters, Rosapi};
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+use pendularm::protocol::catalog::{Node, Service, Topic};
+use tokio::io::{DuplexStream, duplex};
+use tokio::time::sleep;
+
+use crate::court::Court;
+use crate::mirror::{Called, Compare, Sent, Tap};
+use crate::pipe::{Fate, MEANT, Pipe};
+
+/// What a look at the clock of work costs: a dozen to what the arm may work at a time, three to a slice.
+const LOOK: Duration = Duration::from_micros(400);
+/// Where clients connect to: what `Host` has to say.
+const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
+/// Most virtual time that passes without a look at what came.
+const GLANCE: Duration = Duration::from_millis(20);
+/// A slice of a computation takes so long.
+const SLICE: Duration = Duration::from_millis(1);
+
+/// Runs a world to its end, in a runtime of its own.
+pub fn in_virtual_time<T>(course: impl Future<Output = T>) -> T {
+    work_clock::count(LOOK);
+    let system = System::with_tokio_rt(|| {
+        tokio::runtime::Builder::new_current_thread()
+            .enable_time()
+            .start_paused(true)
+            .build()
+            .expect("a runtime")
+    });
+    system.block_on(course)
+}
+
+/// What all clients together may hold in a world with little room: whoever holds more than is modest has to give way, soon.
+pub const SCARCE: usize = 400 << 10;
+
+pub struct World {
+    pub registry: Addr<Registry>,
+    pub gauges: Arc<Gauges>,
+    pub pool: WorkerPool,
+    tap: Recipient<Compare>,
+    court: Rc<Court>,
+}
+
+impl World {
+    pub async fn start(court: &Rc<Court>, links: usize, is_scarce: bool, seed: u64) -> Self {
+        let memory = if is_scarce {
+            Memory::of(SCARCE)
+        } else {
+            Memory::default()
+        };
+        let gauges = Arc::new(Gauges::with(memory));
+        let registry = Registry::new(Arc::clone(&gauges)).start();
+        let pool = WorkerPool::without_threads();
+        let mut nodes = Nodes::default();
+        let start = if links == 2 {
+            start_nodes::<2>
+        } else {
+            start_nodes::<3>
+        };
+        let tap = start(&registry, &gauges, &pool, seed, court, &mut nodes);
+        Integration::attach(&Integration::new(pool.clone()).start(), &mut nodes);
+        registry.send(Attach(nodes)).await.expect("a registry");
+        Self {
+            registry,
+            gauges,
+            pool,
+            tap,
+            court: Rc::clone(court),
+        }
+    }
+
+    /// A connection; gives the client's end, whose pipe holds `room` bytes each way, and its fate.
+    pub fn connect(&self, room: usize) -> (DuplexStream, Rc<Cell<Fate>>) {
+        let (ours, stream) = duplex(room);
+        let fate = Rc::new(Cell::new(Fate::Sound));
+        let pipe = Pipe {
+            stream,
+            fate: Rc::clone(&fate),
+        };
+        let local = SocketAddr::from(LOCAL);
+        let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
+        Connection::start_behind(Arc::default(), local, pipe, registry, gauges);
+        (ours, fate)
+    }
+
+    /// Everybody has so many turns; no time passes.
+    pub async fn turns(&self, turns: usize) {
+        for _ in 0..turns {
+            let _ = self.pool.turn();
+            tokio::task::yield_now().await;
+            self.court.turns.set(self.court.turns.get() + 1);
+        }
+    }
+
+    /// Lets some time pass, and not more than until the next look; gives how much.
+    pub async fn glance(&self, time: Duration) -> Duration {
+        let step = if self.pool.is_idle() { GLANCE } else { SLICE };
+        let step = step.min(time);
+        self.turns(2).await;
+        sleep(step).await;
+        self.turns(2).await;
+        step
+    }
+
+    /// The arm is what its double is.
+    pub async fn compare(&self) {
+        if self.tap.send(Compare).await.is_err() {
+            self.court.wrong("the arm's tap does not answer".to_owned());
+        }
+    }
+
+    /// The clock jumps.
+    pub async fn jump(&self, time: Duration) {
+        self.compare().await;
+        tokio::time::advance(time).await;
+        self.court.jumps.set(self.court.jumps.get() + 1);
+        self.compare().await;
+    }
+
+    /// A computation of nobody's that panics.
+    pub fn submit_panic(&self) {
+        self.pool.submit(RUNTIME, Box::new(Trap));
+    }
+
+    /// What all clients together hold.
+    pub fn held(&self) -> usize {
+        self.gauges.memory().held()
+    }
+
+    /// Whether nobody is connected, nothing is held for anybody, and nothing is computed.
+    pub fn is_empty(&self) -> bool {
+        self.gauges.connections() == 0 && self.held() == 0 && self.pool.is_idle()
+    }
+}
+
+struct Trap;
+
+impl Computation for Trap {
+    fn advance(&mut self, _: Instant) -> Progress {
+        panic!("{MEANT}")
+    }
+
+    fn refuse(&mut self, _: &str) {}
+}
+
+/// What `actors/runtime.rs` starts, all of it in one thread, with the tap before the arm.
+fn start_nodes<const N: usize>(
+    registry: &Addr<Registry>,
+    gauges: &Arc<Gauges>,
+    pool: &WorkerPool,
+    seed: u64,
+    court: &Rc<Court>,
+    nodes: &mut Nodes,
+) -> Recipient<Compare>
+where
+    Gains<N>: Default,
+{
+    let publish = registry.clone().recipient();
+    let arm = ArmSim::<N>::new(
+        Arm::default(),
+        Gains::default(),
+        publish.clone(),
+        Arc::clone(gauges),
+    );
+    let arm = arm.start();
+    ArmSim::attach(&arm, nodes);
+    let tap = Tap::new(arm.clone(), Gains::default(), Rc::clone(court)).start();
+    for service in Service::ALL {
+        if service.owner() == Node::ArmSim && !service.is_computation() {
+            let tap = tap.clone();
+            let route = Box::new(move |call| tap.do_send(Called(call)));
+            nodes.services.insert(service, route);
+        }
+    }
+    let listener = tap.clone();
+    let route = Box::new(move |message| listener.do_send(Sent(message)));
+    nodes.listeners.insert(Topic::JointTrajectory, route);
+    let parameters = ArmParameters {
+        params: tap.clone().recipient(),
+        gains: tap.clone().recipient(),
+        integrator: tap.clone().recipient(),
+        time: tap.clone().recipient(),
+    };
+    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
+    Rosapi::attach(&rosapi, nodes);
+    let study = Study::<N>::new(arm.clone().recipient(), pool.clone()).start();
+    Study::attach(&study, nodes);
+    arm.do_send(Consult(study.recipient()));
+    let ik = Ik::<N>::new(arm.clone().recipient()).start();
+    Ik::attach(&ik, nodes);
+    let tracker = GoalTracker {
+        track: arm.clone().recipient(),
+        command: tap.clone().recipient(),
+        end: arm.clone().recipient(),
+    };
+    let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        settle: action.recipient(),
+    };
+    let rng = fastrand::Rng::with_seed(seed);
+    let trial = IkTrial::<N>::new(arm.recipient(), goals, publish, rng).start();
+    IkTrial::attach(&trial, nodes);
+    tap.recipient()
+}

@@ -1,0 +1,174 @@
+//! Where an arm rests, on random arms, gains and setpoints: never a saddle, and the arm itself comes to rest there.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::dynamics::{energy, gravity_load};
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::linear::equilibrium;
+use pendularm::study::stability::limit_held;
+
+fn at<const N: usize>(position: [f64; N]) -> Setpoint<N> {
+    Setpoint {
+        position,
+        velocity: [0.0; N],
+    }
+}
+
+/// Gains that sag: a load of up to 19.6 N m (2 links) on springs of the same size.
+fn soft<const N: usize>(rng: &mut fastrand::Rng) -> (Gains<N>, Setpoint<N>) {
+    let first = 3.0 + 27.0 * rng.f64();
+    let mut part = 1.0;
+    let kp = std::array::from_fn(|_| {
+        let kp = first * part;
+        part /= 3.0;
+        kp
+    });
+    let gains = Gains {
+        kp,
+        ki: [0.0; N],
+        kd: kp.map(|kp| 0.3 * kp + 0.5),
+    };
+    let position = std::array::from_fn(|_| PI * (2.0 * rng.f64() - 1.0));
+    (gains, at(position))
+}
+
+/// One of the false alarms: Newton steps ran into a saddle, and every timestep was called unstable. The arm rests, and
+/// its true limit, from an independent code, is 0.456 s.
+#[test]
+fn an_arm_that_sags_far_is_not_called_unstable() {
+    let gains = Gains {
+        kp: [8.0, 2.6667],
+        ki: [0.0; 2],
+        kd: [2.6667, 1.0],
+    };
+    let setpoint = at([1.694_544_183_420_622_3, -2.503_024_457_368_377_8]);
+    let limit = limit_held(&ControlLoop::new(Arm::default(), gains, setpoint)).unwrap();
+    assert!((limit - 0.456).abs() < 5e-4, "{limit}");
+}
+
+/// Upright is an exact balance; a hair beside it the arm falls, and its limit is 0.243 s.
+#[test]
+fn an_exact_balance_is_named_and_answered_like_its_neighbours() {
+    let gains = Gains {
+        kp: [20.0, 5.0],
+        ki: [0.0; 2],
+        kd: [4.0, 1.0],
+    };
+    let arm = Arm::<2>::default();
+    for (off, balanced) in [(0.0, true), (1e-6, false), (-1e-6, false)] {
+        let setpoint = at([FRAC_PI_2 + off, 0.0]);
+        let control = ControlLoop::new(arm, gains, setpoint);
+        let rest = equilibrium(&control);
+        assert_eq!(rest.balanced, balanced, "{off}");
+        assert!(rest.residual < 1e-12, "{:e}", rest.residual);
+        let limit = limit_held(&control).unwrap();
+        assert!((limit - 0.243).abs() < 5e-4, "{off}: {limit}");
+    }
+}
+
+/// `V(rest + x) - V(rest) > 0` in every direction, without another derivative: of the arm's energy and its springs'.
+fn is_a_minimum<const N: usize>(
+    arm: &Arm<N>,
+    gains: &Gains<N>,
+    setpoint: &Setpoint<N>,
+    rest: &[f64; N],
+    rng: &mut fastrand::Rng,
+) -> bool {
+    let potential = |q: &[f64; N]| {
+        let spring: f64 = (0..N)
+            .map(|i| 0.5 * gains.kp[i] * (q[i] - setpoint.position[i]).powi(2))
+            .sum();
+        let state = State {
+            position: *q,
+            velocity: [0.0; N],
+        };
+        spring + energy(arm, &state)
+    };
+    let least = potential(rest);
+    (0..50).all(|_| {
+        let q: [f64; N] = std::array::from_fn(|i| rest[i] + 1e-3 * (2.0 * rng.f64() - 1.0));
+        // Rounding of an energy of some 100 J; the smallest curvature seen raises it by 1e-9 J.
+        potential(&q) >= least - 1e-12
+    })
+}
+
+fn check_soft<const N: usize>(seed: u64, cases: usize) {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let arm = Arm::<N>::default();
+    for case in 0..cases {
+        let (gains, setpoint) = soft::<N>(&mut rng);
+        let told = format!("seed {seed} case {case}: {gains:?} {setpoint:?}");
+        let control = ControlLoop::new(arm, gains, setpoint);
+        let rest = equilibrium(&control);
+        assert!(rest.residual < 1e-11, "{told}: {:e} N m", rest.residual);
+        assert!(
+            is_a_minimum(&arm, &gains, &setpoint, &rest.position, &mut rng),
+            "{told}: a saddle"
+        );
+        let limit = limit_held(&control);
+        assert!(limit.is_none_or(|limit| limit > 1e-3), "{told}: {limit:?}");
+    }
+}
+
+#[test]
+fn the_pose_of_every_soft_loop_is_a_minimum_and_has_a_limit() {
+    check_soft::<2>(11, 600);
+    check_soft::<3>(12, 600);
+}
+
+/// The live arm, let go at the setpoint, loses its energy and comes to a pose of the same kind: at the predicted rest
+/// it stays.
+#[test]
+fn the_arm_itself_stays_where_it_is_said_to_rest() {
+    let mut rng = fastrand::Rng::with_seed(13);
+    for case in 0..40 {
+        let (gains, setpoint) = soft::<3>(&mut rng);
+        let arm = Arm::<3>::default();
+        let control = ControlLoop::new(arm, gains, setpoint);
+        let rest = equilibrium(&control);
+        let limit = limit_held(&control).unwrap_or(0.1);
+        let beside = State::at_rest(rest.position.map(|q| q + 1e-4));
+        let timestep = 0.5 * limit.min(0.05);
+        let mut live = control.with_timestep(timestep).simulation(beside);
+        live.advance(20_000);
+        let off = (0..3).map(|i| (live.state().position[i] - rest.position[i]).abs());
+        let off = off.fold(0.0, f64::max);
+        assert!(
+            off < 1e-5,
+            "case {case}: {off} rad off, {gains:?} {setpoint:?}"
+        );
+    }
+}
+
+/// From whole turns to a thousandth of the load, in any mixture: a pose without slope, or a loop that has none.
+#[test]
+fn arms_and_gains_of_every_size_find_a_pose_without_slope() {
+    let mut rng = fastrand::Rng::with_seed(14);
+    for case in 0..500 {
+        let mut size = |decades: f64| 10_f64.powf(decades * (2.0 * rng.f64() - 1.0));
+        let arm = Arm::<3>::new(
+            [size(1.0), size(1.0), size(1.0)],
+            [size(2.0), size(2.0), size(2.0)],
+            9.81,
+        );
+        let arm = arm.unwrap();
+        let gains = Gains {
+            kp: [size(4.0), size(4.0), size(4.0)],
+            ki: [0.0; 3],
+            kd: [1.0; 3],
+        };
+        let position = std::array::from_fn(|_| TAU * (2.0 * rng.f64() - 1.0));
+        let rest = equilibrium(&ControlLoop::new(arm, gains, at(position)));
+        let load = gravity_load(&arm, &rest.position);
+        let most = load.iter().fold(1.0, |max: f64, load| max.max(load.abs()));
+        // A stretch of kp times some units of rounding of the angle, beside a load of that size.
+        let stiffest = gains.kp.iter().copied().fold(most, f64::max);
+        assert!(
+            rest.residual < 1e-13 * stiffest.max(1e2),
+            "case {case}: {:e} {arm:?} {gains:?} {position:?}",
+            rest.residual
+        );
+    }
+}

@@ -1,0 +1,142 @@
+//! Error against cost: the study's scenes behave as theory says, and are what the live arm does.
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::report::experiments::budget::Budget;
+use pendularm::report::experiments::chaos::{energy_drift, horizon, lyapunov_rate, separation};
+use pendularm::report::experiments::error::{OUTPUTS, scenes};
+use pendularm::report::experiments::reference::{Law, Reference};
+
+/// Halving the timestep divides the error by 2^p where truncation is all there is.
+#[test]
+fn every_method_has_its_order_in_every_scene_but_where_the_effort_is_held() {
+    for scene in scenes() {
+        // A held effort is half a step old on average: first order, whatever the method.
+        let held = scene.control() == "held";
+        for method in Method::ALL {
+            // Fine enough for the leading term to be all of the error, also of Euler in a whirl.
+            let steps = match method {
+                Method::Euler => 1 << 17,
+                Method::Midpoint | Method::Verlet => 1 << 14,
+                Method::Rk4 => 1 << 11,
+            };
+            let coarse = scene.run(method, steps);
+            let fine = scene.run(method, 2 * steps);
+            let order = (coarse.error / fine.error).log2();
+            let expected = if held { 1.0 } else { f64::from(method.order()) };
+            assert!(
+                (order - expected).abs() < 0.2,
+                "{} {method}: order {order}, expected {expected}",
+                scene.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn evaluations_are_counted_and_not_reckoned() {
+    for scene in scenes() {
+        for method in Method::ALL {
+            let outcome = scene.run(method, 8192);
+            let expected = 8192 * u64::from(method.evaluations());
+            assert_eq!(outcome.evaluations, expected, "{} {method}", scene.name());
+        }
+    }
+}
+
+/// What is timed (the live arm's stepper) and what is judged (the counted steps) are the same steps: the sum of the last
+/// angles says so for every scene, to the last bit.
+#[test]
+fn the_steps_that_are_timed_are_the_steps_that_are_judged() {
+    for scene in scenes() {
+        for method in Method::ALL {
+            let end = scene.run(method, 8192).end_error;
+            let sum = scene.replay(method, 8192);
+            assert!(
+                end.is_finite() && sum.is_finite(),
+                "{} {method}",
+                scene.name()
+            );
+            assert_eq!(
+                scene.judged_end(method, 8192).to_bits(),
+                sum.to_bits(),
+                "{} {method}",
+                scene.name()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_run_past_its_stability_limit_counts_as_diverged() {
+    let reach = scenes()
+        .into_iter()
+        .find(|s| s.name() == "reach-held")
+        .unwrap();
+    // 31 ms, where the held effort allows 21.7 ms.
+    assert!(reach.run(Method::Rk4, OUTPUTS).error > 0.1);
+    assert!(reach.run(Method::Rk4, 4 * OUTPUTS).diverged.is_none());
+}
+
+#[test]
+fn references_are_a_million_times_better_than_the_smallest_error_shown() {
+    for scene in scenes() {
+        assert!(
+            scene.uncertainty() < 1e-22,
+            "{}: {:e}",
+            scene.name(),
+            scene.uncertainty()
+        );
+    }
+}
+
+/// The three parts of an error are vectors: they may cancel, but their sizes bound the whole.
+#[test]
+fn the_parts_of_an_error_add_up() {
+    for control in [false, true] {
+        for parts in Budget::new(control, 2.0).parts(&Method::ALL, 8 * OUTPUTS) {
+            let sum = parts.truncation + parts.rounding + parts.hold;
+            assert!(parts.total <= sum * (1.0 + 1e-9), "{parts:?}");
+            assert!(parts.rounding < 1e-12, "{parts:?}");
+            assert_eq!(parts.hold > 0.0, control, "{parts:?}");
+        }
+    }
+}
+
+#[test]
+fn a_better_method_has_a_later_horizon() {
+    let arm = Arm::<2>::default();
+    let reference = Reference::of(&arm, &State::rest(), &Law::FREE, 0.125, 96);
+    let at = |method| {
+        let errors = separation(&arm, &State::rest(), method, 1.0 / 256.0, 32, &reference);
+        horizon(&errors, 0.125).unwrap_or(f64::INFINITY)
+    };
+    assert!(at(Method::Euler) < at(Method::Verlet));
+    assert!(at(Method::Verlet) < at(Method::Rk4));
+}
+
+/// A swing of a hundredth of a radian is as good as linear: two neighbours stay neighbours.
+#[test]
+fn a_chaotic_swing_has_a_positive_lyapunov_rate_and_a_small_one_has_none() {
+    let arm = Arm::<2>::default();
+    let [rate, ..] = lyapunov_rate(&arm, &State::rest(), 50.0);
+    assert!(rate > 0.5, "{rate}");
+    let small = State {
+        position: [-std::f64::consts::FRAC_PI_2 + 0.01, 0.0],
+        velocity: [0.0; 2],
+    };
+    let [rate, ..] = lyapunov_rate(&arm, &small, 50.0);
+    assert!(rate.abs() < 0.1, "{rate}");
+}
+
+#[test]
+fn euler_gains_energy_a_thousand_times_faster_than_runge_kutta() {
+    let arm = Arm::<2>::default();
+    let end = |method| {
+        energy_drift(&arm, &State::rest(), method, 1e-3, 5.0)
+            .last()
+            .unwrap()
+            .1
+    };
+    assert!(end(Method::Euler) > 1e3 * end(Method::Rk4));
+}

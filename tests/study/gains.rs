@@ -1,0 +1,135 @@
+//! Gains that are found: their margin and their settling, tried again by other means and on other moves.
+
+use std::f64::consts::TAU;
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::gains::{GainsError, GainsSearch, SETTLED, SuggestedGains, Wish};
+use pendularm::study::stability::limits;
+
+fn find<const N: usize>(
+    control: &ControlLoop<N>,
+    wish: Wish,
+) -> Result<SuggestedGains<N>, GainsError> {
+    let mut search = GainsSearch::new(control, wish)?;
+    loop {
+        if let Some(answer) = search.advance() {
+            return answer;
+        }
+    }
+}
+
+/// When the arm was last off the setpoint, on a random move from rest that is watched for twice the time \[s\].
+fn settles_after<const N: usize>(
+    control: &ControlLoop<N>,
+    rng: &mut fastrand::Rng,
+    time: f64,
+) -> f64 {
+    let setpoint = Setpoint::at(std::array::from_fn(|_| TAU * (2.0 * rng.f64() - 1.0)));
+    let moving = ControlLoop {
+        setpoint,
+        ..*control
+    };
+    let mut live = moving.simulation(State::rest());
+    let mut off_at = 0.0;
+    while live.time() < 2.0 * time {
+        assert!(live.step(), "diverged: {moving:?}");
+        if (0..N).any(|i| (live.state().position[i] - setpoint.position[i]).abs() > SETTLED) {
+            off_at = live.time();
+        }
+    }
+    off_at
+}
+
+fn size(rng: &mut fastrand::Rng, decades: f64) -> f64 {
+    10_f64.powf(decades * (2.0 * rng.f64() - 1.0))
+}
+
+/// Arms of 10 cm to 10 m and of 10 g to 100 kg a link. Nearly all have gains, and moves that the search has not made
+/// settle too, in at most a half more than the time.
+fn check_random<const N: usize>(seed: u64, cases: usize, refused_at_most: usize) {
+    let wish = Wish {
+        settling_time: 4.0,
+        margin: 1.25,
+    };
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let mut refused = 0;
+    for case in 0..cases {
+        let (length, mass) = (size(&mut rng, 1.0), size(&mut rng, 1.7));
+        let lengths = std::array::from_fn(|_| length * size(&mut rng, 0.2));
+        let masses = std::array::from_fn(|_| mass * size(&mut rng, 0.3));
+        let arm = Arm::<N>::new(lengths, masses, 9.81).unwrap();
+        let free = ControlLoop::free(arm).with_method(Method::ALL[case % 4]);
+        let told = format!("seed {seed} case {case}: {free:?}");
+        let Ok(found) = find(&free, wish) else {
+            println!("none: {told}");
+            refused += 1;
+            continue;
+        };
+        let control = ControlLoop {
+            gains: found.gains,
+            ..free
+        };
+        let least = limits(&control).minimum_held.unwrap();
+        assert!(least >= 1.24 * free.timestep, "{told}: {least}");
+        assert!(found.settled_after <= 4.0, "{told}");
+        for _ in 0..3 {
+            let after = settles_after(&control, &mut rng, 4.0);
+            assert!(after <= 6.0, "{told} {found:?}: {after} s");
+        }
+    }
+    assert!(refused <= refused_at_most, "{refused} of {cases} have none");
+}
+
+#[test]
+fn gains_of_random_arms_have_their_margin_and_settle() {
+    check_random::<2>(41, 16, 0);
+    check_random::<3>(42, 6, 1);
+}
+
+/// The default gains never settle a heavy arm, and are unstable on a light one.
+#[test]
+fn arms_that_the_default_gains_fail_get_gains_of_their_own() {
+    let wish = Wish {
+        settling_time: 4.0,
+        margin: 1.25,
+    };
+    let mut rng = fastrand::Rng::with_seed(43);
+    for (length, mass) in [(3.0, 50.0), (0.1, 0.05)] {
+        let arm = Arm::<2>::new([length; 2], [mass; 2], 9.81).unwrap();
+        let shipped = ControlLoop::new(arm, Gains::default(), Setpoint::default());
+        let stable = limits(&shipped)
+            .minimum_held
+            .is_some_and(|least| least > shipped.timestep);
+        assert!(
+            !stable || settles_after(&shipped, &mut rng, 4.0) > 4.0,
+            "{length} m"
+        );
+        let found = find(&shipped, wish).unwrap();
+        let control = ControlLoop {
+            gains: found.gains,
+            ..shipped
+        };
+        assert!(limits(&control).minimum_held.unwrap() >= 1.24e-3);
+        assert!(settles_after(&control, &mut rng, 4.0) <= 4.0, "{length} m");
+    }
+}
+
+#[test]
+fn what_cannot_be_had_is_refused_with_its_reason() {
+    let slow = ControlLoop::free(Arm::<2>::default()).with_timestep(0.5);
+    let wish = Wish {
+        settling_time: 4.0,
+        margin: 2.0,
+    };
+    let why = find(&slow, wish).unwrap_err().to_string();
+    assert!(
+        why.contains("within 4 s") && why.contains("margin of 2"),
+        "{why}"
+    );
+    let tiny = ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6);
+    let why = find(&tiny, wish).unwrap_err();
+    assert_eq!(why, GainsError::TooManySteps { steps: 4.0 / 1e-6 });
+}

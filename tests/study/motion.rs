@@ -1,0 +1,221 @@
+//! The timestep that a motion bears, against what becomes of the arm: within it hardly any is lost, far beyond it most
+//! are.
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::dynamics::{energy, potential_energy};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::motion::Motion;
+use pendularm::study::stability::{limit_held, limits};
+
+fn free<const N: usize>(arm: &Arm<N>, state: &State<N>, method: Method) -> Motion {
+    Motion::ahead(&ControlLoop::free(*arm).with_method(method), state)
+}
+
+/// Whether the energy above that of the hanging arm trebles within `duration`, or the numbers end.
+fn is_lost<const N: usize>(
+    arm: &Arm<N>,
+    state: &State<N>,
+    method: Method,
+    timestep: f64,
+    duration: f64,
+) -> bool {
+    let mut hanging = [0.0; N];
+    hanging[0] = -FRAC_PI_2;
+    let lowest = potential_energy(arm, &hanging);
+    let control = ControlLoop::free(*arm).with_method(method);
+    let mut live = control.with_timestep(timestep).simulation(*state);
+    let most = 3.0 * (energy(arm, state) - lowest);
+    let steps = (duration / timestep).ceil() as u64;
+    // Not finite is not at most anything.
+    (0..steps).any(|_| !(live.step() && energy(arm, live.state()) - lowest <= most))
+}
+
+/// Linearisation had no objection to any of these timesteps, or none at all.
+#[test]
+fn the_free_arms_that_were_lost_at_the_advised_timestep_are_limited_by_their_motion() {
+    let (two, three) = (Arm::<2>::default(), Arm::<3>::default());
+    let limit = free(&two, &State::rest(), Method::Verlet).timestep;
+    assert!((0.04..0.083).contains(&limit), "{limit}");
+    assert!(!is_lost(
+        &two,
+        &State::rest(),
+        Method::Verlet,
+        0.8 * limit,
+        60.0
+    ));
+    let limit = free(&three, &State::rest(), Method::Rk4).timestep;
+    assert!((0.03..0.138).contains(&limit), "{limit}");
+    assert!(!is_lost(
+        &three,
+        &State::rest(),
+        Method::Rk4,
+        0.8 * limit,
+        60.0
+    ));
+    // The same arms without gravity, spun.
+    let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
+    let spun = State {
+        position: [0.0, 0.5],
+        velocity: [1200.0, 0.0],
+    };
+    for method in [Method::Euler, Method::Midpoint, Method::Verlet] {
+        assert!(is_lost(&weightless, &spun, method, 1e-3, 0.02));
+        let limit = free(&weightless, &spun, method).timestep;
+        assert!(limit < 1e-3, "{method} {limit}");
+        // Some twenty turns.
+        assert!(
+            !is_lost(&weightless, &spun, method, 0.8 * limit, 0.1),
+            "{method}"
+        );
+    }
+}
+
+#[test]
+fn what_does_not_move_has_no_limit() {
+    let weightless = Arm::new([1.0; 3], [1.0; 3], 0.0).unwrap();
+    let motion = free(&weightless, &State::rest(), Method::Euler);
+    assert_eq!((motion.speed, motion.timestep), (0.0, f64::INFINITY));
+    let arm = Arm::<3>::default();
+    let at_rest = Motion::ahead(
+        &ControlLoop::new(arm, Gains::default(), Setpoint::default()),
+        &State::rest(),
+    );
+    assert_eq!((at_rest.speed, at_rest.timestep), (0.0, f64::INFINITY));
+}
+
+fn size(rng: &mut fastrand::Rng, decades: f64) -> f64 {
+    10_f64.powf(decades * (2.0 * rng.f64() - 1.0))
+}
+
+fn uneven<const N: usize>(rng: &mut fastrand::Rng, gravity: f64) -> Arm<N> {
+    let lengths = std::array::from_fn(|_| size(rng, 0.3));
+    let masses = std::array::from_fn(|_| size(rng, 0.5));
+    Arm::new(lengths, masses, gravity).unwrap()
+}
+
+/// Free arms, spun at 2 to 50 rad/s or falling from anywhere. Under gravity the limits of Euler and midpoint are zero
+/// by linearisation already.
+fn check_free<const N: usize>(seed: u64, cases: usize) {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    let (mut within, mut beyond, mut lost) = (0, 0, 0);
+    for case in 0..cases {
+        for (method, gravity) in Method::ALL
+            .into_iter()
+            .flat_map(|one| [(one, 0.0), (one, 9.81)])
+        {
+            let arm = uneven::<N>(&mut rng, gravity);
+            let spin = 10.0 * size(&mut rng, 0.7);
+            let state = State {
+                position: std::array::from_fn(|_| TAU * rng.f64()),
+                velocity: std::array::from_fn(|_| {
+                    if gravity == 0.0 {
+                        spin * (2.0 * rng.f64() - 1.0)
+                    } else {
+                        0.0
+                    }
+                }),
+            };
+            let swings = matches!(method, Method::Euler | Method::Midpoint) && gravity > 0.0;
+            if swings {
+                continue;
+            }
+            // A small swing about the hanging pose is slow, and limited by its frequency.
+            let linear = limit_held(&ControlLoop::free(arm).with_method(method));
+            let limit = free(&arm, &state, method)
+                .timestep
+                .min(linear.unwrap_or(f64::INFINITY));
+            let told = format!("seed {seed} case {case} {method} {arm:?} {state:?} {limit}");
+            if is_lost(&arm, &state, method, 0.8 * limit, 4.0) {
+                println!("{told}");
+                within += 1;
+            }
+            beyond += 1;
+            lost += usize::from(is_lost(&arm, &state, method, 5.0 * limit, 4.0));
+        }
+    }
+    println!("{N} links: of {beyond} arms {within} lost within the limit, {lost} at five times");
+    assert!(50 * within <= beyond, "{within} of {beyond}");
+    assert!(10 * lost > 6 * beyond, "{lost} of {beyond}");
+}
+
+#[test]
+fn free_arms_are_carried_within_the_limit_and_lost_at_a_multiple_of_it() {
+    check_free::<2>(31, 60);
+    check_free::<3>(32, 40);
+}
+
+/// Moves of up to four turns with gains of all dampings: the speed assumed is that of the true motion within a factor
+/// of four, and within both limits the arm arrives.
+fn check_moves<const N: usize>(seed: u64, cases: usize) {
+    let mut rng = fastrand::Rng::with_seed(seed);
+    for case in 0..cases {
+        let arm = uneven::<N>(&mut rng, 9.81);
+        let (lengths, masses) = (arm.lengths(), arm.masses());
+        let pace = 15.0 * size(&mut rng, 0.3);
+        let damping = size(&mut rng, 0.3);
+        let inertia: [f64; N] = std::array::from_fn(|i| {
+            let (reach, mass): (f64, f64) = (lengths[i..].iter().sum(), masses[i..].iter().sum());
+            mass * reach * reach / 3.0
+        });
+        let gains = Gains {
+            kp: inertia.map(|inertia| inertia * pace * pace),
+            ki: [0.0; N],
+            kd: inertia.map(|inertia| 2.0 * damping * inertia * pace),
+        };
+        let amplitude = TAU * size(&mut rng, 0.6);
+        let setpoint = Setpoint {
+            position: std::array::from_fn(|_| amplitude * (2.0 * rng.f64() - 1.0)),
+            velocity: [0.0; N],
+        };
+        let duration = 20.0 / pace * (1.0 + 2.0 * damping);
+        let method = Method::ALL[case % 4];
+        let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
+        let motion = Motion::ahead(&control, &State::rest());
+        let told = format!("seed {seed} case {case} {method} {arm:?} {gains:?} {setpoint:?}");
+        let run = |timestep: f64| {
+            let mut live = control.with_timestep(timestep).simulation(State::rest());
+            let mut peak: f64 = 0.0;
+            for _ in 0..(duration / timestep).ceil() as u64 {
+                assert!(live.step(), "{told}: diverged at {timestep} s");
+                let mut rate = 0.0;
+                for velocity in live.state().velocity {
+                    rate += velocity;
+                    peak = peak.max(rate.abs());
+                }
+            }
+            let off = (0..N).map(|i| (live.state().position[i] - setpoint.position[i]).abs());
+            (peak, off.fold(0.0, f64::max))
+        };
+        let linear = limits(&control).minimum_held.unwrap();
+        let (peak, off) = run(0.8 * linear.min(motion.timestep));
+        assert!(off < 0.2 * amplitude.max(1.0), "{told}: {off} rad off");
+        let ratio = motion.speed / peak;
+        assert!(
+            (0.25..4.0).contains(&ratio),
+            "{told}: {ratio} times {peak} rad/s"
+        );
+    }
+}
+
+#[test]
+fn moves_are_carried_at_a_speed_that_is_known_before() {
+    check_moves::<2>(33, 60);
+    check_moves::<3>(34, 40);
+}
+
+/// Of two even links, stretched, `M = (4/3 1/2; 1/2 1/3)` in the angles of the links, and `(M⁻¹)₂₂ = 48/7`. From the
+/// starting pose the arm falls by `2 · 9.81` J, which the last link alone might have.
+#[test]
+fn the_speed_assumed_is_that_of_all_energy_in_one_link() {
+    let motion = free(&Arm::<2>::default(), &State::rest(), Method::Rk4);
+    let expected = (2.0 * 2.0 * 9.81 * 48.0 / 7.0_f64).sqrt();
+    assert!(
+        (motion.speed / expected - 1.0).abs() < 1e-12,
+        "{}",
+        motion.speed
+    );
+}

@@ -1,0 +1,111 @@
+//! Plans, against references of twice the digits: the error that was allowed is kept.
+
+use glam::DVec2;
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::kinematics::forward;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::report::experiments::reference::{Law, Reference};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::planner::{Candidate, MAX_DURATION, PlanError, Planned, Planning, Task};
+
+fn plan<const N: usize>(task: Task<N>) -> Result<Planned, PlanError> {
+    let mut planning = Planning::new(task)?;
+    loop {
+        if let Some(planned) = planning.advance() {
+            return planned;
+        }
+    }
+}
+
+fn swing(duration: f64, error: f64) -> Task<2> {
+    Task {
+        control: ControlLoop::free(Arm::default()),
+        start: State::at_rest([0.4, -0.3]),
+        duration,
+        error,
+    }
+}
+
+/// The largest distance of the end effector from the reference, at fifty instants.
+fn error_of<const N: usize>(task: &Task<N>, law: &Law<N>, candidate: &Candidate) -> f64 {
+    let steps = (task.duration / candidate.timestep).round() as usize;
+    let every = (steps / 50).max(1);
+    let count = steps / every;
+    let spacing = candidate.timestep * every as f64;
+    let truth = Reference::of(&task.control.arm, &task.start, law, spacing, count);
+    let control = task.control.with_method(candidate.method);
+    let mut live = control
+        .with_timestep(candidate.timestep)
+        .simulation(task.start);
+    let tip = |state: &State<N>| -> DVec2 {
+        forward(task.control.arm.lengths(), &state.position).position
+    };
+    (0..count)
+        .map(|index| {
+            live.advance(every as u64);
+            tip(live.state()).distance(tip(&truth.state(index).unwrap()))
+        })
+        .fold(0.0, f64::max)
+}
+
+#[test]
+fn a_planned_swing_keeps_within_its_error() {
+    for error in [1e-2, 1e-5, 1e-8] {
+        let task = swing(3.0, error);
+        let planned = plan(task).unwrap();
+        for candidate in &planned.candidates {
+            let seen = error_of(&task, &Law::FREE, candidate);
+            assert!(seen <= error, "{candidate:?}: {seen:e}");
+            assert!(
+                (seen - candidate.error).abs() <= 0.2 * error,
+                "{candidate:?}: {seen:e}"
+            );
+        }
+        // Order 4 is the cheapest wherever much is asked.
+        let best = planned.best().unwrap();
+        assert!(error > 1e-3 || best.method == Method::Rk4, "{planned:?}");
+        // A step a half longer is too long.
+        let longer = Candidate {
+            timestep: task.duration / (task.duration / (1.5 * best.timestep)).ceil(),
+            ..*best
+        };
+        assert!(error_of(&task, &Law::FREE, &longer) > error, "{planned:?}");
+    }
+}
+
+/// Under control it is holding the effort that costs, so that the method of fewest evaluations wins.
+#[test]
+fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant() {
+    let (gains, setpoint) = (Gains::default(), Setpoint::at([0.8, -0.6]));
+    let task = Task {
+        control: ControlLoop::new(Arm::<2>::default(), gains, setpoint),
+        start: State::rest(),
+        duration: 2.0,
+        error: 5e-3,
+    };
+    let planned = plan(task).unwrap();
+    for candidate in &planned.candidates {
+        let seen = error_of(&task, &Law::Continuous(gains, setpoint), candidate);
+        assert!(seen <= task.error, "{candidate:?}: {seen:e}");
+    }
+    let best = planned.best().unwrap();
+    assert_eq!(best.method, Method::Euler, "{planned:?}");
+    assert!(
+        planned
+            .candidates
+            .is_sorted_by(|one, other| one.evaluations >= other.evaluations)
+    );
+}
+
+#[test]
+fn what_nobody_can_know_is_not_planned() {
+    let chaos = Task {
+        start: State::rest(),
+        ..swing(100.0, 1e-3)
+    };
+    assert!(matches!(plan(chaos), Err(PlanError::Unknown { .. })));
+    let duration = MAX_DURATION.next_up();
+    let long = plan(swing(duration, 1e-3));
+    assert_eq!(long, Err(PlanError::TooLong { duration }));
+}

@@ -1,0 +1,165 @@
+//! The study's own reference motions against stored 70-digit ones.
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation;
+use pendularm::report::experiments::reference::{
+    DoubleDouble, Law, Reference, exact_steps, largest_difference,
+};
+use serde_json::Value;
+
+fn stored() -> Value {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/trajectories.json");
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    let values = value.as_array().unwrap();
+    values.iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+fn array<const N: usize>(value: &Value) -> [f64; N] {
+    numbers(value).try_into().unwrap()
+}
+
+fn compare<const N: usize>(case: &Value) {
+    let name = &case["name"];
+    let arm = Arm::new(
+        array::<N>(&case["lengths"]),
+        array(&case["masses"]),
+        case["gravity"].as_f64().unwrap(),
+    )
+    .unwrap();
+    let start = State {
+        position: array(&case["q0"]),
+        velocity: array(&case["qdot0"]),
+    };
+    let mut before = 0.0;
+    let intervals: Vec<f64> = numbers(&case["times"])
+        .into_iter()
+        .map(|t| t - std::mem::replace(&mut before, t))
+        .collect();
+    let law = Law::Constant(array(&case["tau"]));
+    let reference = Reference::between(&arm, &start, &law, &intervals);
+    for index in 0..reference.len() {
+        let state = reference.state(index).unwrap();
+        let growth = case["growth_max"][index].as_f64().unwrap();
+        // Stored values are rounded to the nearest double, and so are ours. The intervals are differences of rounded
+        // times, off by up to an ulp of the time: times the rate, that is an error of the same size.
+        let (exact_q, exact_v) = (
+            array::<N>(&case["q"][index]),
+            array::<N>(&case["qdot"][index]),
+        );
+        let acceleration = array::<N>(&case["qddot"][index]);
+        for i in 0..N {
+            let ulps = |scale: f64| 4.0 * f64::EPSILON * scale.abs().max(1.0);
+            let q = (state.position[i] - exact_q[i]).abs();
+            let v = (state.velocity[i] - exact_v[i]).abs();
+            let time = 10.0 * f64::EPSILON;
+            let q_bound = ulps(exact_q[i]) + time * exact_v[i].abs();
+            let v_bound = ulps(exact_v[i]) + time * acceleration[i].abs();
+            assert!(q <= q_bound, "{name} {N} {index} {i}: {q:e} > {q_bound:e}");
+            assert!(v <= v_bound, "{name} {N} {index} {i}: {v:e} > {v_bound:e}");
+        }
+        // What is stored about sensitivity bounds what rounding at 106 bits can have done on the way.
+        let own = reference.uncertainty()[index];
+        assert!(
+            own <= 1e-27 * growth,
+            "{name} {N} {index}: {own:e}, growth {growth:e}"
+        );
+    }
+}
+
+#[test]
+fn references_reproduce_the_stored_motions_to_the_last_bits() {
+    let stored = stored();
+    for case in stored["cases"].as_array().unwrap() {
+        match case["n"].as_u64().unwrap() {
+            1 => compare::<1>(case),
+            2 => compare::<2>(case),
+            3 => compare::<3>(case),
+            4 => compare::<4>(case),
+            n => panic!("no arm of {n} links here"),
+        }
+    }
+}
+
+const GAINS: Gains<2> = Gains {
+    kp: [200.0, 100.0],
+    ki: [0.0; 2],
+    kd: [30.0, 12.0],
+};
+
+const SETPOINT: Setpoint<2> = Setpoint {
+    position: [0.8, -0.6],
+    velocity: [0.0; 2],
+};
+
+fn start() -> State<2> {
+    State {
+        position: [0.1, 0.2],
+        velocity: [0.5, -0.3],
+    }
+}
+
+/// With the effort of a linear spring and damper, halving the period of a held effort halves its distance to the law at
+/// every instant: the held effort is on average half a period old.
+#[test]
+fn a_held_effort_approaches_the_continuous_law_at_first_order() {
+    let arm = Arm::<2>::default();
+    let continuous = Law::Continuous(GAINS, SETPOINT);
+    let exact = Reference::of(&arm, &start(), &continuous, 0.125, 4);
+    let distance = |period: f64| {
+        let law = Law::Held {
+            gains: GAINS,
+            setpoint: SETPOINT,
+            period,
+        };
+        let held = Reference::of(&arm, &start(), &law, 0.125, 4);
+        let state = held.state(3).unwrap();
+        exact.angle_error(3, &state.position).unwrap()
+    };
+    let ratio = distance(1.0 / 512.0) / distance(1.0 / 1024.0);
+    assert!((ratio - 2.0).abs() < 0.05, "{ratio}");
+}
+
+/// The steps of the live arm and the same steps with twice the digits differ by rounding alone: a few ulps in 128 steps.
+#[test]
+fn exact_steps_are_the_steps_of_the_live_arm_without_rounding() {
+    let h = 1.0 / 256.0;
+    for method in Method::ALL {
+        for control in [false, true] {
+            let mut live = Simulation::<2>::new(Arm::default(), GAINS);
+            live.set_method(method);
+            live.set_timestep(h);
+            live.set_state(start());
+            live.enable(control);
+            live.set_setpoint(SETPOINT);
+            live.advance(128);
+            let law = if control {
+                Law::Held {
+                    gains: GAINS,
+                    setpoint: SETPOINT,
+                    period: h,
+                }
+            } else {
+                Law::FREE
+            };
+            let exact = exact_steps(&Arm::default(), &start(), &law, method, h, 128, 1);
+            let (q, v) = exact.first().unwrap();
+            assert!(largest_difference(q, &live.state().position) < 1e-14);
+            assert!(largest_difference(v, &live.state().velocity) < 1e-13);
+        }
+    }
+}
+
+/// The whole point of a reference: its own error is far below what a double can show.
+#[test]
+fn a_reference_knows_far_more_digits_than_a_double() {
+    let arm = Arm::<3>::default();
+    let reference = Reference::of(&arm, &State::rest(), &Law::FREE, 0.5, 4);
+    assert!(reference.uncertainty().iter().all(|own| *own < 1e-26));
+    assert!(reference.angle_error(0, &[f64::NAN; 3]).unwrap().is_nan());
+    assert_eq!(DoubleDouble::from(1.5).to_f64(), 1.5);
+}

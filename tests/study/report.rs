@@ -1,0 +1,76 @@
+//! `pendularm report`: files, resuming, refusals. What is in them is the study's own business.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use pendularm::report::{ReportError, ReportOptions, names, run};
+
+/// A directory that is gone after the test.
+struct Scratch(PathBuf);
+
+impl Scratch {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("pendularm-{name}-{}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        Self(path)
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+fn quick(out: &Path, only: &[&str]) -> ReportOptions {
+    ReportOptions {
+        out: out.to_owned(),
+        only: only.iter().map(|&name| name.to_owned()).collect(),
+        quick: true,
+    }
+}
+
+#[test]
+fn a_section_leaves_page_figures_and_numbers() {
+    let scratch = Scratch::new("files");
+    let page = run(&quick(&scratch.0, &["conditioning"])).unwrap();
+    let html = fs::read_to_string(page).unwrap();
+    assert!(html.contains("<svg class=\"plot\""));
+    // Self-contained: nothing is fetched, nothing is run.
+    for fetched in ["src=", "@import", "url(", "<script", "<link"] {
+        assert!(!html.contains(fetched), "{fetched}");
+    }
+    for file in ["conditioning.csv", "conditioning.svg", "report.json"] {
+        assert!(scratch.0.join(file).exists(), "{file}");
+    }
+    let svg = fs::read_to_string(scratch.0.join("conditioning.svg")).unwrap();
+    assert!(
+        svg.starts_with("<svg xmlns=\"http://www.w3.org/2000/svg\"") && svg.contains("<style>")
+    );
+    // A pose, 19 mass ratios, three times, and the head.
+    let csv = fs::read_to_string(scratch.0.join("conditioning.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 58);
+}
+
+#[test]
+fn a_section_made_anew_keeps_the_others() {
+    let scratch = Scratch::new("resume");
+    run(&quick(&scratch.0, &["conditioning"])).unwrap();
+    let first = fs::read_to_string(scratch.0.join("sections/conditioning.json")).unwrap();
+    let page = run(&quick(&scratch.0, &["drift"])).unwrap();
+    let html = fs::read_to_string(page).unwrap();
+    assert!(
+        html.contains("<section id=\"conditioning\">") && html.contains("<section id=\"drift\">")
+    );
+    let kept = fs::read_to_string(scratch.0.join("sections/conditioning.json")).unwrap();
+    assert_eq!(first, kept);
+}
+
+#[test]
+fn an_unknown_section_is_refused_with_the_names_of_all() {
+    let scratch = Scratch::new("unknown");
+    let error = run(&quick(&scratch.0, &["colour"])).unwrap_err();
+    assert!(matches!(&error, ReportError::UnknownSection { name } if name == "colour"));
+    assert!(error.to_string().contains(&names()));
+    assert!(!scratch.0.exists());
+}

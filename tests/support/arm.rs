@@ -1,0 +1,120 @@
+//! What the tests of the arm share: reading its messages, sending it somewhere, and the gravity load by another route.
+
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::common::{Client, PATIENCE};
+
+/// The numbers of a JSON array.
+pub fn numbers(array: &Value) -> Vec<f64> {
+    let entries = array
+        .as_array()
+        .unwrap_or_else(|| panic!("no array: {array}"));
+    entries
+        .iter()
+        .map(|entry| {
+            entry
+                .as_f64()
+                .unwrap_or_else(|| panic!("no number: {array}"))
+        })
+        .collect()
+}
+
+/// Simulation time in the header of a message, in s.
+pub fn stamp(message: &Value) -> f64 {
+    time(&message["header"]["stamp"])
+}
+
+/// A `builtin_interfaces/msg/Time` in s.
+pub fn time(stamp: &Value) -> f64 {
+    let sec = stamp["sec"].as_f64().expect("sec");
+    let nanosec = stamp["nanosec"].as_u64().expect("nanosec");
+    assert!(nanosec < 1_000_000_000, "{stamp}");
+    // Divided, which is rounded rightly: the time that was stamped comes back.
+    sec + nanosec as f64 / 1e9
+}
+
+/// A trajectory of one point for these positions.
+pub fn trajectory(positions: &[f64]) -> Value {
+    json!({"points": [{"positions": positions}]})
+}
+
+/// Sends a message to `/joint_trajectory`; what is called next happens after it.
+pub fn send_trajectory(client: &mut Client, msg: &Value) {
+    client.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": msg}));
+}
+
+/// The state as it is now: the first `/joint_states` after the response to a call, which none from before it follows.
+/// The client must have subscribed.
+pub fn state(client: &mut Client) -> Value {
+    client.settle();
+    client.kept.clear();
+    client.message("/joint_states")
+}
+
+/// Waits for a state for which `wanted` holds.
+pub fn state_where(client: &mut Client, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
+    let deadline = Instant::now() + PATIENCE;
+    let mut last = Value::Null;
+    while Instant::now() < deadline {
+        last = client.message("/joint_states");
+        client.kept.clear();
+        if wanted(&last) {
+            return last;
+        }
+    }
+    panic!("no {what} in time; the last state was {last}");
+}
+
+/// Reads and throws away what comes for so long.
+pub fn let_pass(client: &mut Client, time: Duration) {
+    let end = Instant::now() + time;
+    while Instant::now() < end {
+        client.receive();
+    }
+    client.kept.clear();
+}
+
+/// Whether every joint is within `tolerance` of its place.
+pub fn is_near(state: &Value, positions: &[f64], tolerance: f64) -> bool {
+    numbers(&state["position"])
+        .iter()
+        .zip(positions)
+        .all(|(is, wanted)| (is - wanted).abs() < tolerance)
+}
+
+/// The gravity load by the textbook: about joint `i`, each link beyond it pulls with its weight at its centre of mass, so
+/// `G_i = g sum_k m_k (x_k - x_i)` with `x_k` the centre of link `k` and `x_i` the joint, measured along the horizontal.
+pub fn gravity_load(lengths: &[f64], masses: &[f64], gravity: f64, q: &[f64]) -> Vec<f64> {
+    let mut angle = 0.0;
+    let mut joint = 0.0;
+    let (mut joints, mut centres) = (Vec::new(), Vec::new());
+    for (length, turn) in lengths.iter().zip(q) {
+        angle += turn;
+        joints.push(joint);
+        centres.push(joint + 0.5 * length * angle.cos());
+        joint += length * angle.cos();
+    }
+    joints
+        .iter()
+        .enumerate()
+        .map(|(i, joint)| {
+            (i..q.len())
+                .map(|k| gravity * masses[k] * (centres[k] - joint))
+                .sum()
+        })
+        .collect()
+}
+
+/// What a right runtime shows on a quiet machine and a wrong one never does may fail now and then on a busy one.
+pub fn in_one_of_three_tries(what: &str, attempt: impl Fn() -> Result<(), String>) {
+    let mut failures = Vec::new();
+    for _ in 0..3 {
+        match attempt() {
+            Ok(()) => return,
+            Err(failure) => failures.push(failure),
+        }
+    }
+    panic!("{what}: {failures:?}");
+}

@@ -1,0 +1,119 @@
+//! What the process-level tests share: the built program on a free port, and the client that is connected to it.
+
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+pub use pendularm_client::blocking::{Client, PATIENCE};
+use serde_json::json;
+
+/// A call that shows in the arm's parameters, for whoever tries what must not be executed.
+pub const SET_GRAVITY: &str =
+    "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
+
+/// The program, running; ended with the value.
+pub struct Runtime {
+    child: Child,
+    pub address: SocketAddr,
+}
+
+impl Runtime {
+    /// Starts the program with 2 links on a free port of the loopback interface.
+    pub fn start() -> Self {
+        Self::with(&[])
+    }
+
+    /// The same with `links` links.
+    pub fn with_links(links: usize) -> Self {
+        Self::with(&["--links", &links.to_string()])
+    }
+
+    /// The same with more arguments.
+    pub fn with(arguments: &[&str]) -> Self {
+        Self::with_bind("127.0.0.1:0", arguments)
+    }
+
+    /// The same at another address.
+    pub fn with_bind(bind: &str, arguments: &[&str]) -> Self {
+        let program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
+        Self::spawn(program, bind, arguments)
+    }
+
+    /// The same, started by a shell that has done `prelude` before: sets limits, say.
+    pub fn under(prelude: &str) -> Self {
+        let mut shell = Command::new("sh");
+        let script = format!("{prelude} && exec \"$0\" \"$@\"");
+        shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
+        Self::spawn(shell, "127.0.0.1:0", &[])
+    }
+
+    fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
+        for variable in [
+            "ARM_SIM_LINKS",
+            "ARM_SIM_BIND",
+            "ARM_SIM_SEED",
+            "ARM_SIM_LOG",
+            "ARM_SIM_TOKEN",
+            "ARM_SIM_ALLOW_HOST",
+            "ARM_SIM_ALLOW_ORIGIN",
+            "ARM_SIM_STRICT_ORIGIN",
+            "ARM_SIM_REPORT",
+        ] {
+            command.env_remove(variable);
+        }
+        let mut child = command
+            .args(["--bind", bind])
+            .args(arguments)
+            .env("ARM_SIM_LOG", "off")
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().expect("stdout is piped"))
+            .read_line(&mut line)
+            .expect("the program says where it listens");
+        let address = line
+            .trim()
+            .strip_prefix("listening on ")
+            .and_then(|address| address.parse().ok())
+            .unwrap_or_else(|| panic!("not an address: {line:?}"));
+        Self { child, address }
+    }
+
+    pub fn connect(&self) -> Client {
+        Client::to(self.address)
+    }
+
+    pub fn pid(&self) -> u32 {
+        self.child.id()
+    }
+
+    /// That [`SET_GRAVITY`], hidden in what was sent, was not executed.
+    pub fn assert_nothing_was_executed(&self) {
+        let parameters = self.connect().ask("/arm_sim/set_params", json!({}));
+        assert_eq!(parameters["gravity"], 9.81);
+    }
+
+    /// The exit status, if the program ends within `limit`.
+    pub fn wait(&mut self, limit: Duration) -> Option<std::process::ExitStatus> {
+        let deadline = Instant::now() + limit;
+        loop {
+            if let Some(status) = self.child.try_wait().expect("the child can be asked") {
+                return Some(status);
+            }
+            if Instant::now() > deadline {
+                return None;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+impl Drop for Runtime {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,336 @@
+//! What the tests in virtual time share: the nodes around a goal on one thread whose clock stands still until nobody
+//! has anything to do, and a client that speaks rosbridge through an in-memory pipe.
+//!
+//! A second passes in no time and always in the same way, so that steps, messages and their order can be counted.
+
+use std::future::Future;
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use actix::prelude::*;
+use pendularm::actors::arm::ik::Ik;
+use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
+use pendularm::actors::arm::sim::{
+    ArmPose, ArmSim, CommandGoal, EndGoal, GoalJudged, Pose, Snapshot, TakeSnapshot, TrackGoal,
+    Tracking,
+};
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::gateway::registry::{Attach, Registry};
+use pendularm::actors::node::Publish;
+use pendularm::actors::wire::Nodes;
+use pendularm::math::arm::Arm;
+use pendularm::math::pid::Gains;
+use pendularm::math::simulation::Simulation;
+use pendularm::protocol::catalog::Topic;
+use pendularm_client::pipe;
+use serde_json::{Value, json};
+use tokio::io::DuplexStream;
+use tokio::sync::mpsc::UnboundedSender;
+use tokio::time::{sleep, timeout};
+
+/// Virtual time that anything may take before a test gives up.
+pub const PATIENCE: Duration = Duration::from_secs(600);
+
+/// Runs a test on one thread in virtual time.
+pub fn in_virtual_time<T>(test: impl Future<Output = T>) -> T {
+    counting_wake_ups(|_| test)
+}
+
+/// The same; the test is told how often the thread has gone to sleep, and so how often something woke it.
+pub fn counting_wake_ups<T, F: Future<Output = T>>(test: impl FnOnce(Arc<AtomicU64>) -> F) -> T {
+    let sleeps = Arc::new(AtomicU64::new(0));
+    let counter = Arc::clone(&sleeps);
+    let system = System::with_tokio_rt(move || {
+        tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .start_paused(true)
+            .on_thread_park(move || {
+                counter.fetch_add(1, Ordering::Relaxed);
+            })
+            .build()
+            .unwrap()
+    });
+    system.block_on(test(sleeps))
+}
+
+pub fn ms(milliseconds: u64) -> Duration {
+    Duration::from_millis(milliseconds)
+}
+
+/// All nodes that a goal concerns, joined as the runtime joins them.
+pub struct Stage<const N: usize> {
+    pub registry: Addr<Registry>,
+    pub arm: Addr<ArmSim<N>>,
+    pub action: Addr<IkAction<N>>,
+    gauges: Arc<Gauges>,
+}
+
+impl<const N: usize> Stage<N>
+where
+    Gains<N>: Default,
+{
+    pub async fn start() -> Self {
+        Self::with_seed(1).await
+    }
+
+    pub async fn with_seed(seed: u64) -> Self {
+        let gauges = Arc::new(Gauges::default());
+        let registry = Registry::new(Arc::clone(&gauges)).start();
+        let mut nodes = Nodes::default();
+        let arm = ArmSim::<N>::new(
+            Arm::default(),
+            Gains::default(),
+            registry.clone().recipient(),
+            Arc::clone(&gauges),
+        )
+        .start();
+        ArmSim::attach(&arm, &mut nodes);
+        let tracker = GoalTracker {
+            track: arm.clone().recipient(),
+            command: arm.clone().recipient(),
+            end: arm.clone().recipient(),
+        };
+        let pose = arm.clone().recipient();
+        let action = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
+        registry.send(Attach(nodes)).await.unwrap();
+        Self {
+            registry,
+            arm,
+            action,
+            gauges,
+        }
+    }
+
+    pub fn connect(&self) -> Client {
+        connect(&self.registry, &self.gauges)
+    }
+
+    /// The arm's whole simulation, as it is now.
+    pub async fn simulation(&self) -> Simulation<N> {
+        let Snapshot(simulation) = self.arm.send(TakeSnapshot).await.unwrap();
+        *simulation
+    }
+
+    /// A client, with the arm weightless and at rest at q = 0: it stays where it is, to the bit.
+    pub async fn with_a_floating_arm() -> (Self, Client) {
+        let stage = Self::start().await;
+        let mut client = stage.connect();
+        client
+            .ask("/arm_sim/set_params", json!({"gravity": 0}))
+            .await;
+        client.ask("/arm_sim/reset", json!({})).await;
+        (stage, client)
+    }
+}
+
+/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to.
+pub fn start_goal_nodes<const N: usize>(
+    registry: &Addr<Registry>,
+    pose: Recipient<ArmPose<N>>,
+    tracker: GoalTracker<N>,
+    seed: u64,
+    nodes: &mut Nodes,
+) -> Addr<IkAction<N>> {
+    let publish = || registry.clone().recipient();
+    let ik = Ik::<N>::new(pose.clone()).start();
+    Ik::attach(&ik, nodes);
+    let action = IkAction::<N>::new(ik.recipient(), tracker, publish()).start();
+    IkAction::attach(&action, nodes);
+    let goals = GoalClient {
+        send: action.clone().recipient(),
+        cancel: action.clone().recipient(),
+        settle: action.clone().recipient(),
+    };
+    let rng = fastrand::Rng::with_seed(seed);
+    let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
+    IkTrial::attach(&trial, nodes);
+    action
+}
+
+/// A client in the registry's own thread, through an in-memory pipe.
+pub fn connect(registry: &Addr<Registry>, gauges: &Arc<Gauges>) -> Client {
+    let (ours, theirs) = tokio::io::duplex(1 << 20);
+    Connection::start_on(theirs, registry.clone(), Arc::clone(gauges));
+    Client(pipe::Client::on(ours, PATIENCE).remembering())
+}
+
+/// A client, over a pipe, that remembers every frame it has heard.
+pub struct Client(pipe::Client<DuplexStream>);
+
+impl Deref for Client {
+    type Target = pipe::Client<DuplexStream>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for Client {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
+impl Client {
+    pub async fn next(&mut self) -> Value {
+        self.receive().await
+    }
+
+    pub async fn next_where(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.receive_where(wanted).await
+    }
+
+    /// Sends a goal that must be accepted and gives its id.
+    pub async fn send_goal(&mut self, args: Value) -> String {
+        let values = self.ask("/ik_action/send_goal", args).await;
+        values["goal_id"].as_str().unwrap().to_owned()
+    }
+
+    pub async fn unsubscribe(&mut self, topic: &str) {
+        self.send(&json!({"op": "unsubscribe", "topic": topic}))
+            .await;
+        self.settle().await;
+    }
+
+    pub async fn enable(&mut self) {
+        self.ask("/pid_controller/enable", json!({"data": true}))
+            .await;
+    }
+
+    pub async fn publish_trajectory(&mut self, positions: Value) {
+        self.send(&json!({"op": "publish", "topic": "/joint_trajectory",
+            "msg": {"points": [{"positions": positions}]}}))
+            .await;
+        self.settle().await;
+    }
+
+    /// Lets `time` pass, and gives the messages on `topic` that came in it.
+    pub async fn messages_for(&mut self, time: Duration, topic: &str) -> Vec<Value> {
+        let before = self.heard.len();
+        let listen = async {
+            loop {
+                self.next().await;
+            }
+        };
+        let _: Result<(), _> = timeout(time, listen).await;
+        messages(&self.heard[before..], topic)
+    }
+
+    /// What was heard on `topic` so far.
+    pub fn messages(&self, topic: &str) -> Vec<Value> {
+        messages(&self.heard, topic)
+    }
+
+    /// What was heard so far in few words: topics, services and, of results, the outcome. Statuses are left out.
+    pub fn story(&self) -> Vec<String> {
+        let words = |frame: &Value| match frame["op"].as_str() {
+            Some("publish") => {
+                let topic = frame["topic"].as_str().unwrap();
+                let msg = &frame["msg"];
+                let goal = msg["goal_id"].as_str().unwrap_or_default();
+                let outcome = msg["outcome"].as_str().unwrap_or_default();
+                Some(format!("{topic} {goal} {outcome}").trim_end().to_owned())
+            }
+            Some("service_response") => Some(frame["service"].as_str().unwrap().to_owned()),
+            _ => None,
+        };
+        self.heard.iter().filter_map(words).collect()
+    }
+}
+
+fn messages(frames: &[Value], topic: &str) -> Vec<Value> {
+    frames
+        .iter()
+        .filter(|frame| frame["topic"] == topic)
+        .map(|frame| frame["msg"].clone())
+        .collect()
+}
+
+/// Lets virtual time pass.
+pub async fn pass(time: Duration) {
+    sleep(time).await;
+}
+
+pub fn number(value: &Value) -> f64 {
+    value
+        .as_f64()
+        .unwrap_or_else(|| panic!("not a number: {value}"))
+}
+
+pub fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(number).collect()
+}
+
+/// An arm that says nothing unless it is asked, and makes no steps.
+pub struct SilentArm;
+
+impl SilentArm {
+    /// An arm as `ik_action` wants it.
+    pub fn tracker(address: &Addr<Self>) -> GoalTracker<2> {
+        GoalTracker {
+            track: address.clone().recipient(),
+            command: address.clone().recipient(),
+            end: address.clone().recipient(),
+        }
+    }
+}
+
+impl Actor for SilentArm {
+    type Context = Context<Self>;
+}
+
+impl Handler<ArmPose<2>> for SilentArm {
+    type Result = Pose<2>;
+
+    fn handle(&mut self, _: ArmPose<2>, _: &mut Context<Self>) -> Pose<2> {
+        Pose {
+            lengths: [1.0, 1.0],
+            positions: [0.0, 0.0],
+            simulated: 0.0,
+        }
+    }
+}
+
+impl Handler<TrackGoal<2>> for SilentArm {
+    type Result = Tracking<2>;
+
+    fn handle(&mut self, goal: TrackGoal<2>, _: &mut Context<Self>) -> Tracking<2> {
+        Tracking {
+            positions: goal.solution,
+            before: None,
+        }
+    }
+}
+
+impl Handler<CommandGoal<2>> for SilentArm {
+    type Result = ();
+
+    fn handle(&mut self, _: CommandGoal<2>, _: &mut Context<Self>) {}
+}
+
+impl Handler<EndGoal<2>> for SilentArm {
+    type Result = Option<GoalJudged<2>>;
+
+    fn handle(&mut self, _: EndGoal<2>, _: &mut Context<Self>) -> Self::Result {
+        None
+    }
+}
+
+/// Takes what nodes publish in the registry's place: here nothing is left out for want of subscribers.
+pub struct Published(pub UnboundedSender<Topic>);
+
+impl Actor for Published {
+    type Context = Context<Self>;
+}
+
+impl Handler<Publish> for Published {
+    type Result = ();
+
+    fn handle(&mut self, message: Publish, _: &mut Context<Self>) {
+        self.0.send(message.topic).unwrap();
+    }
+}

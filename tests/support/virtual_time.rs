@@ -1,0 +1,274 @@
+//! What the actor tests share: the gateway's actors on one thread with a paused clock, clients on in-memory pipes, and
+//! nodes that are closures.
+//!
+//! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.
+
+use std::cell::RefCell;
+use std::future::Future;
+use std::ops::{Deref, DerefMut};
+use std::rc::Rc;
+use std::sync::Arc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::gateway::registry::{Attach, Registry};
+use pendularm::actors::node::Interest;
+use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
+use pendularm::protocol::catalog::{Service, Topic};
+use pendularm_client::pipe::Client;
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::time::{Instant, sleep, timeout};
+
+/// Longer than anything in here waits.
+const LONG: Duration = Duration::from_secs(7 * 24 * 3600);
+/// The timers' grain.
+pub const GRAIN: Duration = Duration::from_millis(2);
+/// The pipe to a client that takes everything at once.
+pub const WIDE: usize = 1 << 26;
+
+/// Runs a test on one thread, in virtual time.
+pub fn run(test: impl Future<Output = ()>) {
+    System::with_tokio_rt(|| {
+        tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .start_paused(true)
+            .build()
+            .expect("a runtime")
+    })
+    .block_on(test);
+}
+
+/// Registry and gauges, with the nodes of a test.
+pub struct Gateway {
+    pub registry: Addr<Registry>,
+    pub gauges: Arc<Gauges>,
+}
+
+impl Gateway {
+    /// A gateway without nodes.
+    pub async fn bare() -> Self {
+        Self::with(Nodes::default()).await
+    }
+
+    pub async fn with(nodes: Nodes) -> Self {
+        Self::within(Memory::default(), nodes).await
+    }
+
+    /// A gateway whose clients together may hold so much.
+    pub async fn within(memory: Memory, nodes: Nodes) -> Self {
+        let gauges = Arc::new(Gauges::with(memory));
+        let registry = Registry::new(Arc::clone(&gauges)).start();
+        registry.send(Attach(nodes)).await.expect("a registry");
+        Self { registry, gauges }
+    }
+
+    /// A client whose pipe holds `room` bytes each way.
+    pub fn connect(&self, room: usize) -> Peer {
+        let (ours, theirs) = duplex(room);
+        Connection::start_on(theirs, self.registry.clone(), Arc::clone(&self.gauges));
+        Peer(Client::on(ours, LONG))
+    }
+}
+
+/// A client on an in-memory pipe.
+pub struct Peer(Client<DuplexStream>);
+
+impl Deref for Peer {
+    type Target = Client<DuplexStream>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.0
+    }
+}
+
+impl DerefMut for Peer {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.0
+    }
+}
+
+impl Peer {
+    pub async fn send(&mut self, frame: Value) {
+        self.0.send(&frame).await;
+    }
+
+    pub async fn send_text(&mut self, text: &str) {
+        self.send_bytes(text.as_bytes()).await;
+    }
+
+    /// Sends text as far as it is taken at once; false if that is not all, or the client has been disconnected.
+    pub async fn offer(&mut self, text: &str) -> bool {
+        let send = self.stream().write_all(text.as_bytes());
+        matches!(timeout(GRAIN, send).await, Ok(Ok(())))
+    }
+
+    /// Shuts down the writing side.
+    pub async fn half_close(&mut self) {
+        self.finish().await;
+    }
+
+    /// Takes what comes up to the end of the stream.
+    pub async fn drain(&mut self) {
+        let mut bytes = Vec::new();
+        let _ = self.stream().read_to_end(&mut bytes).await;
+    }
+
+    /// Takes just this many bytes out of the pipe.
+    pub async fn take(&mut self, bytes: usize) {
+        let mut buffer = vec![0; bytes];
+        let reading = self.stream().read_exact(&mut buffer);
+        timeout(LONG, reading)
+            .await
+            .expect("they come")
+            .expect("an open pipe");
+    }
+
+    pub async fn subscribe(&mut self, topic: &str) {
+        self.send(json!({"op": "subscribe", "topic": topic})).await;
+        assert_eq!(self.receive().await["level"], "info");
+    }
+
+    pub async fn advertise(&mut self, topic: &str) {
+        self.send(json!({"op": "advertise", "topic": topic})).await;
+    }
+
+    pub async fn provide(&mut self, service: &str) {
+        self.send(json!({"op": "advertise_service", "service": service}))
+            .await;
+        assert_eq!(self.receive().await["level"], "info");
+    }
+
+    pub async fn publish(&mut self, topic: &str, n: u64) {
+        self.send(json!({"op": "publish", "topic": topic, "msg": {"n": n}}))
+            .await;
+    }
+
+    pub async fn call(&mut self, service: &str, id: u64) {
+        self.send(json!({"op": "call_service", "service": service, "id": id}))
+            .await;
+    }
+
+    /// Answers a call that this client has received as a provider.
+    pub async fn answer(&mut self, call: &Value, values: Value) {
+        let (service, id) = (&call["service"], &call["id"]);
+        self.send(json!({"op": "service_response", "service": service, "id": id, "values": values, "result": true}))
+            .await;
+    }
+}
+
+/// Lets everything happen that needs no time, and what needs next to none.
+pub async fn settle() {
+    sleep(Duration::from_millis(10)).await;
+}
+
+/// A node that keeps the calls that come, unanswered.
+#[derive(Clone, Default)]
+pub struct Held(pub Rc<RefCell<Vec<ServiceCall>>>);
+
+impl Held {
+    pub fn count(&self) -> usize {
+        self.0.borrow().len()
+    }
+
+    /// The oldest call that is held.
+    pub fn take(&self) -> Caller {
+        self.0.borrow_mut().remove(0).caller
+    }
+
+    /// Answers the oldest call.
+    pub fn answer(&self) {
+        self.take().succeed(&json!({}));
+    }
+}
+
+/// A node: hands what it is sent to closures.
+pub struct Node {
+    pub on_call: Box<dyn FnMut(ServiceCall)>,
+    pub on_message: Box<dyn FnMut(TopicMessage)>,
+    pub on_interest: Box<dyn FnMut(Interest)>,
+}
+
+impl Default for Node {
+    fn default() -> Self {
+        Self {
+            on_call: Box::new(drop),
+            on_message: Box::new(drop),
+            on_interest: Box::new(drop),
+        }
+    }
+}
+
+impl Node {
+    /// A node that keeps its calls.
+    pub fn holding(held: &Held) -> Self {
+        let held = held.clone();
+        Self {
+            on_call: Box::new(move |call| held.0.borrow_mut().push(call)),
+            ..Self::default()
+        }
+    }
+
+    /// Starts it as the one that serves `services`, takes and publishes `topics`.
+    pub fn attach(self, nodes: &mut Nodes, services: &[Service], topics: &[Topic]) {
+        let address = self.start();
+        for service in services {
+            let node = address.clone();
+            let route = Box::new(move |call| node.do_send(Called(call)));
+            nodes.services.insert(*service, route);
+        }
+        for topic in topics {
+            let node = address.clone();
+            let route = Box::new(move |message| node.do_send(Sent(message)));
+            nodes.listeners.insert(*topic, route);
+            nodes.publishers.insert(*topic, address.clone().recipient());
+        }
+    }
+}
+
+impl Actor for Node {
+    type Context = Context<Self>;
+}
+
+/// A call, unread.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Called(ServiceCall);
+
+impl Handler<Called> for Node {
+    type Result = ();
+    fn handle(&mut self, Called(call): Called, _: &mut Context<Self>) {
+        (self.on_call)(call);
+    }
+}
+
+/// A message on a topic, unread.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Sent(TopicMessage);
+
+impl Handler<Sent> for Node {
+    type Result = ();
+    fn handle(&mut self, Sent(message): Sent, _: &mut Context<Self>) {
+        (self.on_message)(message);
+    }
+}
+
+impl Handler<Interest> for Node {
+    type Result = ();
+    fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
+        (self.on_interest)(interest);
+    }
+}
+
+/// Asserts that `since` is `expected` ago.
+pub fn assert_elapsed(since: Instant, expected: Duration) {
+    let elapsed = since.elapsed();
+    assert!(
+        elapsed >= expected && elapsed <= expected + 10 * GRAIN,
+        "{elapsed:?} instead of {expected:?}"
+    );
+}

@@ -1,0 +1,165 @@
+//! What the tests of the web door share: requests as bytes, answers taken apart, and the client over WebSocket.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpStream};
+use std::ops::{Deref, DerefMut};
+use std::path::{Path, PathBuf};
+
+use serde_json::{Value, json};
+
+use crate::common::{Client, PATIENCE};
+
+/// A folder of one test's own, below the build's.
+pub fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+/// An answer over HTTP.
+#[derive(Debug)]
+pub struct Answer {
+    pub status: u16,
+    headers: Vec<(String, String)>,
+    pub body: Vec<u8>,
+}
+
+impl Answer {
+    /// Takes an answer apart, which is all that came before the end of the stream.
+    pub fn parse(bytes: &[u8]) -> Self {
+        let end = bytes
+            .windows(4)
+            .position(|window| window == b"\r\n\r\n")
+            .unwrap_or_else(|| panic!("no head in {:?}", String::from_utf8_lossy(bytes)));
+        let head = std::str::from_utf8(&bytes[..end]).expect("a head is text");
+        let mut lines = head.split("\r\n");
+        let first = lines.next().unwrap();
+        let status = first
+            .strip_prefix("HTTP/1.1 ")
+            .and_then(|rest| rest.get(..3))
+            .and_then(|code| code.parse().ok())
+            .unwrap_or_else(|| panic!("not a status line: {first:?}"));
+        let headers = lines
+            .map(|line| {
+                let (name, value) = line.split_once(": ").expect("a header");
+                (name.to_ascii_lowercase(), value.to_owned())
+            })
+            .collect();
+        let answer = Self {
+            status,
+            headers,
+            body: bytes[end + 4..].to_vec(),
+        };
+        if status != 101 {
+            let length: usize = answer.header("content-length").unwrap().parse().unwrap();
+            assert_eq!(length, answer.body.len());
+        }
+        answer
+    }
+
+    pub fn header(&self, name: &str) -> Option<&str> {
+        let found = self.headers.iter().find(|(one, _)| one == name)?;
+        Some(&found.1)
+    }
+
+    pub fn text(&self) -> &str {
+        std::str::from_utf8(&self.body).expect("a text")
+    }
+}
+
+/// Sends bytes and gives all that comes up to the end of the stream.
+pub fn exchange(address: SocketAddr, request: &[u8]) -> Vec<u8> {
+    let mut stream = TcpStream::connect(address).expect("the program accepts");
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    stream.write_all(request).expect("the program takes it");
+    rest(&mut stream)
+}
+
+/// All that comes up to the end of the stream.
+pub fn rest(stream: &mut TcpStream) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    stream.read_to_end(&mut bytes).expect("an orderly end");
+    bytes
+}
+
+/// Sends a request with these header lines, each with its line end.
+pub fn request(address: SocketAddr, path: &str, headers: &str) -> Answer {
+    let request = format!("GET {path} HTTP/1.1\r\n{headers}\r\n");
+    Answer::parse(&exchange(address, request.as_bytes()))
+}
+
+/// The same with our own host.
+pub fn get(address: SocketAddr, path: &str) -> Answer {
+    request(address, path, &format!("Host: {address}\r\n"))
+}
+
+/// The header lines of a handshake that is as it has to be.
+pub fn handshake(address: SocketAddr) -> String {
+    format!(
+        "Host: {address}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
+         Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
+    )
+}
+
+/// The status of a handshake, and its body if it was refused.
+pub fn try_handshake(address: SocketAddr, path: &str, headers: &str) -> (u16, String) {
+    let mut stream = TcpStream::connect(address).expect("the program accepts");
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    let request = format!("GET {path} HTTP/1.1\r\n{headers}\r\n");
+    stream.write_all(request.as_bytes()).unwrap();
+    let mut bytes = Vec::new();
+    let mut chunk = [0; 4096];
+    while !bytes.starts_with(b"HTTP/1.1 101 ") || !bytes.ends_with(b"\r\n\r\n") {
+        match stream.read(&mut chunk) {
+            Ok(0) => break,
+            Ok(read) => bytes.extend_from_slice(&chunk[..read]),
+            Err(error) => panic!("{error}"),
+        }
+    }
+    let answer = Answer::parse(&bytes);
+    (answer.status, answer.text().to_owned())
+}
+
+/// A client over WebSocket, where nothing comes that was not asked for.
+pub struct Socket(Client);
+
+impl Deref for Socket {
+    type Target = Client;
+
+    fn deref(&self) -> &Client {
+        &self.0
+    }
+}
+
+impl DerefMut for Socket {
+    fn deref_mut(&mut self) -> &mut Client {
+        &mut self.0
+    }
+}
+
+impl Socket {
+    pub fn open(address: SocketAddr) -> Self {
+        Self(Client::web(address))
+    }
+
+    pub fn open_with(address: SocketAddr, target: &str, headers: &str) -> Self {
+        Self(Client::web_with(address, target, headers))
+    }
+
+    /// Calls a service and returns its response, which must be the very next frame.
+    #[track_caller]
+    pub fn call(&mut self, service: &str, args: Value) -> Value {
+        let response = self.0.call(service, args);
+        assert!(self.kept.is_empty(), "{:?}", self.kept);
+        response
+    }
+
+    /// Waits until all that was sent has been handled, and asserts that nothing else was said.
+    #[track_caller]
+    pub fn settle(&mut self) {
+        let response = self.call("/arm_sim/set_params", json!({}));
+        assert_eq!(response["result"], true, "{response}");
+    }
+}

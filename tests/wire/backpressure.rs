@@ -1,0 +1,256 @@
+//! Contract section 2: one slow or dead client never delays another, and costs a bounded amount of memory.
+//!
+//! **Invariant:** nothing here is told by a clock: the fast client goes in lockstep, the slow one is shown by counts and
+//! by the program's peak memory.
+
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use crate::common::{Client, PATIENCE, Runtime};
+use pendularm::actors::gateway::limits::MAX_BACKLOG;
+use serde_json::{Value, json};
+
+const MIB: usize = 1024 * 1024;
+/// What the program needs by itself, and what an allocator and a test build add.
+const BASE: usize = 40 * MIB;
+
+/// The most memory that the program has had resident, in bytes.
+fn peak_memory(runtime: &Runtime) -> usize {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", runtime.pid())).unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmHWM"))
+        .unwrap();
+    let kilobytes: usize = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+    kilobytes * 1024
+}
+
+fn diagnostic(client: &mut Client, key: &str) -> u64 {
+    let message = client.message("/diagnostics");
+    let statuses = message["status"].as_array().unwrap();
+    let gateway = statuses
+        .iter()
+        .find(|one| one["name"] == "gateway")
+        .unwrap();
+    let values = gateway["values"].as_array().unwrap();
+    let value = values.iter().find(|one| one["key"] == key).unwrap();
+    value["value"].as_str().unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted() {
+    let runtime = Runtime::start();
+    let mut deaf = runtime.connect();
+    deaf.subscribe("/t");
+    let mut client = runtime.connect();
+    client.send(&json!({"op": "advertise", "topic": "/t"}));
+    client.subscribe("/t");
+    // 100 MiB, of which the deaf client's outbox takes 4 and the system's buffers some.
+    let blob = "x".repeat(MIB / 4);
+    for n in 0..400 {
+        client.send(&json!({"op": "publish", "topic": "/t", "msg": {"n": n, "blob": blob}}));
+        assert_eq!(
+            client.message("/t")["n"],
+            n,
+            "in lockstep, so nothing is lost"
+        );
+    }
+    let peak = peak_memory(&runtime);
+    assert!(peak < BASE, "{peak} bytes for an outbox of 4 MiB");
+    client.subscribe("/diagnostics");
+    let dropped = diagnostic(&mut client, "messages_dropped");
+    assert!(dropped > 200, "{dropped} of 400");
+
+    let mut received = vec![];
+    while received.last() != Some(&399) {
+        received.push(deaf.message("/t")["n"].as_u64().unwrap());
+    }
+    assert!(
+        received.is_sorted_by(|a, b| a < b),
+        "reordered: {received:?}"
+    );
+    assert_eq!(
+        received.len() as u64,
+        400 - dropped,
+        "what is not dropped arrives"
+    );
+    // 4 MiB at the end are the newest 15 messages of a little over 256 KiB: the oldest went first.
+    assert!(
+        received.ends_with(&(385..400).collect::<Vec<_>>()),
+        "{received:?}"
+    );
+}
+
+#[test]
+fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
+    const CALLS: usize = 90;
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let mut stream = client.stream().try_clone().unwrap();
+    let sent = Arc::new(AtomicUsize::new(0));
+    let count = Arc::clone(&sent);
+    let id = "x".repeat(MIB);
+    let sending = std::thread::spawn(move || {
+        for n in 0..CALLS {
+            let frame = json!({"op": "call_service", "service": "/arm_sim/pause", "id": format!("{n} {id}")});
+            stream.write_all(format!("{frame}\n").as_bytes()).unwrap();
+            count.store(n + 1, Ordering::Relaxed);
+        }
+    });
+    // It comes to a stand, and nobody else notices.
+    let mut other = runtime.connect();
+    let (mut before, mut since) = (0, Instant::now());
+    while since.elapsed() < Duration::from_millis(500) {
+        other.settle();
+        let now = sent.load(Ordering::Relaxed);
+        if now != before {
+            (before, since) = (now, Instant::now());
+        }
+    }
+    assert!(before >= 32, "{before} calls of a MiB are under the limit");
+    assert!(
+        before < CALLS,
+        "everything was read although nothing was taken"
+    );
+    let peak = peak_memory(&runtime);
+    assert!(
+        peak < BASE + 50 * MIB,
+        "{peak} bytes for 32 MiB of responses and a frame"
+    );
+    for n in 0..CALLS {
+        let response = client.receive();
+        let id = response["id"].as_str().unwrap();
+        assert_eq!(id.len(), MIB + n.to_string().len() + 1);
+        assert!(id.starts_with(&format!("{n} ")), "out of order at {n}");
+    }
+    sending.join().unwrap();
+}
+
+#[test]
+fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() {
+    let runtime = Runtime::start();
+    let mut provider = runtime.connect();
+    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
+    provider.status();
+    let mut caller = runtime.connect();
+    let blob = "x".repeat(MIB);
+    let mut busy = 0;
+    for id in 0..200 {
+        caller.send(
+            &json!({"op": "call_service", "service": "/s", "id": id, "timeout": 1e-3,
+            "args": {"blob": blob}}),
+        );
+        let response = caller.receive();
+        assert_eq!(
+            (&response["id"], &response["result"]),
+            (&json!(id), &json!(false))
+        );
+        busy += usize::from(
+            response["status"]
+                .as_str()
+                .unwrap()
+                .contains("does not read"),
+        );
+    }
+    assert!(busy > 50, "{busy} of 200 refused");
+    let peak = peak_memory(&runtime);
+    assert!(
+        peak < BASE + MAX_BACKLOG + 16 * MIB,
+        "{peak} bytes for 64 MiB that may wait"
+    );
+}
+
+/// A flood is read as fast as the arm takes it: the others' calls go in between. Without that they would wait for
+/// all of it, minutes.
+#[test]
+fn a_flood_of_trajectories_delays_nobody() {
+    let runtime = Runtime::start();
+    let stop = Arc::new(AtomicBool::new(false));
+    let floods: Vec<_> = (0..3)
+        .map(|_| {
+            let stream = runtime.connect().stream().try_clone().unwrap();
+            let stop = Arc::clone(&stop);
+            std::thread::spawn(move || {
+                let frame = json!({"op": "publish", "topic": "/joint_trajectory",
+                    "msg": {"points": [{"positions": [0.1, 0.2]}]}});
+                let frames = format!("{frame}\n").repeat(500);
+                while !stop.load(Ordering::Relaxed) {
+                    (&stream).write_all(frames.as_bytes()).unwrap();
+                }
+            })
+        })
+        .collect();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    let began = Instant::now();
+    for _ in 0..100 {
+        client.settle();
+        client.kept.clear();
+    }
+    for _ in 0..10 {
+        client.message("/joint_states");
+    }
+    assert!(began.elapsed() < PATIENCE, "{:?}", began.elapsed());
+    stop.store(true, Ordering::Relaxed);
+    for flood in floods {
+        flood.join().unwrap();
+    }
+}
+
+#[test]
+fn a_flood_of_garbage_is_answered_line_by_line_in_bounded_memory() {
+    const LINES: usize = 50_000;
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let mut stream = client.stream().try_clone().unwrap();
+    let sending = std::thread::spawn(move || stream.write_all(&b"x\n".repeat(LINES)).unwrap());
+    let mut other = runtime.connect();
+    for _ in 0..20 {
+        other.settle();
+    }
+    for _ in 0..LINES {
+        let status: Value = client.receive();
+        assert_eq!(status["level"], "error");
+    }
+    sending.join().unwrap();
+    assert!(peak_memory(&runtime) < BASE + 32 * MIB);
+}
+
+#[test]
+fn ids_of_four_mebibytes_are_echoed_again_and_again() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let id = "x".repeat(4 * MIB - 200);
+    for op in [
+        "nonsense",
+        "call_service",
+        "unadvertise_service",
+        "advertise",
+    ] {
+        for _ in 0..4 {
+            client.send(&json!({"op": op, "service": "/none", "topic": "/clock", "id": id}));
+            assert_eq!(client.receive()["id"], id.as_str());
+        }
+    }
+    assert!(peak_memory(&runtime) < BASE + 32 * MIB);
+}
+
+/// A message of a few bytes must not cost a subscriber that never reads many times its size.
+#[test]
+fn an_outbox_full_of_the_smallest_messages_is_bounded_too() {
+    let runtime = Runtime::start();
+    let mut deaf = runtime.connect();
+    deaf.subscribe("/t");
+    let mut client = runtime.connect();
+    client.send(&json!({"op": "advertise", "topic": "/t"}));
+    // 12 MB: three times what the outbox holds.
+    let frames = "{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{}}\n".repeat(10_000);
+    for _ in 0..30 {
+        client.send_bytes(frames.as_bytes());
+        client.settle();
+    }
+    let peak = peak_memory(&runtime);
+    assert!(peak < BASE, "{peak} bytes");
+}

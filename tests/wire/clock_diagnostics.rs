@@ -1,0 +1,272 @@
+//! `/clock` and `/diagnostics` from outside.
+
+use std::time::Duration;
+
+use crate::arm::{stamp, time};
+use crate::common::{Client, Runtime};
+use pendularm::actors::gateway::budget::MODEST;
+use serde_json::{Value, json};
+
+/// The contract's, then ours.
+const KEYS: [&str; 11] = [
+    "state",
+    "sim_time",
+    "real_time_factor",
+    "steps_per_second",
+    "energy",
+    "energy_drift",
+    "max_step_time",
+    "timestep_limit",
+    "timestep_limit_motion",
+    "setpoint",
+    "warning",
+];
+
+fn status<'a>(message: &'a Value, name: &str) -> &'a Value {
+    let all = message["status"].as_array().unwrap();
+    all.iter()
+        .find(|status| status["name"] == name)
+        .unwrap_or_else(|| panic!("no {name} in {message}"))
+}
+
+fn text<'a>(status: &'a Value, key: &str) -> &'a str {
+    let values = status["values"].as_array().unwrap();
+    let entry = values.iter().find(|entry| entry["key"] == key);
+    entry
+        .and_then(|entry| entry["value"].as_str())
+        .unwrap_or_else(|| panic!("no {key} in {status}"))
+}
+
+fn number(status: &Value, key: &str) -> f64 {
+    text(status, key).parse().unwrap()
+}
+
+/// The arm's status in the next message.
+fn arm_status(client: &mut Client) -> Value {
+    status(&client.message("/diagnostics"), "arm_sim").clone()
+}
+
+#[test]
+fn the_clock_is_the_time_in_the_joint_states_at_the_same_rate() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/clock");
+    client.subscribe("/joint_states");
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    let state = client.message("/joint_states");
+    let clock = client.message("/clock");
+    assert_eq!(clock, json!({"clock": state["header"]["stamp"]}));
+    client.ask("/arm_sim/pause", json!({"data": false}));
+    client.kept.clear();
+    let seen = client.receive_for(Duration::from_secs(1));
+    let times: Vec<f64> = seen
+        .iter()
+        .filter(|frame| frame["topic"] == "/clock")
+        .map(|frame| time(&frame["msg"]["clock"]))
+        .collect();
+    let states: Vec<f64> = seen
+        .iter()
+        .filter(|frame| frame["topic"] == "/joint_states")
+        .map(|frame| stamp(&frame["msg"]))
+        .collect();
+    assert!(times.len() > 20, "{} in a second", times.len());
+    assert!(times.len().abs_diff(states.len()) <= 1);
+    assert!(
+        times
+            .iter()
+            .all(|time| states.contains(time) || time > states.last().unwrap())
+    );
+}
+
+#[test]
+fn diagnostics_have_the_documented_statuses_and_keys_once_a_second() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/diagnostics");
+    let first = client.message("/diagnostics");
+    assert_eq!(first["header"]["frame_id"], "world");
+    assert_eq!(first["status"].as_array().unwrap().len(), 2);
+    let arm = status(&first, "arm_sim");
+    assert_eq!(arm["message"], "running");
+    let keys: Vec<&str> = arm["values"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|entry| entry["key"].as_str().unwrap())
+        .collect();
+    assert_eq!(keys, KEYS);
+    assert_eq!(text(arm, "state"), "running");
+    for key in &KEYS[1..7] {
+        assert!(number(arm, key).is_finite(), "{key}");
+    }
+    assert_eq!(text(arm, "warning"), "");
+    let gateway = status(&first, "gateway");
+    assert_eq!(gateway["level"], 0);
+    assert_eq!(number(gateway, "connections"), 1.0);
+    assert_eq!(number(gateway, "messages_dropped"), 0.0);
+    assert_eq!(number(gateway, "clients_cut_off"), 0.0);
+    let held = number(gateway, "bytes_held");
+    assert!(held > 0.0 && held < MODEST as f64, "{held}");
+    let more = client.receive_for(Duration::from_millis(3500));
+    assert!((2..=4).contains(&more.len()), "{} in 3.5 s", more.len());
+}
+
+#[test]
+fn rates_are_those_of_wall_time() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/diagnostics");
+    arm_status(&mut client);
+    // A busy machine may lose some; an idle one gives 1 and 1000.
+    for _ in 0..2 {
+        let arm = arm_status(&mut client);
+        let (factor, rate) = (
+            number(&arm, "real_time_factor"),
+            number(&arm, "steps_per_second"),
+        );
+        assert!((0.5..1.3).contains(&factor), "{arm}");
+        assert!(
+            (rate - 1000.0 * factor).abs() < 1.0,
+            "steps of a millisecond: {arm}"
+        );
+        let step = number(&arm, "max_step_time");
+        assert!(step > 0.0 && step < 0.1, "{arm}");
+    }
+}
+
+#[test]
+fn every_change_of_state_is_told_at_once_and_nothing_else_is() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.subscribe("/diagnostics");
+    let paused = arm_status(&mut client);
+    assert_eq!(
+        (&paused["level"], &paused["message"]),
+        (&json!(0), &json!("paused"))
+    );
+    assert_eq!(text(&paused, "state"), "paused");
+    for (data, state) in [(false, "running"), (true, "paused"), (false, "running")] {
+        client.kept.clear();
+        client.ask("/arm_sim/pause", json!({"data": data}));
+        client.ask("/arm_sim/pause", json!({"data": data}));
+        let told: Vec<&Value> = client
+            .kept
+            .iter()
+            .filter(|frame| frame["topic"] == "/diagnostics")
+            .collect();
+        // Before the response; the message of the second may fall in between.
+        assert!((1..=2).contains(&told.len()), "{told:?}");
+        assert_eq!(text(status(&told[0]["msg"], "arm_sim"), "state"), state);
+    }
+}
+
+#[test]
+fn a_paused_arm_makes_no_steps() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.subscribe("/diagnostics");
+    arm_status(&mut client);
+    let arm = arm_status(&mut client);
+    assert_eq!(number(&arm, "real_time_factor"), 0.0);
+    assert_eq!(number(&arm, "steps_per_second"), 0.0);
+    assert_eq!(number(&arm, "max_step_time"), 0.0);
+}
+
+/// The default arm on its side has no energy and, swinging freely by rk4 at 1 ms, keeps that for a second within 1e-6 J.
+/// Forward Euler at 10 ms gains a good part of a joule.
+#[test]
+fn the_setpoint_is_told_to_whoever_comes_late() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    crate::arm::send_trajectory(&mut client, &crate::arm::trajectory(&[0.25, -1.5]));
+    client.subscribe("/diagnostics");
+    let told = (0..5).map(|_| text(&arm_status(&mut client), "setpoint").to_owned());
+    assert!(told.into_iter().any(|setpoint| setpoint == "[0.25, -1.5]"));
+    client.ask("/arm_sim/reset", json!({}));
+    let told = (0..5).map(|_| text(&arm_status(&mut client), "setpoint").to_owned());
+    assert!(told.into_iter().any(|setpoint| setpoint == "[0.0, 0.0]"));
+}
+
+#[test]
+fn the_energy_drift_counts_from_reset_parameters_and_switch() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/diagnostics");
+    client.ask("/arm_sim/reset", json!({}));
+    let free = arm_status(&mut client);
+    assert!(number(&free, "energy").abs() < 1e-6, "{free}");
+    assert!(number(&free, "energy_drift").abs() < 1e-6, "{free}");
+
+    client.ask(
+        "/arm_sim/set_integrator",
+        json!({"method": "euler", "timestep": 0.01}),
+    );
+    arm_status(&mut client);
+    let gained = arm_status(&mut client);
+    assert!(number(&gained, "energy_drift") > 0.01, "{gained}");
+    assert!(
+        (number(&gained, "energy_drift") - number(&gained, "energy")).abs() < 1e-6,
+        "from 0: {gained}"
+    );
+
+    // Frozen, so that nothing happens between the change and the message.
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    let frozen = arm_status(&mut client);
+    assert!(
+        number(&frozen, "energy_drift") > 0.01,
+        "a pause is no change: {frozen}"
+    );
+    client.ask("/arm_sim/set_params", json!({"gravity": 9.81}));
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.02}));
+    client.ask(
+        "/pid_controller/set_gains",
+        json!({"kp": [1, 1], "ki": [0, 0], "kd": [0, 0]}),
+    );
+    client.ask("/pid_controller/enable", json!({"data": false}));
+    client.kept.clear();
+    let same = arm_status(&mut client);
+    assert_eq!(
+        number(&same, "energy_drift"),
+        number(&frozen, "energy_drift"),
+        "nor is what changes nothing"
+    );
+    for (service, args) in [
+        ("/arm_sim/set_params", json!({"gravity": 5})),
+        ("/pid_controller/enable", json!({"data": true})),
+        ("/pid_controller/enable", json!({"data": false})),
+        ("/arm_sim/reset", json!({})),
+    ] {
+        client.ask("/arm_sim/pause", json!({"data": false}));
+        std::thread::sleep(Duration::from_millis(300));
+        client.ask("/arm_sim/pause", json!({"data": true}));
+        client.ask(service, args);
+        client.kept.clear();
+        assert_eq!(
+            number(&arm_status(&mut client), "energy_drift"),
+            0.0,
+            "{service}"
+        );
+    }
+}
+
+/// No machine takes a step in a picosecond: the arm lags, says so, and goes on answering.
+#[test]
+fn an_arm_that_can_not_follow_wall_time_warns() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/diagnostics");
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e-12}));
+    arm_status(&mut client);
+    let lagging = arm_status(&mut client);
+    assert_eq!(
+        (&lagging["level"], &lagging["message"]),
+        (&json!(1), &json!("running"))
+    );
+    assert!(number(&lagging, "real_time_factor") < 0.01, "{lagging}");
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
+    client.kept.clear();
+    arm_status(&mut client);
+    assert_eq!(arm_status(&mut client)["level"], 0);
+}

@@ -1,0 +1,118 @@
+//! Open files run out: clients too many are told so, those served go on, and nothing spins.
+//!
+//! **Invariant:** the limits are the process's own, set by the shell that starts it; nothing of the machine is changed.
+
+use std::time::Instant;
+
+use crate::common::{Client, PATIENCE, Runtime};
+use pendularm::actors::gateway::limits::MAX_CONNECTIONS;
+use serde_json::json;
+
+/// Sets the program's soft limit of open files, under a hard one of 40.
+fn set_soft_limit(runtime: &Runtime, files: usize) {
+    let limit = format!("--nofile={files}:40");
+    let set = std::process::Command::new("prlimit")
+        .args(["--pid", &runtime.pid().to_string(), &limit])
+        .status()
+        .expect("prlimit runs");
+    assert!(set.success());
+}
+
+/// Seconds of processor time that the program has used.
+fn processor_seconds(runtime: &Runtime) -> f64 {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", runtime.pid())).unwrap();
+    // Behind the name in brackets: state, then ten numbers, then user and system ticks of 10 ms.
+    let fields: Vec<&str> = stat[stat.rfind(')').unwrap()..]
+        .split_whitespace()
+        .collect();
+    (fields[12].parse::<f64>().unwrap() + fields[13].parse::<f64>().unwrap()) / 100.0
+}
+
+/// A client that is one too many: what it is told, and the end.
+fn is_refused(client: &mut Client) -> String {
+    let status = client.receive();
+    assert_eq!(status["level"], "error", "{status}");
+    assert!(client.is_closed());
+    status["msg"].as_str().unwrap().to_owned()
+}
+
+/// Whether a new client has a place once the end of another has been noticed.
+fn is_served_at_last(runtime: &Runtime) -> bool {
+    let began = Instant::now();
+    while began.elapsed() < PATIENCE {
+        let mut next = runtime.connect();
+        next.send(&json!({"op": "call_service", "service": "/arm_sim/pause"}));
+        if next.receive()["op"] == "service_response" {
+            return true;
+        }
+    }
+    false
+}
+
+/// The usual soft limit of 1,024 is not enough for 1,024 clients: it is raised.
+#[test]
+fn a_thousand_and_twenty_four_clients_are_served_and_the_next_is_told_so() {
+    // This side of the connections needs files too, two for each.
+    let ours = rlimit::increase_nofile_limit(4 * MAX_CONNECTIONS as u64).unwrap();
+    assert!(
+        ours > 3 * MAX_CONNECTIONS as u64,
+        "the test needs files too"
+    );
+    let runtime = Runtime::under("ulimit -S -n 256");
+    let mut clients: Vec<Client> = (0..MAX_CONNECTIONS).map(|_| runtime.connect()).collect();
+    for client in &mut clients {
+        client.settle();
+    }
+    for _ in 0..3 {
+        let told = is_refused(&mut runtime.connect());
+        assert!(told.contains("1024"), "{told}");
+    }
+    clients.pop();
+    assert!(is_served_at_last(&runtime));
+}
+
+#[test]
+fn where_few_files_may_be_open_fewer_clients_are_served_and_all_others_are_told() {
+    let runtime = Runtime::under("ulimit -n 40");
+    let mut served: Vec<Client> = (0..8).map(|_| runtime.connect()).collect();
+    for client in &mut served {
+        client.settle();
+    }
+    // More than there are files: those that find none wait in the system's queue until others have been told.
+    let mut late: Vec<Client> = (0..60).map(|_| runtime.connect()).collect();
+    for client in &mut late {
+        assert!(is_refused(client).contains("serves 8 clients"));
+    }
+    for client in &mut served {
+        client.settle();
+    }
+}
+
+/// Without a file nothing can be accepted: the program waits, at no cost, and goes on as soon as there is one.
+#[test]
+fn files_that_have_run_out_harm_no_client_cost_no_processor_and_are_waited_for() {
+    let runtime = Runtime::under("ulimit -n 40");
+    let mut served: Vec<Client> = (0..8).map(|_| runtime.connect()).collect();
+    served[0].subscribe("/joint_states");
+    for client in &mut served {
+        client.settle();
+    }
+    // The limit falls below what is open already: from now on there is no file for anybody.
+    set_soft_limit(&runtime, 8);
+    let mut waiting: Vec<Client> = (0..20).map(|_| runtime.connect()).collect();
+    let before = processor_seconds(&runtime);
+    let began = Instant::now();
+    for _ in 0..90 {
+        served[0].message("/joint_states");
+        served[1].settle();
+    }
+    let (used, took) = (processor_seconds(&runtime) - before, began.elapsed());
+    // A thread that spins uses all of it; the subscriber and the calls a small part.
+    assert!(used < 0.5 * took.as_secs_f64(), "{used} s in {took:?}");
+    set_soft_limit(&runtime, 40);
+    for client in &mut waiting {
+        assert!(is_refused(client).contains("serves 8 clients"));
+    }
+    served.pop();
+    assert!(is_served_at_last(&runtime));
+}

@@ -1,0 +1,159 @@
+//! Faults that take their time: `make test-slow` runs these.
+//!
+//! **Invariant:** what is measured of memory is the program's own peak, in a test build.
+
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use crate::common::{Client, Runtime};
+use pendularm::actors::gateway::budget::MAX_MEMORY;
+use serde_json::{Value, json};
+
+const MIB: usize = 1024 * 1024;
+const STEP: &str = "/arm_sim/integration_step";
+
+/// The most memory that the program has had resident, in bytes.
+fn peak_memory(runtime: &Runtime) -> usize {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", runtime.pid())).unwrap();
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmHWM"))
+        .unwrap();
+    let kilobytes: usize = line.split_whitespace().nth(1).unwrap().parse().unwrap();
+    kilobytes * 1024
+}
+
+/// Fifty clients ask for 60 MB each and read nothing. Those whose answers fit get them, whole, as soon as they read; the others are told at once.
+#[test]
+#[ignore = "a minute: make test-slow"]
+fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
+    const STEPS: usize = 1_000_000;
+    let runtime = Runtime::start();
+    let mut deaf: Vec<Client> = (0..50).map(|_| runtime.connect()).collect();
+    for (id, client) in deaf.iter_mut().enumerate() {
+        client.send(&json!({"op": "call_service", "service": STEP, "id": id,
+            "args": {"function": "sin(t)", "x0": 1.0 / 3.0, "dt": 1e-3, "steps": STEPS,
+                "integrator": "euler"}}));
+    }
+    // Until all have been answered somehow: an answer waits for 20 s at most before its client counts as dead.
+    let mut honest = runtime.connect();
+    let mut answers = Vec::new();
+    std::thread::scope(|scope| {
+        let reading: Vec<_> = deaf
+            .iter_mut()
+            .map(|client| {
+                scope.spawn(|| {
+                    // Deaf for a while, each.
+                    std::thread::sleep(Duration::from_secs(12));
+                    client
+                        .stream()
+                        .set_read_timeout(Some(Duration::from_secs(120)))
+                        .unwrap();
+                    let line = client.receive_text();
+                    let response: Value = serde_json::from_str(&line).unwrap();
+                    let whole = response["values"]["velocities"].as_array().map(Vec::len);
+                    (
+                        response["id"].clone(),
+                        response["result"] == true,
+                        whole,
+                        response["status"].clone(),
+                    )
+                })
+            })
+            .collect();
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_secs(12) {
+            honest.settle();
+            let few = honest.ask(
+                STEP,
+                json!({"function": "t", "x0": 0, "dt": 1, "steps": 10,
+                "integrator": "rk4"}),
+            );
+            assert_eq!(few["times"].as_array().unwrap().len(), 11);
+        }
+        answers.extend(reading.into_iter().map(|thread| thread.join().unwrap()));
+    });
+    let peak = peak_memory(&runtime);
+    println!("peak {} MiB", peak / MIB);
+    let mut whole = 0;
+    for (n, (id, result, length, status)) in answers.iter().enumerate() {
+        assert_eq!(id, n);
+        if *result {
+            assert_eq!(*length, Some(STEPS + 1));
+            whole += 1;
+        } else {
+            assert!(
+                status.as_str().unwrap().contains("try again later"),
+                "{status}"
+            );
+        }
+    }
+    println!("{whole} of 50 answered");
+    assert!((4..50).contains(&whole), "{whole} answered");
+    assert!(peak < MAX_MEMORY, "{peak} bytes");
+}
+
+/// The wall clock jumps an hour on and a day back: nothing that is decided by time notices. Needs Debian's `libfaketime`.
+#[test]
+#[ignore = "needs libfaketime: make test-slow"]
+fn a_wall_clock_that_jumps_changes_nothing() {
+    let library = std::fs::read_dir("/usr/lib")
+        .unwrap()
+        .map(|folder| folder.unwrap().path().join("faketime/libfaketime.so.1"))
+        .find(|library| library.exists())
+        .expect("libfaketime is installed: apt-get install libfaketime");
+    let library = library.to_str().unwrap();
+    let file = std::env::temp_dir().join(format!("pendularm-clock-{}", std::process::id()));
+    std::fs::write(&file, "+0\n").unwrap();
+    let runtime = Runtime::under(&format!(
+        "export LD_PRELOAD={library} FAKETIME_TIMESTAMP_FILE={} FAKETIME_NO_CACHE=1 DONT_FAKE_MONOTONIC=1",
+        file.display()
+    ));
+    let mut client = runtime.connect();
+    let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
+    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
+    provider.status();
+    client.subscribe("/joint_states");
+    let stamp = |client: &mut Client| {
+        let stamp = client.message("/joint_states")["header"]["stamp"].clone();
+        stamp["sec"].as_f64().unwrap() + stamp["nanosec"].as_f64().unwrap() / 1e9
+    };
+    for jump in ["+1h", "-1d", "+0"] {
+        caller.send(&json!({"op": "call_service", "service": "/s", "id": jump, "timeout": 5}));
+        let call = provider.receive();
+        let (began, before) = (Instant::now(), stamp(&mut client));
+        std::fs::write(&file, format!("{jump}\n")).unwrap();
+        let messages = client.receive_for(Duration::from_secs(2)).len();
+        let (wall, after) = (began.elapsed().as_secs_f64(), stamp(&mut client));
+        let simulated = after - before;
+        assert!(
+            (simulated - wall).abs() < 0.3,
+            "{simulated} s in {wall} s after {jump}"
+        );
+        assert!(
+            (60..=130).contains(&messages),
+            "{messages} messages in 2 s after {jump}"
+        );
+        // A call that waits is neither forgotten nor out of time.
+        provider.send(
+            &json!({"op": "service_response", "service": "/s", "id": call["id"],
+            "values": {}, "result": true}),
+        );
+        assert_eq!(caller.receive()["result"], true);
+    }
+    let seen = Command::new("sh")
+        .args([
+            "-c",
+            "LD_PRELOAD=$0 FAKETIME='+1h' date +%s; date +%s",
+            library,
+        ])
+        .output()
+        .unwrap();
+    let seen = String::from_utf8(seen.stdout).unwrap();
+    let seconds: Vec<i64> = seen.lines().map(|line| line.parse().unwrap()).collect();
+    assert!(
+        seconds[0] - seconds[1] > 3000,
+        "the library does move clocks: {seen}"
+    );
+    std::fs::remove_file(&file).unwrap();
+}

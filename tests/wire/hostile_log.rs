@@ -1,0 +1,278 @@
+//! Log injection: whatever a client sends at the most talkative level, each line of standard error is one record of the
+//! runtime's own, and nothing on it acts on a terminal. Nor does what is sent become a file's name or a format.
+//!
+//! **Invariant:** the program logs into a pipe that is read to its end, so no line is missed.
+
+#[cfg(feature = "web")]
+use std::fs;
+use std::io::{BufRead, BufReader, Read};
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::thread::{self, JoinHandle};
+
+use crate::common::Client;
+use serde_json::{Value, json};
+
+/// Texts that do harm wherever they are written as they came, or read as anything but a text.
+const HOSTILE: [&str; 14] = [
+    "a\n2026-01-01T00:00:00Z ERROR forged: b",
+    "a\r\n2026-01-01T00:00:00Z ERROR forged: b",
+    "a\rforged",
+    "\u{1b}[2J\u{1b}]0;forged\u{7}",
+    "\u{9b}31m\u{85}forged",
+    "\u{202e}degrof\u{2066}\u{2069}",
+    "\u{2028}forged\u{2029}\u{feff}",
+    "\u{0}forged",
+    "\u{8}\u{8}\u{8}\u{7f}",
+    "%s%n%x%99999999d {} {0} {:?} {{ }} ${forged} $(forged) `forged`",
+    "../../../../forged.txt",
+    "/dev/stderr",
+    "<img src=x onerror=forged()>",
+    "\\u001b[2J\\n\\x1b\\",
+];
+
+/// How long a line of the log can be: what is kept of one, and its mark that something was cut.
+const LONGEST_LINE: usize = 4096 + 16;
+
+/// The program, logging everything, in a folder of its own.
+struct Talkative {
+    child: Child,
+    address: SocketAddr,
+    log: Option<JoinHandle<Vec<u8>>>,
+    folder: PathBuf,
+}
+
+impl Talkative {
+    fn start(name: &str) -> Self {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        let _ = fs::remove_dir_all(&folder);
+        fs::create_dir_all(&folder).unwrap();
+        let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
+            .args(["--bind", "127.0.0.1:0", "--log", "trace"])
+            .current_dir(&folder)
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut line = String::new();
+        let mut stdout = BufReader::new(child.stdout.take().unwrap());
+        stdout.read_line(&mut line).unwrap();
+        let address = line.trim().strip_prefix("listening on ").unwrap().parse();
+        let mut stderr = child.stderr.take().unwrap();
+        let log = thread::spawn(move || {
+            let mut all = Vec::new();
+            stderr
+                .read_to_end(&mut all)
+                .expect("standard error is read");
+            all
+        });
+        Self {
+            child,
+            address: address.unwrap(),
+            log: Some(log),
+            folder,
+        }
+    }
+
+    /// Ends the program in order, and gives its log.
+    fn end(mut self) -> String {
+        let pid = self.child.id().to_string();
+        let asked = Command::new("kill").args(["-TERM", &pid]).status();
+        assert!(asked.unwrap().success());
+        let log = self.log.take().unwrap().join().unwrap();
+        assert!(self.child.wait().unwrap().success());
+        String::from_utf8(log).expect("the log is text")
+    }
+}
+
+impl Drop for Talkative {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// Each line is a record: a time, a level, a module of ours, and characters that show themselves only.
+fn assert_records(log: &str) {
+    assert!(log.ends_with('\n') && log.lines().count() > 3, "{log:?}");
+    for line in log.split_terminator('\n') {
+        // On a machine that is busy enough the log's own complaint is among them.
+        let lost = line.strip_suffix(" log lines were dropped: nobody read them fast enough");
+        if lost.is_some_and(|count| count.bytes().all(|byte| byte.is_ascii_digit())) {
+            continue;
+        }
+        let mut words = line.split_whitespace();
+        let time = words.next().unwrap_or_default();
+        assert!(
+            time.len() > 20 && time.ends_with('Z') && !time.starts_with("2026-01-01T00"),
+            "{line:?}"
+        );
+        let level = words.next().unwrap_or_default();
+        assert!(
+            ["ERROR", "WARN", "INFO", "DEBUG", "TRACE"].contains(&level),
+            "{line:?}"
+        );
+        let target = words.next().unwrap_or_default();
+        assert!(
+            target.starts_with("pendularm") && target.ends_with(':'),
+            "{line:?}"
+        );
+        let acts = |one: char| {
+            one.is_control()
+                || matches!(one, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+        };
+        assert!(!line.contains(acts), "{line:?}");
+        assert!(line.len() <= LONGEST_LINE, "{} bytes: {line:?}", line.len());
+    }
+}
+
+/// Every op, with the text in every member that takes one, as a member's name, and as a value of another type.
+fn ops(text: &str) -> Vec<Value> {
+    let services = [
+        "/arm_sim/set_params",
+        "/arm_sim/set_integrator",
+        "/arm_sim/integration_step",
+        "/ik/solve",
+        "/ik_action/send_goal",
+        "/ik_action/cancel_goal",
+        "/ik_trial/start",
+        "/study/stability",
+        "/study/rollout",
+        "/rosapi/topic_type",
+        "/rosapi/message_details",
+        "/rosapi/node_details",
+        "/rosapi/get_param",
+        "/rosapi/set_param",
+        "/rosapi/delete_param",
+        text,
+    ];
+    let args = json!({"name": text, "value": text, "method": text, "function": text, "topic": text, "type": text,
+        "node": text, "goal_id": text, "gravity": text, "x": text, "integrator": text, "x0": 0, "dt": 1, "steps": 1, text: text});
+    let mut ops: Vec<Value> = services
+        .iter()
+        .map(|service| json!({"op": "call_service", "service": service, "args": args, "id": text}))
+        .collect();
+    for op in [
+        "advertise",
+        "subscribe",
+        "publish",
+        "unsubscribe",
+        "unadvertise",
+        "advertise_service",
+        "unadvertise_service",
+        "service_response",
+        "set_level",
+        "auth",
+        "fragment",
+        "send_action_goal",
+        "cancel_action_goal",
+        text,
+    ] {
+        ops.push(json!({"op": op, "topic": text, "service": text, "type": text, "id": text, "msg": {text: text},
+            "values": {text: text}, "result": true, "status": text, "level": text, "token": text, "action": text,
+            "action_type": text, "data": text, "num": 0, "total": 1, "compression": "none", text: text}));
+        ops.push(json!({"op": op, "topic": [text], "service": {text: 1}, "id": {text: [text]}, "level": [text]}));
+    }
+    ops.push(json!({"op": "publish", "topic": "/joint_trajectory", "id": text, "msg": {"joint_names": [text, text],
+        "points": [{"positions": [text]}], "header": {"frame_id": text}}}));
+    ops
+}
+
+#[test]
+fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it_was() {
+    let runtime = Talkative::start("hostile_log_tcp");
+    for text in HOSTILE {
+        let mut client = Client::to(runtime.address);
+        for op in ops(text) {
+            client.send(&op);
+        }
+        client.send(&json!({"op": "set_level", "level": "info"}));
+        client.send(&json!({"op": "subscribe", "topic": text, "id": text}));
+        client.send(&json!({"op": "advertise", "topic": text}));
+        client.send(&json!({"op": "publish", "topic": text, "msg": {"last": text}}));
+        let last = client.receive_where("message", |frame| frame["msg"]["last"] == text);
+        assert_eq!(last["topic"], text);
+        for frame in &client.kept {
+            let id = &frame["id"];
+            assert!(
+                id.is_null() || id == text || id == &json!({text: [text]}),
+                "{frame}"
+            );
+        }
+        // What is no JSON at all, in a line of its own and as a first one.
+        client.send_bytes(format!("{text}\n").as_bytes());
+        client.settle();
+        Client::to(runtime.address).send_bytes(format!("{text} {text}\n\n").as_bytes());
+    }
+    let entries: Vec<_> = fs::read_dir(&runtime.folder).unwrap().collect();
+    assert!(entries.is_empty(), "{entries:?}");
+    assert_records(&runtime.end());
+}
+
+/// The runtime repeats there what it was asked, so there is something to escape: see that it comes.
+#[cfg(feature = "web")]
+#[test]
+fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
+    use crate::web_client::{Socket, exchange, handshake};
+
+    let runtime = Talkative::start("hostile_log_web");
+    let address = runtime.address;
+    for text in HOSTILE {
+        for head in [
+            format!("GET / HTTP/1.1\r\nHost: {text}\r\n\r\n"),
+            format!("GET /{text} HTTP/1.1\r\nHost: {address}\r\n\r\n"),
+            format!(
+                "GET /report/{text}.txt?token={text} HTTP/1.1\r\nHost: {address}\r\nCookie: {text}={text}\r\n\r\n"
+            ),
+            format!(
+                "GET / HTTP/1.1\r\n{}Origin: {text}\r\n\r\n",
+                handshake(address)
+            ),
+            format!("GET / HTTP/1.1\r\n{text}: {text}\r\n\r\n"),
+            format!("GET / {text}\r\n\r\n"),
+            format!("{text} / HTTP/1.1\r\nHost: {text}\r\n\r\n"),
+        ] {
+            // A text with a line end of its own may leave the request unfinished.
+            let answer = exchange(address, (head + "\r\n\r\n").as_bytes());
+            assert!(!answer.is_empty());
+        }
+        let mut socket = Socket::open(address);
+        socket.send(&json!({"op": text, "id": text}));
+        socket.close(1000, text);
+        assert!(socket.is_closed());
+    }
+    let repeated = "GET / HTTP/1.1\r\nHost: caf\u{e9}.\u{202e}example\r\n\r\n";
+    exchange(address, repeated.as_bytes());
+    let log = runtime.end();
+    assert_records(&log);
+    assert!(
+        log.contains("request refused") && log.contains("caf\u{e9}."),
+        "{log}"
+    );
+}
+
+/// What carries a client's text on the runtime's own topics is JSON like any other.
+#[test]
+fn what_the_runtime_publishes_of_itself_is_json_whatever_clients_sent() {
+    let runtime = Talkative::start("hostile_log_topics");
+    let mut listener = Client::to(runtime.address);
+    for topic in ["/rosout", "/diagnostics"] {
+        listener.subscribe(topic);
+    }
+    for text in HOSTILE {
+        let mut client = Client::to(runtime.address);
+        for op in ops(text) {
+            client.send(&op);
+        }
+        client.send(&json!({"op": "call_service", "service": "/arm_sim/pause", "id": "end"}));
+        client.receive_where("end", |frame| frame["id"] == "end");
+    }
+    // `receive` fails on what is no JSON on one line.
+    let status = listener.message("/diagnostics");
+    for frame in listener.kept.iter().chain([&status]) {
+        assert!(!frame.to_string().contains("forged"), "{frame}");
+    }
+    assert_records(&runtime.end());
+}

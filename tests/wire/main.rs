@@ -1,0 +1,75 @@
+//! The built program, driven over TCP and WebSocket as a client would.
+
+#![allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_precision_loss,
+    clippy::cast_sign_loss,
+    clippy::expect_used,
+    clippy::float_cmp,
+    clippy::indexing_slicing,
+    clippy::needless_pass_by_value,
+    clippy::panic,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    dead_code,
+    unreachable_pub,
+    reason = "a test that panics has failed, and may say what it saw; numbers that are compared, written or cast exactly are exact; \
+              helpers are handed values that were made for them, and binaries that share them need not use every part"
+)]
+
+mod actions;
+mod advice;
+#[path = "../support/arm.rs"]
+mod arm;
+mod backpressure;
+mod cbor;
+mod clock_diagnostics;
+mod closing;
+#[path = "../support/common.rs"]
+mod common;
+mod divergence;
+mod external_services;
+mod faults;
+mod faults_files;
+mod faults_slow;
+mod fragments;
+mod framing;
+mod gains;
+mod hostile_log;
+mod hostile_pages;
+mod hostile_users;
+mod hostile_websocket;
+mod http;
+mod ids;
+mod ik;
+mod ik_action;
+mod ik_trial;
+mod integration_step;
+mod joint_states;
+mod joint_trajectory;
+mod latched;
+mod launch;
+mod limits;
+mod memory_slow;
+mod names;
+mod opening;
+mod options;
+mod order;
+mod pause_reset;
+mod pid;
+mod readme;
+mod rosapi;
+mod series;
+mod services;
+mod set_integrator;
+mod set_params;
+mod shutdown;
+mod smoke;
+mod step_disturb;
+mod study;
+mod time;
+mod token;
+mod topics;
+#[path = "../support/web_client.rs"]
+mod web_client;
+mod websocket;

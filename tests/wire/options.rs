@@ -1,0 +1,499 @@
+//! The command line and the environment: what is taken, what is refused, and in which words.
+//!
+//! **Invariant:** the tests of the values hand arguments and variables in; only the last few start the program itself.
+
+use std::ffi::OsString;
+use std::process::{Command, Output, Stdio};
+
+use pendularm::options::{DEFAULT_BIND, Links, Options, Parsed, UsageError};
+use proptest::prelude::*;
+use tracing::level_filters::LevelFilter;
+
+fn parse(arguments: &[&str], variables: &[(&str, &str)]) -> Result<Parsed, UsageError> {
+    let arguments = ["pendularm"].iter().chain(arguments);
+    Options::parse(arguments, |name| {
+        let found = variables.iter().find(|(variable, _)| *variable == name)?;
+        Some(OsString::from(found.1))
+    })
+}
+
+#[track_caller]
+fn options(arguments: &[&str], variables: &[(&str, &str)]) -> Options {
+    match parse(arguments, variables) {
+        Ok(Parsed::Serve(options)) => options,
+        other => panic!("not to be served: {other:?}"),
+    }
+}
+
+#[track_caller]
+fn refusal(arguments: &[&str], variables: &[(&str, &str)]) -> String {
+    parse(arguments, variables).unwrap_err().to_string()
+}
+
+#[test]
+fn without_arguments_and_variables_the_defaults_hold() {
+    assert_eq!(options(&[], &[]), Options::default());
+    let Options {
+        links,
+        bind,
+        is_default_bind,
+        seed,
+        log,
+        token,
+        ..
+    } = Options::default();
+    assert_eq!(links, Links::Two);
+    assert_eq!(
+        (bind.to_string().as_str(), is_default_bind),
+        ("127.0.0.1:9095", true)
+    );
+    assert_eq!((seed, log, token), (None, LevelFilter::INFO, None));
+}
+
+#[test]
+fn an_empty_variable_counts_as_unset() {
+    let empty = [
+        ("ARM_SIM_LINKS", ""),
+        ("ARM_SIM_BIND", ""),
+        ("ARM_SIM_SEED", ""),
+        ("ARM_SIM_LOG", ""),
+        ("ARM_SIM_TOKEN", ""),
+        ("ARM_SIM_ALLOW_HOST", ""),
+        ("ARM_SIM_ALLOW_ORIGIN", ""),
+        ("ARM_SIM_STRICT_ORIGIN", ""),
+        ("ARM_SIM_REPORT", ""),
+    ];
+    assert_eq!(options(&[], &empty), Options::default());
+}
+
+#[test]
+fn two_and_three_links_are_taken_from_the_option_and_from_the_variable() {
+    for (value, links, count) in [("2", Links::Two, 2), ("3", Links::Three, 3)] {
+        assert_eq!(options(&["--links", value], &[]).links, links);
+        assert_eq!(options(&[&format!("--links={value}")], &[]).links, links);
+        assert_eq!(options(&[], &[("ARM_SIM_LINKS", value)]).links, links);
+        assert_eq!(links.count(), count);
+    }
+}
+
+#[test]
+fn any_other_number_of_links_is_refused_by_name_and_value() {
+    for value in ["1", "4", "02", " 2", "2.0", "two", "-2"] {
+        let expected = format!("must be 2 or 3, got {value:?}");
+        let option = refusal(&[&format!("--links={value}")], &[]);
+        assert_eq!(option, format!("--links {expected}"));
+        let variable = refusal(&[], &[("ARM_SIM_LINKS", value)]);
+        assert_eq!(variable, format!("ARM_SIM_LINKS {expected}"));
+    }
+}
+
+#[test]
+fn an_option_wins_over_its_variable_which_is_not_looked_at() {
+    let variables = [("ARM_SIM_LINKS", "seven"), ("ARM_SIM_SEED", "1")];
+    let options = options(&["--links", "3", "--seed", "2"], &variables);
+    assert_eq!((options.links, options.seed), (Links::Three, Some(2)));
+}
+
+#[test]
+fn loopback_addresses_are_taken_and_only_the_default_one_brings_the_other_family() {
+    for address in [
+        "127.0.0.1:0",
+        "127.0.0.2:9095",
+        "[::1]:9095",
+        "127.0.0.1:9096",
+    ] {
+        let options = options(&["--bind", address], &[]);
+        assert_eq!(
+            (options.bind.to_string().as_str(), options.is_default_bind),
+            (address, false)
+        );
+    }
+    let options = options(&[], &[("ARM_SIM_BIND", "127.0.0.1:9095")]);
+    assert_eq!(
+        (options.bind, options.is_default_bind),
+        (DEFAULT_BIND, true)
+    );
+}
+
+#[test]
+fn an_address_that_other_machines_could_reach_needs_a_token() {
+    for address in [
+        "0.0.0.0:9095",
+        "[::]:9095",
+        "192.0.2.1:9095",
+        "[::ffff:127.0.0.1]:9095",
+    ] {
+        let expected = format!(
+            "must be a loopback address, such as 127.0.0.1:9095, unless --token gives something to ask for, got {address:?}"
+        );
+        assert_eq!(
+            refusal(&["--bind", address], &[]),
+            format!("--bind {expected}")
+        );
+        assert_eq!(
+            refusal(&[], &[("ARM_SIM_BIND", address)]),
+            format!("ARM_SIM_BIND {expected}")
+        );
+        let arguments = ["--bind", address, "--token", "open-sesame-once-more"];
+        let options = options(&arguments, &[]);
+        assert_eq!(options.bind.to_string(), address);
+        assert!(options.token.unwrap().matches("open-sesame-once-more"));
+    }
+}
+
+#[test]
+fn what_is_no_address_with_a_port_is_refused() {
+    for text in [
+        "localhost:9095",
+        "127.0.0.1",
+        "9095",
+        ":9095",
+        "127.0.0.1:65536",
+        "::1:9095",
+    ] {
+        let refused = refusal(&[], &[("ARM_SIM_BIND", text)]);
+        assert!(
+            refused.starts_with("ARM_SIM_BIND must be an IP address with a port"),
+            "{refused}"
+        );
+        assert!(refused.ends_with(&format!("got {text:?}")), "{refused}");
+    }
+}
+
+#[test]
+fn a_seed_is_any_number_of_64_bits() {
+    assert_eq!(options(&["--seed", "0"], &[]).seed, Some(0));
+    let largest = u64::MAX.to_string();
+    assert_eq!(
+        options(&[], &[("ARM_SIM_SEED", &largest)]).seed,
+        Some(u64::MAX)
+    );
+    for value in ["18446744073709551616", "1.5", "x"] {
+        let expected = format!(
+            "ARM_SIM_SEED must be a whole number from 0 to 18446744073709551615, got {value:?}"
+        );
+        assert_eq!(refusal(&[], &[("ARM_SIM_SEED", value)]), expected);
+    }
+    assert!(refusal(&["--seed=-1"], &[]).starts_with("--seed must be"));
+}
+
+#[test]
+fn every_log_level_has_a_name_and_other_names_are_refused() {
+    let levels = [
+        ("off", LevelFilter::OFF),
+        ("error", LevelFilter::ERROR),
+        ("warn", LevelFilter::WARN),
+        ("info", LevelFilter::INFO),
+        ("debug", LevelFilter::DEBUG),
+        ("trace", LevelFilter::TRACE),
+    ];
+    for (name, level) in levels {
+        assert_eq!(options(&[], &[("ARM_SIM_LOG", name)]).log, level);
+        assert_eq!(options(&["--log", name], &[]).log, level);
+    }
+    assert_eq!(
+        refusal(&[], &[("ARM_SIM_LOG", "loud")]),
+        "ARM_SIM_LOG must be one of off, error, warn, info, debug, trace, got \"loud\""
+    );
+}
+
+#[test]
+fn arguments_that_do_not_exist_are_refused_by_name() {
+    for argument in ["--speed", "-x", "fly", "--link"] {
+        let expected = format!("unknown argument {argument:?}; --help shows all of them");
+        assert_eq!(refusal(&[argument], &[]), expected);
+    }
+    assert!(refusal(&["--speed=3"], &[]).starts_with("unknown argument \"--speed\""));
+    assert!(refusal(&["--links", "2", "3"], &[]).starts_with("unknown argument \"3\""));
+}
+
+#[test]
+fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
+    let report = |arguments: &[&str]| {
+        let all = ["pendularm", "report"].iter().chain(arguments);
+        match Options::parse(all, |_| None) {
+            Ok(Parsed::Report(report)) => report,
+            other => panic!("no report: {other:?}"),
+        }
+    };
+    let plain = report(&[]);
+    assert_eq!((plain.out.to_str(), plain.quick), (Some("report"), false));
+    assert!(plain.only.is_empty());
+    let all = report(&["--out", "here", "--only", "error,budget", "--quick"]);
+    assert_eq!((all.out.to_str(), all.quick), (Some("here"), true));
+    assert_eq!(all.only, ["error", "budget"]);
+    assert!(refusal(&["--links", "2", "report"], &[]).starts_with("unknown argument \"--links\""));
+    assert!(refusal(&["report", "--speed"], &[]).starts_with("unknown argument \"--speed\""));
+}
+
+#[test]
+fn an_option_without_its_value_or_given_twice_is_refused_by_name() {
+    assert_eq!(refusal(&["--links"], &[]), "--links <N> needs a value");
+    assert_eq!(
+        refusal(&["--bind", "--links", "2"], &[]),
+        "--bind <ADDRESS> needs a value"
+    );
+    assert_eq!(
+        refusal(&["--links="], &[]),
+        "--links must be 2 or 3, got \"\""
+    );
+    let twice = ["--links", "2", "--links", "2"];
+    assert_eq!(refusal(&twice, &[]), "--links <N> is given more than once");
+    assert_eq!(
+        refusal(&["--help=3"], &[]),
+        "--help takes no value, got \"3\""
+    );
+}
+
+#[test]
+fn the_help_shows_every_option_with_its_variable_and_default() {
+    let Ok(Parsed::Show(help)) = parse(&["--help"], &[("ARM_SIM_LINKS", "no matter")]) else {
+        panic!("--help is to be shown");
+    };
+    for (option, variable, default) in [
+        ("--links <N>", "ARM_SIM_LINKS", "2"),
+        ("--bind <ADDRESS>", "ARM_SIM_BIND", "127.0.0.1:9095"),
+        ("--seed <N>", "ARM_SIM_SEED", "a new seed at every start"),
+        ("--log <LEVEL>", "ARM_SIM_LOG", "info"),
+        ("--token <TOKEN>", "ARM_SIM_TOKEN", "none"),
+        #[cfg(feature = "web")]
+        ("--allow-host <HOSTS>", "ARM_SIM_ALLOW_HOST", "none"),
+        #[cfg(feature = "web")]
+        ("--allow-origin <ORIGINS>", "ARM_SIM_ALLOW_ORIGIN", "none"),
+        #[cfg(feature = "web")]
+        (
+            "--strict-origin[=<SWITCH>]",
+            "ARM_SIM_STRICT_ORIGIN",
+            "false",
+        ),
+        #[cfg(feature = "web")]
+        ("--report <FOLDER>", "ARM_SIM_REPORT", "report"),
+    ] {
+        let line = help.lines().find(|line| line.contains(option)).unwrap();
+        assert!(
+            line.contains(&format!("[env: {variable}] [default: {default}]")),
+            "{line}"
+        );
+    }
+    assert!(help.contains("--version"), "{help}");
+    let usage = "\nUsage: pendularm [OPTIONS] [COMMAND]\n";
+    assert!(help.contains(usage), "{help}");
+    let build = if cfg!(feature = "web") {
+        "This build has the web feature"
+    } else {
+        "This build is without the web feature"
+    };
+    assert!(help.contains(build), "{help}");
+}
+
+#[test]
+fn the_version_is_the_packages_and_says_what_is_in_this_build() {
+    let web = if cfg!(feature = "web") {
+        "web"
+    } else {
+        "without web"
+    };
+    let expected = format!("pendularm {} ({web})\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!(parse(&["--version"], &[]), Ok(Parsed::Show(expected)));
+}
+
+#[test]
+fn a_token_is_printable_and_never_shown() {
+    let options = options(&[], &[("ARM_SIM_TOKEN", "a-Secret_that_is_long")]);
+    assert!(!format!("{options:?}").contains("Secret"));
+    assert!(options.token.unwrap().matches("a-Secret_that_is_long"));
+    let long = "s".repeat(257);
+    for (value, why) in [
+        ("my secret", "must be printable ASCII without spaces"),
+        ("schlüssel", "must be printable ASCII without spaces"),
+        ("15-bytes-are-it", "must be at least 16 bytes long, got 15"),
+        (&long, "must be at most 256 bytes long, got 257"),
+    ] {
+        let refused = refusal(&[], &[("ARM_SIM_TOKEN", value)]);
+        assert_eq!(refused, format!("ARM_SIM_TOKEN {why}"));
+    }
+    assert_eq!(
+        refusal(&["--token="], &[]),
+        "--token must be at least 16 bytes long, got 0"
+    );
+}
+
+#[cfg(feature = "web")]
+#[test]
+fn hosts_and_origins_are_lists_and_the_switch_needs_no_value() {
+    let given = options(
+        &[
+            "--allow-host=Arm.Example, other:80",
+            "--allow-origin",
+            "https://Example.org,null,file://",
+            "--strict-origin",
+            "--report=somewhere",
+        ],
+        &[],
+    );
+    let hosts: Vec<String> = given.web.hosts.iter().map(ToString::to_string).collect();
+    assert_eq!(hosts, ["arm.example", "other:80"]);
+    let origins: Vec<&str> = given.web.origins.iter().map(|one| &**one).collect();
+    assert_eq!(origins, ["https://example.org", "null", "file://"]);
+    assert!(given.web.strict_origin);
+    assert_eq!(given.web.report.to_str(), Some("somewhere"));
+    for (value, on) in [("true", true), ("1", true), ("false", false), ("0", false)] {
+        let options = options(&[], &[("ARM_SIM_STRICT_ORIGIN", value)]);
+        assert_eq!(options.web.strict_origin, on);
+    }
+    assert!(!options(&["--strict-origin=false"], &[]).web.strict_origin);
+}
+
+#[cfg(feature = "web")]
+#[test]
+fn what_is_no_host_or_origin_or_switch_is_refused_by_name_and_value() {
+    for value in ["a b", "http://a", "a,,b", "a:99999"] {
+        let refused = refusal(&["--allow-host", value], &[]);
+        let expected = "--allow-host must be hosts, with or without a port, separated by commas";
+        assert_eq!(refused, format!("{expected}, got {value:?}"));
+    }
+    for value in ["example.org", "http://a/", "://a", "a,b", "*"] {
+        let refused = refusal(&[], &[("ARM_SIM_ALLOW_ORIGIN", value)]);
+        assert!(
+            refused.starts_with("ARM_SIM_ALLOW_ORIGIN must be origins as browsers write them")
+                && refused.ends_with(&format!("got {value:?}")),
+            "{refused}"
+        );
+    }
+    assert_eq!(
+        refusal(&["--strict-origin=maybe"], &[]),
+        "--strict-origin must be true or false, got \"maybe\""
+    );
+}
+
+#[cfg(unix)]
+#[test]
+fn bytes_that_are_no_text_are_refused_like_any_other_value() {
+    use std::os::unix::ffi::OsStringExt;
+    let bytes = || OsString::from_vec(vec![b'2', 0xff]);
+    let variable = Options::parse(["pendularm"], |_| Some(bytes())).unwrap_err();
+    assert!(matches!(variable, UsageError::Token { .. }), "{variable}");
+    let option = Options::parse(["pendularm".into(), "--links".into(), bytes()], |_| None);
+    assert!(
+        matches!(option, Err(UsageError::Links { .. })),
+        "{option:?}"
+    );
+    let argument = Options::parse(["pendularm".into(), bytes()], |_| None);
+    assert!(
+        matches!(argument, Err(UsageError::UnknownArgument { .. })),
+        "{argument:?}"
+    );
+}
+
+proptest! {
+    /// Whatever is given: an answer, and a refusal is one line without control characters.
+    #[test]
+    fn no_arguments_and_no_variables_break_the_reader(
+        arguments in prop::collection::vec(
+            prop_oneof![
+                ".{0,12}",
+                "--(links|bind|seed|log|token|allow-host|allow-origin|strict-origin|report|help|version|)(=.{0,6})?",
+                Just("2".to_owned()),
+                Just("--".to_owned()),
+            ],
+            0..5,
+        ),
+        variable in ".{0,12}",
+    ) {
+        let arguments = std::iter::once("pendularm".to_owned()).chain(arguments);
+        if let Err(error) = Options::parse(arguments, |_| Some(OsString::from(&variable))) {
+            let line = error.to_string();
+            prop_assert!(!line.is_empty() && !line.contains(char::is_control), "{line:?}");
+        }
+    }
+}
+
+/// The program itself, with nothing of the tester's environment that could change what it does.
+fn program(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_pendularm"));
+    for variable in [
+        "ARM_SIM_LINKS",
+        "ARM_SIM_BIND",
+        "ARM_SIM_SEED",
+        "ARM_SIM_LOG",
+        "ARM_SIM_TOKEN",
+        "ARM_SIM_ALLOW_HOST",
+        "ARM_SIM_ALLOW_ORIGIN",
+        "ARM_SIM_STRICT_ORIGIN",
+        "ARM_SIM_REPORT",
+    ] {
+        command.env_remove(variable);
+    }
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+#[track_caller]
+fn is_bad_usage(output: &Output, names: &str) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(
+        said.starts_with("pendularm: ") && said.contains(names),
+        "{said}"
+    );
+    assert!(output.stdout.is_empty());
+}
+
+#[test]
+fn bad_usage_ends_the_program_with_one_line_and_status_2() {
+    is_bad_usage(
+        &program(&["--links", "4"]).output().unwrap(),
+        "--links must be 2 or 3, got \"4\"",
+    );
+    is_bad_usage(&program(&["fly"]).output().unwrap(), "\"fly\"");
+    for variable in [
+        "ARM_SIM_LINKS",
+        "ARM_SIM_BIND",
+        "ARM_SIM_SEED",
+        "ARM_SIM_LOG",
+    ] {
+        is_bad_usage(
+            &program(&[]).env(variable, "nonsense").output().unwrap(),
+            variable,
+        );
+    }
+    is_bad_usage(
+        &program(&["--bind", "0.0.0.0:0"]).output().unwrap(),
+        "loopback",
+    );
+}
+
+#[test]
+fn help_and_version_go_to_standard_output_with_status_0() {
+    for (argument, text) in [("--help", "ARM_SIM_LINKS"), ("--version", "pendularm ")] {
+        let output = program(&[argument]).output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        assert!(String::from_utf8_lossy(&output.stdout).contains(text));
+        assert!(output.stderr.is_empty());
+    }
+}
+
+/// Every write to `/dev/full` fails, as one to a pipe that nobody holds any more does.
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_streams_that_take_nothing_change_no_exit_status() {
+    let full = || {
+        Stdio::from(
+            std::fs::File::options()
+                .write(true)
+                .open("/dev/full")
+                .unwrap(),
+        )
+    };
+    let status = |arguments: &[&str]| {
+        program(arguments)
+            .stdout(full())
+            .stderr(full())
+            .status()
+            .unwrap()
+            .code()
+    };
+    assert_eq!(status(&["--help"]), Some(0));
+    assert_eq!(status(&["--links", "4"]), Some(2));
+}

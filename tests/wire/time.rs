@@ -1,0 +1,221 @@
+//! Simulation time against wall time, at any timestep, and after the process has been stopped.
+
+use std::process::Command;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use crate::arm::{in_one_of_three_tries, stamp, state};
+use crate::common::{Client, Runtime};
+use serde_json::json;
+
+/// An arm that nothing moves: what such a timestep would make of a swing is not the question here.
+fn still_arm(client: &mut Client, timestep: f64) {
+    client.ask("/arm_sim/set_params", json!({"gravity": 0}));
+    client.ask("/arm_sim/set_integrator", json!({"timestep": timestep}));
+    client.ask("/arm_sim/reset", json!({}));
+}
+
+/// How far simulation time is ahead of `epoch`'s wall time: the largest of some messages, since what delays a message
+/// on its way to us only makes it less.
+fn lead(client: &mut Client, epoch: Instant) -> f64 {
+    let mut lead = f64::NEG_INFINITY;
+    for _ in 0..20 {
+        let time = stamp(&client.message("/joint_states"));
+        lead = lead.max(time - epoch.elapsed().as_secs_f64());
+    }
+    lead
+}
+
+#[test]
+fn simulation_time_runs_at_wall_time() {
+    in_one_of_three_tries("within 0.5 %", || {
+        let runtime = Runtime::start();
+        let mut client = runtime.connect();
+        client.subscribe("/joint_states");
+        let epoch = Instant::now();
+        let before = lead(&mut client, epoch);
+        crate::arm::let_pass(&mut client, Duration::from_secs(3));
+        let after = lead(&mut client, epoch);
+        let share = (after - before) / epoch.elapsed().as_secs_f64();
+        (share.abs() < 0.005)
+            .then_some(())
+            .ok_or(format!("{share}"))
+    });
+}
+
+#[test]
+fn coarse_timesteps_run_at_wall_time_too() {
+    for timestep in [0.1, 0.37] {
+        let runtime = Runtime::start();
+        let mut client = runtime.connect();
+        client.subscribe("/joint_states");
+        still_arm(&mut client, timestep);
+        let began = Instant::now();
+        sleep(Duration::from_secs(3));
+        let time = stamp(&state(&mut client));
+        let wall = began.elapsed().as_secs_f64();
+        // Whole steps: one may be in progress. The reset is from shortly before `began`.
+        assert!(
+            time <= wall + 0.05 && time > wall - timestep - 0.5,
+            "{time} {wall} at {timestep}"
+        );
+        assert!(
+            ((time / timestep).round() * timestep - time).abs() < 1e-8,
+            "{time} is no multiple of {timestep}"
+        );
+    }
+}
+
+#[test]
+fn a_step_of_two_seconds_is_taken_every_two_seconds() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    still_arm(&mut client, 2.0);
+    client.subscribe("/joint_states");
+    let began = Instant::now();
+    let mut times = Vec::new();
+    while began.elapsed() < Duration::from_millis(4500) {
+        let time = stamp(&client.message("/joint_states"));
+        let wall = began.elapsed().as_secs_f64();
+        assert!(time <= wall + 0.05, "{time} s of simulation after {wall} s");
+        times.push(time);
+    }
+    times.dedup();
+    assert_eq!(times, [0.0, 2.0, 4.0]);
+}
+
+/// A microsecond is at the edge of what a machine can follow, and beyond it without optimisation: nothing is asserted of the
+/// rate, all of what else holds.
+#[test]
+fn a_step_of_a_microsecond_leaves_the_runtime_answering() {
+    for timestep in [1e-6, 1e-9, 1e-300] {
+        let runtime = Runtime::with_links(3);
+        let mut client = runtime.connect();
+        client.ask("/arm_sim/set_integrator", json!({"timestep": timestep}));
+        client.ask("/arm_sim/reset", json!({}));
+        client.subscribe("/joint_states");
+        let began = Instant::now();
+        let first = stamp(&client.message("/joint_states"));
+        sleep(Duration::from_secs(1));
+        let later = stamp(&state(&mut client));
+        let wall = began.elapsed().as_secs_f64();
+        assert!(
+            later - first <= wall + 0.5,
+            "{later} s of simulation in {wall} s"
+        );
+        assert!(
+            timestep < 1e-6 || later > 0.02,
+            "{later} s of simulation in {wall} s"
+        );
+        for _ in 0..10 {
+            client.message("/joint_states");
+        }
+        // Back to an ordinary step, at once.
+        client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
+        client.ask("/arm_sim/reset", json!({}));
+        crate::arm::state_where(&mut client, "a moving arm", |state| stamp(state) > 0.2);
+    }
+}
+
+#[test]
+fn a_timestep_beyond_all_measure_stops_the_clock_and_nothing_else() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    for timestep in [1e18, 1e308] {
+        client.ask("/arm_sim/set_integrator", json!({"timestep": timestep}));
+        let before = state(&mut client);
+        crate::arm::let_pass(&mut client, Duration::from_millis(300));
+        assert_eq!(state(&mut client), before);
+    }
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
+    let before = stamp(&state(&mut client));
+    crate::arm::state_where(&mut client, "a moving arm", |state| stamp(state) > before);
+}
+
+fn signal(runtime: &Runtime, name: &str) {
+    let status = Command::new("kill")
+        .args([&format!("-{name}"), &runtime.pid().to_string()])
+        .status();
+    assert!(status.expect("kill is there").success());
+}
+
+/// Stopped for two seconds, the arm is two seconds behind. It catches up a quarter of a second and a step, once.
+#[test]
+fn a_stalled_process_catches_up_a_quarter_of_a_second_and_drops_the_rest() {
+    in_one_of_three_tries("after SIGCONT", || {
+        let runtime = Runtime::start();
+        let mut client = runtime.connect();
+        client.subscribe("/joint_states");
+        let epoch = Instant::now();
+        let before = lead(&mut client, epoch);
+        signal(&runtime, "STOP");
+        let stopped = Instant::now();
+        sleep(Duration::from_secs(2));
+        signal(&runtime, "CONT");
+        let stall = stopped.elapsed().as_secs_f64();
+        let burst = client.receive_for(Duration::from_millis(200));
+        // Twelve ticks in 0.2 s, and what was under way when it stopped; the 120 missed ones are skipped.
+        if burst.len() > 20 {
+            return Err(format!("{} messages in 0.2 s", burst.len()));
+        }
+        let after = lead(&mut client, epoch);
+        let caught_up = after - before + stall;
+        // 0.25 s and a step of 1 ms; the ends of the stall are known to some 10 ms.
+        let right = (0.15..0.3).contains(&caught_up);
+        right
+            .then_some(())
+            .ok_or(format!("caught up {caught_up} s of {stall} s"))
+    });
+}
+
+#[test]
+fn setting_what_is_set_already_costs_no_time() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    still_arm(&mut client, 0.5);
+    client.subscribe("/joint_states");
+    let began = Instant::now();
+    // Were each to start the step afresh, no step would ever be done.
+    while began.elapsed() < Duration::from_millis(1700) {
+        client.ask(
+            "/arm_sim/set_integrator",
+            json!({"timestep": 0.5, "method": "rk4"}),
+        );
+        client.ask("/arm_sim/pause", json!({"data": false}));
+        client.ask("/pid_controller/enable", json!({"data": false}));
+        client.call("/arm_sim/set_integrator", json!({"timestep": -1}));
+        sleep(Duration::from_millis(20));
+    }
+    let time = stamp(&state(&mut client));
+    assert!(time >= 1.0, "{time}");
+}
+
+#[test]
+fn a_new_timestep_starts_its_step_afresh() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    still_arm(&mut client, 0.9);
+    client.subscribe("/joint_states");
+    for round in 0..6 {
+        client.ask(
+            "/arm_sim/set_integrator",
+            json!({"timestep": if round % 2 == 0 { 0.8 } else { 0.9 }}),
+        );
+        sleep(Duration::from_millis(200));
+    }
+    assert_eq!(stamp(&state(&mut client)), 0.0);
+}
+
+/// At a timestep of 1e-8 s no machine keeps up. Were each call to bring 5 ms of steps of its own, there could not be more than 200
+/// answers a second; while only wake-ups step, there are thousands.
+#[test]
+fn calls_to_an_arm_that_cannot_keep_up_do_not_each_cost_a_wake_up() {
+    let runtime = Runtime::start();
+    let mut caller = runtime.connect();
+    caller.ask("/arm_sim/set_integrator", json!({"timestep": 1e-8}));
+    let call = b"{\"op\":\"call_service\",\"service\":\"/pid_controller/enable\",\"id\":\"p\"}\n";
+    caller.send_bytes(&call.repeat(5_000));
+    let answered = caller.receive_for(Duration::from_secs(1)).len();
+    assert!(answered > 400, "{answered} calls were answered in a second");
+}
