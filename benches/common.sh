@@ -1,4 +1,4 @@
-# Sourced by run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
+# Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
 # Needs: `root` (this project). Sets: `benches`, `built`. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches
@@ -35,4 +35,18 @@ environment() {
     echo "system:    $(uname -s) $(uname -r | cut -d- -f1)"
     echo "rustc:     $(cd "$root" && rustc --version), $(cd "$root" && rustc -vV | sed -n 's/^host: //p'), no flags beyond the release profile"
     echo "load:      $(cut -d' ' -f1-3 /proc/loadavg 2>/dev/null || uptime) (1, 5, 15 minutes, at the start)"
+}
+
+# Redis and mosquitto, from Debian's packages as root. Needs: `scratch` (a folder).
+install_peers() {
+    local missing=()
+    PATH=$PATH:/usr/sbin
+    command -v redis-server >/dev/null || missing+=(redis-server)
+    command -v mosquitto >/dev/null || missing+=(mosquitto)
+    [ ${#missing[@]} -gt 0 ] || return 0
+    { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; } || fail "missing: ${missing[*]}; install Debian's packages of that name"
+    say "installing ${missing[*]}"
+    # Programs to be started here, no services.
+    { apt-get update --quiet=2 && DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 apt-get install --quiet=2 --yes --no-install-recommends "${missing[@]}"; } \
+        >"$scratch/apt.log" 2>&1 || { cat "$scratch/apt.log" >&2; fail "apt-get could not install ${missing[*]}"; }
 }

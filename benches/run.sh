@@ -67,6 +67,9 @@ summary() {
                 if (line ~ / steps /) steps += x[n = split(line, x, " ") - 1]
                 if (line ~ / bytes: /) verdict("allocations per delivered message of " x[1], x[3], "at most 2", x[3] <= 2) }
             verdict("allocations in 16 million physics steps", steps + 0, "0", steps == 0)
+            past("reading"); slowest = 1e9
+            while ((getline line < file) > 0) if (match(line, /[0-9]+ MB\/s/)) { rate = substr(line, RSTART) + 0; if (rate < slowest) slowest = rate }
+            verdict("reading the nastiest of inputs, MB/s", slowest, "at least 200", slowest >= 200)
         }'
 }
 
@@ -85,6 +88,7 @@ part() {
     part idle "$built/idle" "$program"
     part fairness "$built/fairness" "$program"
     part allocations "$built/allocations"
+    part reading pinned "$built/reading"
     part summary summary
 }
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$folder")"

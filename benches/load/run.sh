@@ -12,19 +12,6 @@ source "$root/benches/common.sh"
 needed_files=4096
 [ "$(ulimit -n)" -ge $needed_files ] || ulimit -n $needed_files || fail "$needed_files open files are needed: raise ulimit -n"
 
-install_peers() {
-    local missing=()
-    PATH=$PATH:/usr/sbin
-    command -v redis-server >/dev/null || missing+=(redis-server)
-    command -v mosquitto >/dev/null || missing+=(mosquitto)
-    [ ${#missing[@]} -gt 0 ] || return 0
-    { [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; } || fail "missing: ${missing[*]}; install Debian's packages of that name"
-    say "installing ${missing[*]}"
-    # Programs to be started here, no services.
-    { apt-get update --quiet=2 && DEBIAN_FRONTEND=noninteractive RUNLEVEL=1 apt-get install --quiet=2 --yes --no-install-recommends "${missing[@]}"; } \
-        >"$scratch/apt.log" 2>&1 || { cat "$scratch/apt.log" >&2; fail "apt-get could not install ${missing[*]}"; }
-}
-
 scratch=$(mktemp -d)
 pids=()
 cleanup() {

@@ -9,11 +9,14 @@
 
 use libfuzzer_sys::fuzz_target;
 use pendularm::math::expression::Expression;
+use pendularm_fuzz::limits::{READING, hold};
 
 /// Longer texts would only exhaust the stack of the second reading, which recurses.
 const LONGEST: usize = 4096;
 
-fuzz_target!(|input: &[u8]| {
+fuzz_target!(|input: &[u8]| hold(input.len(), READING, || examine(input)));
+
+fn examine(input: &[u8]) {
     let text = match input {
         [b'#', tokens @ ..] => written(tokens),
         _ => String::from_utf8_lossy(input).into_owned(),
@@ -47,7 +50,7 @@ fuzz_target!(|input: &[u8]| {
             "{text:?} at {time:?}: {value:?}"
         );
     }
-});
+}
 
 /// Times at which functions have their edges, and one that depends on the input.
 fn times(input: &[u8]) -> [f64; 8] {

@@ -10,14 +10,17 @@
 
 use libfuzzer_sys::fuzz_target;
 use pendularm::protocol::catalog::{Field, Service};
-use pendularm::protocol::fields::{Bound, Fields};
-use pendularm::protocol::frame::FrameReader;
+use pendularm::protocol::op::fields::{Bound, Fields};
 use pendularm::protocol::op::{self, Arguments, CallService, Op};
+use pendularm::protocol::wire::frame::FrameReader;
 use pendularm_fuzz::json::Json;
+use pendularm_fuzz::limits::{READING, hold};
 
 const METHODS: [&str; 4] = ["euler", "midpoint", "verlet", "rk4"];
 
-fuzz_target!(|input: &[u8]| {
+fuzz_target!(|input: &[u8]| hold(input.len(), READING, || examine(input)));
+
+fn examine(input: &[u8]) {
     let &[service, seed, ref args @ ..] = input else {
         return;
     };
@@ -25,8 +28,8 @@ fuzz_target!(|input: &[u8]| {
     let Some(args) = arguments(service, args) else {
         return;
     };
-    let Some(json) = Json::read(args.raw().get()) else {
-        panic!("accepted, and no JSON: {}", args.raw());
+    let Some(json) = Json::read(args.payload().get()) else {
+        panic!("accepted, and no JSON: {}", args.payload().get());
     };
     let Some(model) = Model::new(service, &json) else {
         let refusal = Fields::read(&args, service).expect_err("the other reading refuses it");
@@ -47,7 +50,7 @@ fuzz_target!(|input: &[u8]| {
     for name in refused {
         assert!(status.contains(name) || status.ends_with('…'), "{status}");
     }
-});
+}
 
 /// What comes out of a frame with these arguments, if it is one.
 fn arguments(service: Service, args: &[u8]) -> Option<Arguments> {

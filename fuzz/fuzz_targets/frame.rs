@@ -8,9 +8,13 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::protocol::frame::{FrameError, FrameReader, MAX_NESTING};
+use pendularm::protocol::limits::MAX_NESTING;
+use pendularm::protocol::wire::frame::{FrameError, FrameReader};
+use pendularm_fuzz::limits::{READING, hold};
 
-fuzz_target!(|input: &[u8]| {
+fuzz_target!(|input: &[u8]| hold(input.len(), READING, || examine(input)));
+
+fn examine(input: &[u8]) {
     let &[limit, seed, ref stream @ ..] = input else {
         return;
     };
@@ -19,7 +23,7 @@ fuzz_target!(|input: &[u8]| {
     check(&expected, limit, stream, std::iter::once(stream));
     check(&expected, limit, stream, stream.chunks(1));
     check(&expected, limit, stream, Cuts { stream, seed });
-});
+}
 
 /// What a stretch of the stream is.
 #[derive(Debug, PartialEq, Eq)]
@@ -60,7 +64,7 @@ fn check<'a>(
 }
 
 fn compare(
-    outcome: Result<pendularm::protocol::frame::Frame, FrameError>,
+    outcome: Result<pendularm::protocol::wire::frame::Frame, FrameError>,
     wanted: &Outcome,
     limit: usize,
     stream: &[u8],

@@ -1,8 +1,8 @@
 //! The first bytes of a connection, and HTTP behind them: one request, with and without a token to be shown.
 //!
 //! What holds: the answer is lines of JSON, or one well-formed HTTP answer of known headers, as long as it says, and then the
-//! end, whatever follows the request; a file is never one from outside the report's folder; without a host, without the
-//! token where there is one, nothing is given.
+//! end, whatever follows the request; a file is never one from outside the report's folder; who is let in, and who is not, is
+//! what a [second opinion](pendularm_fuzz::admission) says; whoever speaks JSON and does not show the token hears one line.
 //!
 //! Input: a byte of settings, a byte that says in which pieces the rest is sent, the rest.
 
@@ -11,22 +11,31 @@
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::actors::budget::Totals;
-use pendularm::actors::connection::gate::Gate;
-use pendularm::protocol::token::Token;
+use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::gateway::connection::gate::{Admission, Gate};
+use pendularm::protocol::op::token::Token;
 use pendularm::web::Door;
 use pendularm::web::access::Access;
 use pendularm::web::authority::Authority;
+use pendularm_client::codec::{Codec, Framing};
+use pendularm_fuzz::admission::{Opinion, Rules, judge};
 use pendularm_fuzz::json::Json;
+use pendularm_fuzz::limits::{Allowance, hold};
 use pendularm_fuzz::stage::{Stage, run};
-use pendularm_fuzz::websocket;
 use tokio::io::{AsyncReadExt, AsyncWriteExt, split};
 use tokio::time::timeout;
 
-const TOKEN: &str = "open-sesame";
+const TOKEN: &str = "open-sesame-once-more";
 /// The folder of the report, and what a file beside it says.
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/report/inside");
 const SECRET: &str = "to be given to nobody";
+/// A page is long, and a connection has its buffers.
+const WHOLE: Allowance = Allowance {
+    time: Duration::from_secs(1),
+    time_per_byte: Duration::from_micros(20),
+    memory: 16 << 20,
+    memory_per_byte: 1 << 10,
+};
 /// Longer than any file of the page.
 const LONGEST: usize = 4 * 1024 * 1024;
 /// Longer than anything here may take.
@@ -34,7 +43,7 @@ const LONG: Duration = Duration::from_secs(600);
 
 const STATUSES: [u16; 11] = [101, 200, 301, 400, 403, 404, 405, 408, 426, 431, 503];
 /// What an answer may have, in lower case.
-const HEADERS: [&str; 17] = [
+const HEADERS: [&str; 19] = [
     "content-type",
     "content-length",
     "connection",
@@ -52,51 +61,79 @@ const HEADERS: [&str; 17] = [
     "sec-websocket-version",
     "sec-websocket-accept",
     "date",
+    "vary",
+    "content-encoding",
 ];
 
-fuzz_target!(|input: &[u8]| {
+fuzz_target!(|input: &[u8]| hold(input.len(), WHOLE, || check(input)));
+
+fn check(input: &[u8]) {
     let &[settings, piece, ref bytes @ ..] = input else {
         return;
     };
-    let asks_token = settings & 1 != 0;
-    let answer = run(converse(gate(settings), bytes, piece.max(1).into()));
+    let rules = Rules {
+        token: (settings & 1 != 0).then_some(TOKEN),
+        has_name: settings & 2 != 0,
+        allows_null: settings & 4 != 0,
+        is_strict: settings & 8 != 0,
+    };
+    let answer = run(converse(gate(rules), bytes, piece.max(1).into()));
+    let expected = judge(bytes, rules);
     if answer.starts_with(b"HTTP/") {
-        check_answer(&answer, bytes, asks_token);
-    } else {
-        let text = String::from_utf8(answer).expect("UTF-8");
-        assert!(text.is_empty() || text.ends_with('\n'), "{text:?}");
-        for line in text.lines() {
-            assert!(Json::read(line).is_some(), "{line:?}");
-        }
+        check_answer(&answer, expected);
+        return;
     }
-});
+    let is_certain = expected.is_some_and(|(_, is_certain)| is_certain);
+    assert!(!is_certain, "no answer to a request");
+    let text = String::from_utf8(answer).expect("UTF-8");
+    assert!(text.is_empty() || text.ends_with('\n'), "{text:?}");
+    for line in text.lines() {
+        assert!(Json::read(line).is_some(), "{line:?}");
+    }
+    let shows_token = bytes
+        .windows(TOKEN.len())
+        .any(|window| window == TOKEN.as_bytes());
+    // Written as escapes it is the token all the same.
+    if rules.token.is_some() && !shows_token && !bytes.contains(&b'\\') {
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(
+            lines.len() <= 1 && !text.contains("service_response"),
+            "{lines:?}"
+        );
+        assert!(
+            text.is_empty() || text.contains("\"level\":\"error\""),
+            "{text}"
+        );
+    }
+}
 
-fn gate(settings: u8) -> Gate {
-    let token = (settings & 1 != 0).then(|| Token::new(TOKEN).expect("a token"));
+fn gate(rules: Rules<'_>) -> Gate {
+    let token = rules.token.map(|token| Token::new(token).expect("a token"));
     let named = Authority::parse("arm.example:80").expect("a host");
     let access = Access {
         token: token.clone(),
-        hosts: if settings & 2 != 0 {
+        hosts: if rules.has_name {
             vec![named]
         } else {
             Vec::new()
         },
-        origins: if settings & 4 != 0 {
+        origins: if rules.allows_null {
             vec!["null".into()]
         } else {
             Vec::new()
         },
-        strict_origin: settings & 8 != 0,
+        strict_origin: rules.is_strict,
     };
     Gate {
         token,
         door: Door::new(access, FOLDER.into()),
+        admission: Admission::default(),
     }
 }
 
 /// Sends all of it, then the end; gives what comes up to the end.
 async fn converse(gate: Gate, bytes: &[u8], piece: usize) -> Vec<u8> {
-    let stage = Stage::new(gate, Totals::default()).await;
+    let stage = Stage::new(gate, Memory::default()).await;
     let (mut input, mut output) = split(stage.connect(256));
     let mut answer = Vec::new();
     let talk = async {
@@ -132,7 +169,7 @@ async fn converse(gate: Gate, bytes: &[u8], piece: usize) -> Vec<u8> {
     answer
 }
 
-fn check_answer(answer: &[u8], request: &[u8], asks_token: bool) {
+fn check_answer(answer: &[u8], expected: Option<(Opinion, bool)>) {
     let end = answer
         .windows(4)
         .position(|window| window == b"\r\n\r\n")
@@ -163,18 +200,32 @@ fn check_answer(answer: &[u8], request: &[u8], asks_token: bool) {
         }
     }
     if status == 101 {
-        let mut frames = websocket::Reader::default();
+        let mut frames = Codec::opened(Framing::WebSocket);
         frames.push(body);
-        while frames.event().is_some() {}
+        while frames.next_event().expect("frames of a server").is_some() {}
     } else {
         assert_eq!(length, Some(body.len()), "{head}");
     }
     let shown = String::from_utf8_lossy(body);
     assert!(!shown.contains(SECRET), "a file from outside the report");
-    if [101, 200, 301, 404].contains(&status) {
-        let request = String::from_utf8_lossy(request).to_ascii_lowercase();
-        assert!(request.contains("host:"), "{request:?}: {head}");
-        let shows_token = request.contains("token=") || request.contains("pendularm_9095=");
-        assert!(!asks_token || shows_token, "{request:?}: {head}");
+    let opinion = expected.map(|(opinion, _)| opinion);
+    // Whatever else is odd about a request: nobody is let in who may not.
+    match status {
+        101 | 426 => assert_eq!(opinion, Some(Opinion::Socket), "{head}"),
+        200 | 301 => assert_eq!(opinion, Some(Opinion::Page), "{head}"),
+        404 => assert!(
+            matches!(opinion, Some(Opinion::Page | Opinion::Socket)),
+            "{head}"
+        ),
+        _ => {}
+    }
+    if let Some((opinion, true)) = expected {
+        let fitting: &[u16] = match opinion {
+            Opinion::NoHost => &[400],
+            Opinion::Refused => &[403],
+            Opinion::Page => &[200, 301, 404],
+            Opinion::Socket => &[101, 400, 404, 426],
+        };
+        assert!(fitting.contains(&status), "{opinion:?}: {head}");
     }
 }

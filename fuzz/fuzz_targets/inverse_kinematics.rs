@@ -14,6 +14,7 @@ use arbitrary::Arbitrary;
 use glam::{DVec2, dvec2};
 use libfuzzer_sys::fuzz_target;
 use pendularm::math::kinematics::{Target, nearest_turn, solve};
+use pendularm_fuzz::limits::{DOING, hold};
 use pendularm_fuzz::numbers::{Finite, Positive, finite, positive};
 
 /// What the contract asks of a round trip, as a share of the sum of the lengths. A target that far outside the reach is
@@ -33,15 +34,17 @@ struct Input {
     orientation: Option<Finite>,
 }
 
-fuzz_target!(|input: Input| {
+fuzz_target!(|input: Input| hold(0, DOING, || examine(&input)));
+
+fn examine(input: &Input) {
     let [l1, l2, l3] = positive(input.lengths);
     let [q1, q2, q3] = finite(input.present);
     if input.has_three {
-        check(&input, [l1, l2, l3], [q1, q2, q3]);
+        check(input, [l1, l2, l3], [q1, q2, q3]);
     } else {
-        check(&input, [l1, l2], [q1, q2]);
+        check(input, [l1, l2], [q1, q2]);
     }
-});
+}
 
 fn check<const N: usize>(input: &Input, lengths: [f64; N], present: [f64; N]) {
     let longest = lengths.into_iter().fold(0.0, f64::max);

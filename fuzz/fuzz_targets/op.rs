@@ -1,28 +1,35 @@
 //! Frames into operations: any text that the frame reader lets through.
 //!
 //! What holds: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object gives an
-//! operation; names are bounded, and so is what a complaint repeats; whatever is passed on or echoed is one line of strict
+//! operation; names and numbers are those of the frame, bounded, and so is what a complaint repeats; whatever is passed on or echoed is one line of strict
 //! JSON in which nothing but numbers that overflow has changed.
 //!
 //! Input: the frames.
 
 #![no_main]
 
+use std::time::Duration;
+
 use libfuzzer_sys::fuzz_target;
 use pendularm::protocol::catalog::Topic;
-use pendularm::protocol::frame::FrameReader;
+use pendularm::protocol::limits::MAX_NAME;
+use pendularm::protocol::messages::trajectory::joint_trajectory;
 use pendularm::protocol::messages::{self, Level};
 use pendularm::protocol::op::{
-    self, MAX_NAME, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
+    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
 };
-use pendularm::protocol::trajectory::joint_trajectory;
+use pendularm::protocol::wire::frame::FrameReader;
+use pendularm::protocol::wire::payload::Payload;
 use pendularm_fuzz::json::Json;
+use pendularm_fuzz::limits::{READING, hold};
 use serde_json::value::RawValue;
 
 /// Longest complaint: a sentence of ours and an excerpt of what it is about.
 const LONGEST_COMPLAINT: usize = 512;
 
-fuzz_target!(|input: &[u8]| {
+fuzz_target!(|input: &[u8]| hold(input.len(), READING, || examine(input)));
+
+fn examine(input: &[u8]) {
     let mut frames = FrameReader::new();
     frames.push(input);
     for frame in frames.by_ref() {
@@ -34,7 +41,7 @@ fuzz_target!(|input: &[u8]| {
     if let Some(error) = frames.finish() {
         check_complaint(&error.to_string());
     }
-});
+}
 
 fn check_complaint(why: &str) {
     let line = check_line(&messages::status(Level::Error, why, None));
@@ -44,7 +51,7 @@ fn check_complaint(why: &str) {
 fn judge(frame: &str) {
     let json = Json::read(frame);
     let incoming = op::read(frame);
-    let id = incoming.id.as_deref();
+    let id = incoming.id.as_ref();
     let Some(json) = json else {
         assert!(incoming.op.is_err() && id.is_none(), "{frame:?} is no JSON");
         return;
@@ -76,22 +83,31 @@ fn judge(frame: &str) {
     }
 }
 
-fn check(op: &Op, json: &Json, id: Option<&RawValue>) {
+fn check(op: &Op, json: &Json, id: Option<&Payload>) {
     match op {
-        Op::Publish { topic, msg } => {
-            check_name(topic);
+        Op::PublishLines(_) => unreachable!("one frame is never read as lines"),
+        Op::Publish { topic, msg, heard } => {
+            check_name(json, "topic", topic);
             let line = check_line(&messages::publish_raw(topic, msg));
             check_passed_on(json.get("msg"), line.get("msg"));
             assert_eq!(line.get("topic").and_then(Json::text), Some(&**topic));
             // The runtime's own subscribers read it further; whatever it is, they must not fail.
             if *topic == *Topic::JointTrajectory.name() {
-                check_setpoint(msg);
+                check_setpoint(msg.raw());
+                if let Some(heard) = heard {
+                    let read = |msg: &Payload| joint_trajectory(msg.raw(), &["joint1", "joint2"]);
+                    assert_eq!(read(heard), read(msg), "what is left out does not count");
+                }
             }
         }
         Op::CallService(call) => {
-            check_name(&call.service);
-            assert!(call.timeout.is_none_or(|timeout| timeout <= MAX_TIMEOUT));
-            let line = check_line(&messages::call(&call.service, "1", call.args.raw()));
+            check_name(json, "service", &call.service);
+            let timeout = json.get("timeout").and_then(Json::number);
+            assert_eq!(
+                call.timeout,
+                timeout.map(|timeout| duration(timeout, MAX_TIMEOUT))
+            );
+            let line = check_line(&messages::call(&call.service, "1", call.args.payload()));
             let none = matches!(json.get("args"), None | Some(Json::Null));
             if !none {
                 check_passed_on(json.get("args"), line.get("args"));
@@ -103,7 +119,7 @@ fn check(op: &Op, json: &Json, id: Option<&RawValue>) {
             result,
             status,
         } => {
-            check_name(service);
+            check_name(json, "service", service);
             let status = status.as_deref().unwrap_or_default();
             let line = check_line(&messages::response_raw(
                 service, id, values, *result, status,
@@ -112,19 +128,27 @@ fn check(op: &Op, json: &Json, id: Option<&RawValue>) {
             check_passed_on(json.get("id"), line.get("id"));
         }
         Op::Subscribe(one) => {
-            check_name(&one.topic);
-            assert!(one.throttle <= MAX_THROTTLE);
-            assert!((1..=MAX_QUEUE_LENGTH).contains(&one.queue_length));
+            check_name(json, "topic", &one.topic);
+            let number = |name: &str| json.get(name).and_then(Json::number);
+            let milliseconds = number("throttle_rate").unwrap_or_default();
+            assert_eq!(one.throttle, duration(milliseconds / 1000.0, MAX_THROTTLE));
+            // What is beyond every count is as good as the largest.
+            let length = number("queue_length").unwrap_or(1.0);
+            let longest = MAX_QUEUE_LENGTH as f64;
+            assert_eq!(one.queue_length as f64, length.clamp(1.0, longest));
             assert_ne!(one.encoding.fragment_size, Some(0));
+            if let Some(size) = one.encoding.fragment_size {
+                assert_eq!(Some(size as f64), number("fragment_size"));
+            }
         }
         Op::Advertise { topic, .. } | Op::Unadvertise { topic } | Op::Unsubscribe { topic } => {
-            check_name(topic)
+            check_name(json, "topic", topic)
         }
         Op::AdvertiseService { service, .. } | Op::UnadvertiseService { service } => {
-            check_name(service)
+            check_name(json, "service", service)
         }
-        Op::SendActionGoal(goal) => check_name(&goal.action),
-        Op::CancelActionGoal { action } => check_name(action),
+        Op::SendActionGoal(goal) => check_name(json, "action", &goal.action),
+        Op::CancelActionGoal { action } => check_name(json, "action", action),
         Op::Fragment(_) | Op::SetLevel(_) | Op::Auth { .. } => {}
     }
 }
@@ -140,8 +164,14 @@ fn check_setpoint(msg: &RawValue) {
     }
 }
 
-fn check_name(name: &str) {
+fn check_name(json: &Json, member: &str, name: &str) {
     assert!((1..=MAX_NAME).contains(&name.len()));
+    assert_eq!(json.get(member).and_then(Json::text), Some(name));
+}
+
+/// So many seconds, at most `longest`.
+fn duration(seconds: f64, longest: Duration) -> Duration {
+    Duration::try_from_secs_f64(seconds).map_or(longest, |duration| duration.min(longest))
 }
 
 fn check_line(line: &[u8]) -> Json {

@@ -14,11 +14,12 @@ use std::time::{Duration, Instant};
 use arbitrary::Arbitrary;
 use bytes::Bytes;
 use libfuzzer_sys::fuzz_target;
-use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, Outbox};
+use pendularm::protocol::outbox::{FRAME_BYTES, MAX_TOPIC_BYTES, Outbox, PLACE_BYTES};
+use pendularm_fuzz::limits::{DOING, hold};
 
 const TOPICS: [&str; 4] = ["/a", "/b", "/c", "/d"];
 
-#[derive(Debug, Arbitrary)]
+#[derive(Debug, Clone, Copy, Arbitrary)]
 enum Step {
     /// A message of that many sixteenths of all there is room for, and some more; none is empty.
     Push {
@@ -48,19 +49,21 @@ enum Step {
     Pass {
         milliseconds: u16,
     },
-    /// From the next message on only so much may wait, where that is less than ever.
-    Limit {
+    /// Only so much of topic messages is kept, their places included.
+    Keep {
         bytes: u32,
     },
 }
 
-fuzz_target!(|steps: Vec<Step>| {
+fuzz_target!(|steps: Vec<Step>| hold(0, DOING, || examine(&steps)));
+
+fn examine(steps: &[Step]) {
     let zeros = Bytes::from_static(&[0; MAX_TOPIC_BYTES + 1]);
     let topics = TOPICS.map(Arc::<str>::from);
     let mut outbox = Outbox::new();
     let mut model = Model::default();
     let mut now = Instant::now();
-    for step in steps {
+    for &step in steps {
         match step {
             Step::Push {
                 topic,
@@ -111,15 +114,18 @@ fuzz_target!(|steps: Vec<Step>| {
                 model.write(bytes);
             }
             Step::Pass { milliseconds } => now += Duration::from_millis(milliseconds.into()),
-            Step::Limit { bytes } => {
+            Step::Keep { bytes } => {
                 let bytes = usize::try_from(bytes).unwrap_or(usize::MAX) % (MAX_TOPIC_BYTES + 10);
-                outbox.limit_topics(bytes);
-                model.scarce = Some(bytes);
+                outbox.keep_topics(bytes);
+                model.drop_while(|model| {
+                    model.topic_bytes() + model.messages().count() * (PLACE_BYTES + FRAME_BYTES)
+                        > bytes
+                });
             }
         }
         compare(&mut outbox, &model);
     }
-});
+}
 
 fn compare(outbox: &mut Outbox, model: &Model) {
     assert!(outbox.topic_bytes() <= MAX_TOPIC_BYTES);
@@ -159,20 +165,27 @@ struct Model {
     /// What is being written: what is left of it, and whether it is a response.
     in_flight: Vec<(usize, bool)>,
     dropped: u64,
-    scarce: Option<usize>,
 }
 
 impl Model {
-    fn most(&self) -> usize {
-        self.scarce.unwrap_or(MAX_TOPIC_BYTES).min(MAX_TOPIC_BYTES)
+    fn messages(&self) -> impl Iterator<Item = &Waiting> {
+        let waiting = self.queue.iter().chain(&self.held);
+        waiting.filter(|one| one.topic.is_some())
     }
 
     fn topic_bytes(&self) -> usize {
-        let waiting = self.queue.iter().chain(&self.held);
-        waiting
-            .filter(|one| one.topic.is_some())
-            .map(|one| one.length)
-            .sum()
+        self.messages().map(|one| one.length).sum()
+    }
+
+    /// The oldest messages go.
+    fn drop_while(&mut self, too_many: impl Fn(&Self) -> bool) {
+        while too_many(self) {
+            let oldest = self.messages().map(|one| one.number).min();
+            let oldest = oldest.expect("what takes up room");
+            self.queue.retain(|one| one.number != oldest);
+            self.held.retain(|one| one.number != oldest);
+            self.dropped += 1;
+        }
     }
 
     fn response_bytes(&self) -> usize {
@@ -201,7 +214,7 @@ impl Model {
 
     fn push(&mut self, topic: usize, length: usize, now: Instant) {
         self.release(now);
-        if length > self.most() {
+        if length > MAX_TOPIC_BYTES {
             self.dropped += 1;
             return;
         }
@@ -230,20 +243,7 @@ impl Model {
                 self.enqueue(Some(topic), length);
             }
         }
-        while self.topic_bytes() > self.most() {
-            let messages = self
-                .queue
-                .iter()
-                .chain(&self.held)
-                .filter(|one| one.topic.is_some());
-            let oldest = messages
-                .map(|one| one.number)
-                .min()
-                .expect("what takes up room");
-            self.queue.retain(|one| one.number != oldest);
-            self.held.retain(|one| one.number != oldest);
-            self.dropped += 1;
-        }
+        self.drop_while(|model| model.topic_bytes() > MAX_TOPIC_BYTES);
     }
 
     /// Of what is held back of a topic only so many remain.

@@ -8,10 +8,11 @@
 
 use libfuzzer_sys::fuzz_target;
 use pendularm_fuzz::client::Door;
+use pendularm_fuzz::limits::{DOING, hold};
 use pendularm_fuzz::session::{Step, play_with_arm};
 
 fuzz_target!(|script: (bool, bool, Vec<Step<'_>>)| {
     let (is_scarce, is_socket, steps) = script;
     let door = if is_socket { Door::Socket } else { Door::Plain };
-    play_with_arm(door, is_scarce, &steps);
+    hold(0, DOING, || play_with_arm(door, is_scarce, &steps));
 });

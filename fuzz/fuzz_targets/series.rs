@@ -8,14 +8,17 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::protocol::frame::{Frame, FrameError, FrameReader};
 use pendularm::protocol::messages;
 use pendularm::protocol::op::{self, Op};
-use pendularm::protocol::series::{MAX_SERIES, messages as each};
+use pendularm::protocol::wire::frame::{Frame, FrameError, FrameReader};
+use pendularm::protocol::wire::series::{MAX_SERIES, messages as each};
+use pendularm_fuzz::limits::{READING, hold};
 
 const HEAD: &[u8] = b"{\"op\":\"publish\",\"topic\":\"/a\",\"msg\":{";
 
-fuzz_target!(|input: &[u8]| {
+fuzz_target!(|input: &[u8]| hold(input.len(), READING, || examine(input)));
+
+fn examine(input: &[u8]) {
     let &[piece, ref rest @ ..] = input else {
         return;
     };
@@ -29,7 +32,7 @@ fuzz_target!(|input: &[u8]| {
     let one_by_one = read(&stream, stream.len().max(1), false);
     assert_eq!(read(&stream, stream.len().max(1), true), one_by_one);
     assert_eq!(read(&stream, usize::from(piece).max(1), true), one_by_one);
-});
+}
 
 /// What a frame comes to: the message as it is passed on, or the frame.
 #[derive(Debug, PartialEq, Eq)]
@@ -68,7 +71,7 @@ fn judge(next: Result<Frame, FrameError>) -> Outcome {
     };
     let incoming = op::read(&frame);
     match incoming.op {
-        Ok(Op::Publish { topic, msg }) => {
+        Ok(Op::Publish { topic, msg, .. }) => {
             Outcome::Message(messages::publish_raw(&topic, &msg).to_vec())
         }
         _ => Outcome::Other(frame),

@@ -15,6 +15,7 @@ use pendularm::math::dynamics::energy;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use pendularm::math::simulation::{Divergence, Simulation};
+use pendularm_fuzz::limits::{DOING, hold};
 use pendularm_fuzz::numbers::{Finite, Positive, finite, positive};
 
 /// Changes in one run, and steps between two of them.
@@ -49,13 +50,15 @@ enum Change {
     Reset,
 }
 
-fuzz_target!(|input: Input| {
+fuzz_target!(|input: Input| hold(0, DOING, || examine(&input)));
+
+fn examine(input: &Input) {
     if input.has_three {
-        run::<3>(&input);
+        run::<3>(input);
     } else {
-        run::<2>(&input);
+        run::<2>(input);
     }
-});
+}
 
 fn first<const N: usize>(numbers: [Finite; 3]) -> [f64; N] {
     let numbers = finite(numbers);

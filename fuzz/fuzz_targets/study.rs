@@ -12,15 +12,20 @@ use libfuzzer_sys::fuzz_target;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::linear::no_control;
 use pendularm::study::rollout::{Plan, Rollout};
 use pendularm::study::stability::limit_held;
 use pendularm::study::stability::{LimitSearch, Limits};
+use pendularm_fuzz::limits::{DOING, hold};
 use pendularm_fuzz::numbers::{Finite, Positive, finite, positive};
 
 /// Pieces of one search: the grid of poses, many times over.
 const MAX_PIECES: usize = 100_000;
 /// Steps of one run; more take time and show nothing new.
 const MAX_STEPS: f64 = 300.0;
+/// Samples that are asked for: up to some more than there are steps.
+const MAX_SAMPLES: u16 = 400;
 
 #[derive(Debug, Clone, Copy, Arbitrary)]
 struct Input {
@@ -49,13 +54,17 @@ enum Question {
     RunOfThree,
 }
 
-fuzz_target!(|input: Input| match input.question {
-    Question::HeldOfTwo => held::<2>(&input),
-    Question::HeldOfThree => held::<3>(&input),
-    Question::AllOfTwo => all::<2>(&input),
-    Question::RunOfTwo => run::<2>(&input),
-    Question::RunOfThree => run::<3>(&input),
-});
+fuzz_target!(|input: Input| hold(0, DOING, || examine(&input)));
+
+fn examine(input: &Input) {
+    match input.question {
+        Question::HeldOfTwo => held::<2>(input),
+        Question::HeldOfThree => held::<3>(input),
+        Question::AllOfTwo => all::<2>(input),
+        Question::RunOfTwo => run::<2>(input),
+        Question::RunOfThree => run::<3>(input),
+    }
+}
 
 fn first<const N: usize>(numbers: [Finite; 3]) -> [f64; N] {
     let numbers = finite(numbers);
@@ -82,8 +91,11 @@ fn setpoint<const N: usize>(input: &Input) -> Setpoint<N> {
     }
 }
 
-fn method(input: &Input) -> Method {
-    Method::ALL[usize::from(input.method) % Method::ALL.len()]
+fn control<const N: usize>(input: &Input, gains: Gains<N>) -> ControlLoop<N> {
+    let Positive(timestep) = input.timestep;
+    ControlLoop::new(arm(input), gains, setpoint(input))
+        .with_method(Method::ALL[usize::from(input.method) % Method::ALL.len()])
+        .with_timestep(timestep)
 }
 
 fn check_limit(limit: Option<f64>) {
@@ -94,26 +106,29 @@ fn check_limit(limit: Option<f64>) {
 }
 
 fn held<const N: usize>(input: &Input) {
-    check_limit(limit_held(
-        &arm::<N>(input),
-        &gains(input),
-        &setpoint(input),
-        method(input),
-    ));
+    check_limit(limit_held(&control::<N>(input, gains(input))));
 }
 
 fn all<const N: usize>(input: &Input) {
-    let mut search =
-        LimitSearch::<N>::new(&arm(input), &gains(input), &setpoint(input), method(input));
+    let mut search = LimitSearch::<N>::new(&control(input, gains(input)));
     let found = (0..MAX_PIECES).find_map(|_| search.advance());
     let Limits {
         held,
         continuous,
         minimum_held,
         minimum_continuous,
+        bound,
         advised,
+        ..
     } = found.expect("a search ends");
-    for limit in [held, continuous, minimum_held, minimum_continuous, advised] {
+    for limit in [
+        held,
+        continuous,
+        minimum_held,
+        minimum_continuous,
+        bound,
+        advised,
+    ] {
         check_limit(limit);
     }
 }
@@ -122,14 +137,17 @@ fn run<const N: usize>(input: &Input) {
     let Positive(timestep) = input.timestep;
     let [position, velocity] = input.start.map(first);
     let plan = Plan::<N> {
-        arm: arm(input),
+        control: control(
+            input,
+            if input.has_control {
+                gains(input)
+            } else {
+                no_control()
+            },
+        ),
         start: State { position, velocity },
         duration: timestep * (f64::from(input.steps) % MAX_STEPS),
-        timestep,
-        method: method(input),
-        gains: input.has_control.then(|| gains(input)),
-        setpoint: setpoint(input),
-        samples: input.samples.into(),
+        samples: (input.samples % MAX_SAMPLES).into(),
         reference: input.has_reference,
     };
     let (mut whole, mut sliced) = match (Rollout::new(plan), Rollout::new(plan)) {
@@ -149,5 +167,5 @@ fn run<const N: usize>(input: &Input) {
     assert!(whole.times().is_sorted(), "{:?}", whole.times());
     let mut numbers = whole.positions().iter().chain(whole.velocities()).flatten();
     assert!(numbers.all(|number| number.is_finite()));
-    assert!(whole.times().len() <= usize::from(input.samples).max(2));
+    assert!(whole.times().len() <= usize::from(input.samples % MAX_SAMPLES).max(2));
 }

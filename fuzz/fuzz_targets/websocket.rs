@@ -8,9 +8,10 @@
 
 use libfuzzer_sys::fuzz_target;
 use pendularm_fuzz::client::Door;
+use pendularm_fuzz::limits::{DOING, hold};
 use pendularm_fuzz::session::{Step, play};
 
 fuzz_target!(|script: (bool, Vec<Step<'_>>)| {
     let (is_scarce, steps) = script;
-    play(Door::Socket, is_scarce, &steps);
+    hold(0, DOING, || play(Door::Socket, is_scarce, &steps));
 });

@@ -8,7 +8,8 @@ use tokio::sync::Notify;
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 use tokio::task::JoinHandle;
 
-use crate::websocket::{self, Event, HANDSHAKE, opcode};
+use pendularm_client::codec::{Codec, Event, Framing};
+use pendularm_client::websocket::{LAST, append, append_close, append_message, handshake, opcode};
 
 /// Which way a client speaks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,8 +35,7 @@ pub struct Client {
     out: UnboundedSender<Outgoing>,
     line: Rc<Line>,
     tasks: [JoinHandle<()>; 2],
-    frames: websocket::Reader,
-    is_greeted: bool,
+    codec: Codec,
 }
 
 enum Outgoing {
@@ -65,11 +65,13 @@ impl Client {
             out,
             line,
             tasks: [reading, writing],
-            frames: websocket::Reader::default(),
-            is_greeted: door == Door::Plain,
+            codec: Codec::new(match door {
+                Door::Plain => Framing::Lines,
+                Door::Socket => Framing::WebSocket,
+            }),
         };
         if door == Door::Socket {
-            client.send_bytes(HANDSHAKE.into());
+            client.send_bytes(handshake("127.0.0.1:9095", "/", "").into_bytes());
         }
         client
     }
@@ -103,7 +105,7 @@ impl Client {
                 };
                 let piece = [0, 1, 7, 100][usize::from(style >> 1) % 4];
                 let mask = [style, style.rotate_left(3), 0x5a, 0];
-                websocket::append_message(&mut bytes, kind, mask, piece, frame.as_bytes());
+                append_message(&mut bytes, kind, mask, piece, frame.as_bytes());
             }
         }
         self.send_bytes(bytes);
@@ -113,7 +115,7 @@ impl Client {
     pub fn finish(&self) {
         if self.door == Door::Socket {
             let mut bytes = Vec::new();
-            websocket::append(&mut bytes, 0x80 | opcode::CLOSE, [1, 2, 3, 4], &[3, 232]);
+            append_close(&mut bytes, [1, 2, 3, 4], 1000, "");
             self.send_bytes(bytes);
         }
         let _ = self.out.send(Outgoing::End);
@@ -140,62 +142,43 @@ impl Client {
     /// Whether the runtime has agreed to speak.
     #[must_use]
     pub fn is_greeted(&self) -> bool {
-        self.is_greeted
+        self.codec.is_open()
     }
 
     /// Whether all that came was whole, for a stream that has ended.
     #[must_use]
     pub fn ended_in_order(&self) -> bool {
-        self.line.bytes.borrow().is_empty()
-            && (self.door == Door::Plain || !self.is_greeted || self.frames.is_between_messages())
+        self.line.bytes.borrow().is_empty() && self.codec.is_between_messages()
     }
 
     /// What was left over, to be shown.
     #[must_use]
     pub fn rest(&self) -> String {
         let bytes = String::from_utf8_lossy(&self.line.bytes.borrow()).into_owned();
-        format!("{bytes:?}, {:?}", self.frames)
+        format!("{bytes:?}, {:?}", self.codec)
+    }
+
+    /// Throws away what has come since, whatever it is.
+    pub fn take_anything(&mut self) {
+        self.line.bytes.borrow_mut().clear();
+        self.codec.discard();
     }
 
     /// What has come since.
     pub fn take(&mut self) -> Vec<Received> {
-        let mut bytes = self.line.bytes.borrow_mut();
-        if !self.is_greeted {
-            let Some(end) = bytes.windows(4).position(|window| window == b"\r\n\r\n") else {
-                return Vec::new();
-            };
-            assert!(
-                bytes.starts_with(b"HTTP/1.1 101 "),
-                "{}",
-                String::from_utf8_lossy(&bytes)
-            );
-            bytes.drain(..end + 4);
-            self.is_greeted = true;
-        }
+        self.codec
+            .push(&std::mem::take(&mut *self.line.bytes.borrow_mut()));
         let mut received = Vec::new();
-        if self.door == Door::Plain {
-            let end = bytes
-                .iter()
-                .rposition(|byte| *byte == b'\n')
-                .map_or(0, |at| at + 1);
-            let lines: Vec<u8> = bytes.drain(..end).collect();
-            let text = String::from_utf8(lines).expect("what the runtime sends is UTF-8");
-            received.extend(text.lines().map(|line| Received::Json(line.to_owned())));
-            return received;
-        }
-        self.frames.push(&bytes);
-        bytes.clear();
-        drop(bytes);
-        while let Some(event) = self.frames.event() {
+        while let Some(event) = self.codec.next_event().expect("what a server may send") {
             match event {
                 Event::Text(text) => received.push(Received::Json(text)),
                 Event::Binary(bytes) => received.push(Received::Binary(bytes)),
                 Event::Ping(payload) => {
                     let mut pong = Vec::new();
-                    websocket::append(&mut pong, 0x80 | opcode::PONG, [9; 4], &payload);
+                    append(&mut pong, LAST | opcode::PONG, [9; 4], &payload);
                     self.send_bytes(pong);
                 }
-                Event::Pong | Event::Close => {}
+                Event::Pong(_) | Event::Close(..) => {}
             }
         }
         received

@@ -2,18 +2,24 @@
 //!
 //! | file | what |
 //! | --- | --- |
-//! | [`json`], [`cbor`] | second readings, slow and strict |
+//! | [`json`], [`cbor`], [`cdr`] | second readings, slow and strict |
+//! | [`admission`] | a second opinion on who may in |
+//! | [`limits`] | what an execution may cost in time and memory |
 //! | [`numbers`] | numbers where they are awkward |
+//! | [`book`] | what clients have said, to compare what others hear with |
 //! | [`session`] | scripts for clients, and what must hold of what they hear |
-//! | [`client`], [`websocket`] | a client on an in-memory pipe |
+//! | [`client`] | a client on an in-memory pipe, which speaks as `pendularm-client` does |
 //! | [`stage`] | the runtime's side of it, in virtual time |
 //!
 //! A target panics where something does not hold; what it was given is then kept by the fuzzer.
 
+pub mod admission;
+pub mod book;
 pub mod cbor;
+pub mod cdr;
 pub mod client;
 pub mod json;
+pub mod limits;
 pub mod numbers;
 pub mod session;
 pub mod stage;
-pub mod websocket;

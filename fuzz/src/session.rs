@@ -2,24 +2,30 @@
 //!
 //! - Every frame is one line of strict JSON (or CBOR, where that was asked for) with an `op` that the runtime sends.
 //! - A call gets exactly one response with its `id`, as long as its client stays, reads, and breaks no rule; never two.
-//! - Of one client's messages on a topic another hears each at most once, in the order in which they were sent.
+//! - Of one client's messages on a topic another hears each at most once, in the order in which they were sent, as they were sent.
+//! - A provider hears what its caller asked, and the caller what its provider answered.
+//! - In the end, when nobody is in anybody's way, every message and every call between those who are left arrives.
 //! - A connection ends when its client has ended, and nothing else ends it but the rules that say so.
 //! - When all have left, nothing is counted as held for anybody.
 //!
 //! All of it holds too where all clients together have little room.
 
+use std::cell::RefCell;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
+use std::rc::Rc;
 use std::time::Duration;
 
 use arbitrary::Arbitrary;
-use pendularm::actors::budget::Totals;
-use pendularm::actors::connection::gate::Gate;
-use pendularm::actors::connection::{ANSWERS_OWED, LINGER, STALL_LIMIT};
+use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::gateway::connection::gate::Gate;
+use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
 use pendularm::web::serve::TAKE_TIME;
+use pendularm_client::websocket;
 use tokio::time::sleep;
 
+use crate::book::Book;
 use crate::cbor;
 use crate::client::{Client, Door, Received};
 use crate::json::Json;
@@ -36,6 +42,9 @@ const ARM_WAIT: u16 = 48;
 const LONGEST_TIMEOUT: Duration = Duration::from_secs(66);
 /// Every id of a call begins so; garbage must not, or it would be a call.
 const ID: &str = "call-";
+/// Messages of each client in the end, on a topic that nobody has named before.
+const LAST_MESSAGES: u64 = 3;
+const LAST_TOPIC: &str = "/in/the/end";
 
 /// One thing that happens.
 #[derive(Debug, Arbitrary)]
@@ -170,8 +179,8 @@ const VALUES: [&str; 12] = [
 /// Plays a script with clients of one kind, and one node that serves everything.
 pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run(async {
-        let stage = Stage::new(Gate::default(), totals(is_scarce)).await;
-        Session::new(door, Cast::Stub, stage)
+        let stage = Stage::new(Gate::default(), memory(is_scarce)).await;
+        Session::new(door, Cast::Stub, is_scarce, stage)
             .perform_all(steps)
             .await;
     });
@@ -180,18 +189,18 @@ pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
 /// Plays a script with the runtime's own nodes. In less time: an arm of tiny timesteps computes for as long as it may.
 pub fn play_with_arm(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run_apart(async {
-        let stage = Stage::with_arm(Gate::default(), totals(is_scarce)).await;
-        Session::new(door, Cast::Arm, stage)
+        let stage = Stage::with_arm(Gate::default(), memory(is_scarce)).await;
+        Session::new(door, Cast::Arm, is_scarce, stage)
             .perform_all(steps)
             .await;
     });
 }
 
-fn totals(is_scarce: bool) -> Totals {
+fn memory(is_scarce: bool) -> Memory {
     if is_scarce {
         scarce()
     } else {
-        Totals::default()
+        Memory::default()
     }
 }
 
@@ -212,6 +221,9 @@ struct Session {
     /// Calls and messages so far: their numbers tell them apart.
     calls: u64,
     messages: u64,
+    /// All that clients say, for all to look up.
+    book: Rc<RefCell<Book>>,
+    is_scarce: bool,
 }
 
 /// A client, and what it may expect.
@@ -219,8 +231,11 @@ struct Player {
     client: Client,
     /// How often each of its calls was answered.
     answered: BTreeMap<String, u32>,
-    /// Calls that came for it as a provider, by id and service.
-    forwarded: Vec<(String, String)>,
+    /// Calls that came for it as a provider: id, service, and the caller's own id.
+    forwarded: Vec<(String, String, String)>,
+    /// What it heard in the end: whose, and which.
+    last: Vec<(u64, u64)>,
+    book: Rc<RefCell<Book>>,
     /// The last message of each topic and sender.
     latest: HashMap<(String, u64), u64>,
     /// Fragments of a message, by its id.
@@ -233,11 +248,13 @@ struct Player {
 }
 
 impl Player {
-    fn new(client: Client) -> Self {
+    fn new(client: Client, book: Rc<RefCell<Book>>) -> Self {
         Self {
             client,
             answered: BTreeMap::new(),
             forwarded: Vec::new(),
+            last: Vec::new(),
+            book,
             latest: HashMap::new(),
             pieces: HashMap::new(),
             is_excused: false,
@@ -248,7 +265,7 @@ impl Player {
 }
 
 impl Session {
-    fn new(door: Door, cast: Cast, stage: Stage) -> Self {
+    fn new(door: Door, cast: Cast, is_scarce: bool, stage: Stage) -> Self {
         let mut session = Self {
             door,
             cast,
@@ -257,6 +274,8 @@ impl Session {
             left: ARM_TIME,
             calls: 0,
             messages: 0,
+            book: Rc::default(),
+            is_scarce,
         };
         for _ in 0..CLIENTS {
             let player = session.enter(2, 255);
@@ -275,7 +294,7 @@ impl Session {
         let client = Client::new(self.door, self.stage.connect(room), piece);
         // So that nothing that follows opens like another protocol.
         client.send("{\"op\":\"set_level\",\"level\":\"info\"}", 0);
-        Player::new(client)
+        Player::new(client, Rc::clone(&self.book))
     }
 
     async fn perform_all(mut self, steps: &[Step<'_>]) {
@@ -313,6 +332,7 @@ impl Session {
                 let player = self.player(*client);
                 // A line that is not ended would swallow what follows, and a frame may be a close frame.
                 player.is_excused = true;
+                player.note_forgery(bytes);
                 player.client.send_bytes(bytes.to_vec());
                 if door == Door::Plain {
                     player.client.send_bytes(b"\n".to_vec());
@@ -408,12 +428,13 @@ impl Session {
             .iter()
             .any(|word| text.contains(word));
         player.is_excused |= meddles;
+        player.note_forgery(bytes);
         match door {
             Door::Plain => player.client.send_bytes([bytes, b"\n"].concat()),
             Door::Socket => {
                 let mut message = Vec::new();
-                let kind = crate::websocket::opcode::BINARY;
-                crate::websocket::append_message(&mut message, kind, [1, 2, 3, 4], 0, bytes);
+                let kind = websocket::opcode::BINARY;
+                websocket::append_message(&mut message, kind, [1, 2, 3, 4], 0, bytes);
                 player.client.send_bytes(message);
             }
         }
@@ -431,8 +452,11 @@ impl Session {
             }
             Deed::Publish { topic, payload } => {
                 self.messages += 1;
-                let (topic, number) = (topic_of(*topic), self.messages);
+                let number = self.messages;
                 let more = payload.json().unwrap_or("0".to_owned());
+                let name = TOPICS[usize::from(*topic) % TOPICS.len()];
+                self.book.borrow_mut().publish(number, place, name, &more);
+                let topic = topic_of(*topic);
                 format!(
                     "{{\"op\":\"publish\",\"topic\":{topic},\"msg\":{{\"from\":{place},\"number\":{number},\"more\":{more}}}}}"
                 )
@@ -484,12 +508,8 @@ impl Session {
                 if forwarded.is_empty() {
                     return None;
                 }
-                let (id, service) = forwarded.remove(usize::from(*which) % forwarded.len());
-                let values = values.json().unwrap_or("{}".to_owned());
-                let (id, service) = (quoted(&id), quoted(&service));
-                format!(
-                    "{{\"op\":\"service_response\",\"service\":{service},\"id\":{id},\"values\":{values},\"result\":{result}}}"
-                )
+                let call = forwarded.remove(usize::from(*which) % forwarded.len());
+                self.response(&call, *result, values.json().as_deref().unwrap_or("{}"))
             }
             Deed::Level(level) => {
                 let level = ["info", "warning", "error", "none", "loud"][usize::from(*level) % 5];
@@ -531,12 +551,31 @@ impl Session {
             Payload::Fitting(numbers, more) => Some(fitting(service_name(service), numbers, *more)),
             args => args.json(),
         };
+        let args = if Service::from_name(service_name(service)).is_some() {
+            args
+        } else {
+            let more = args.unwrap_or("0".to_owned());
+            self.book.borrow_mut().call(&id, &more);
+            Some(format!("{{\"call\":\"{id}\",\"more\":{more}}}"))
+        };
         put(&mut frame, "args", args.as_ref());
         frame + "}"
     }
 
+    /// A provider's answer to a call, noted.
+    fn response(&self, call: &(String, String, String), result: bool, more: &str) -> String {
+        let (id, service, caller) = call;
+        self.book.borrow_mut().answer(caller, result, more);
+        let (id, service, caller) = (quoted(id), quoted(service), quoted(caller));
+        format!(
+            "{{\"op\":\"service_response\",\"service\":{service},\"id\":{id},\"values\":{{\"call\":{caller},\"more\":{more}}},\"result\":{result}}}"
+        )
+    }
+
     /// Looks at all that came.
     fn hear(&mut self) {
+        // Where room is scarce, whoever holds most is cut off.
+        let someone_gave_way = self.stage.gauges.memory().cut_off() > 0;
         for player in &mut self.players {
             for received in player.client.take() {
                 match received {
@@ -551,7 +590,7 @@ impl Session {
                 } else {
                     TAKE_TIME
                 };
-                let stalled = player.idle >= patience;
+                let stalled = player.idle >= patience || someone_gave_way;
                 assert!(
                     player.is_excused || stalled,
                     "ended for no reason: {}",
@@ -586,11 +625,14 @@ impl Session {
                 assert_eq!(unanswered, None, "a call and its answers");
             }
         }
+        if !self.is_scarce {
+            self.exchange().await;
+        }
         for player in &self.players {
             player.client.finish();
         }
         // A client that leaves is owed the rest, and answers need not come.
-        let limit = STALL_LIMIT + ANSWERS_OWED + 2 * LINGER + Duration::from_secs(5);
+        let limit = STALL_LIMIT + RESPONSES_OWED + 2 * LINGER + Duration::from_secs(5);
         let mut waited = Duration::ZERO;
         while waited < limit && !self.has_emptied() {
             let step = self.patience(250, waited);
@@ -601,8 +643,85 @@ impl Session {
             player.is_excused = true;
         }
         self.hear();
-        let left = (self.stage.gauges.connections(), self.stage.gauges.totals());
+        let left = (self.stage.gauges.connections(), self.stage.gauges.memory());
         assert!(self.has_emptied(), "left when all have left: {left:?}");
+    }
+
+    /// Those who are left tell one another something and ask one another something, and nothing of that may be lost: all of them
+    /// read, and have done what they wanted to.
+    async fn exchange(&mut self) {
+        let left: Vec<u8> = (0..CLIENTS as u8)
+            .filter(|client| self.player(*client).is_owed())
+            .collect();
+        let topic = quoted(LAST_TOPIC);
+        for &client in &left {
+            let player = self.player(client);
+            player.forwarded.clear();
+            for frame in [
+                format!("{{\"op\":\"subscribe\",\"topic\":{topic}}}"),
+                format!("{{\"op\":\"advertise\",\"topic\":{topic}}}"),
+                format!("{{\"op\":\"advertise_service\",\"service\":\"{LAST_TOPIC}/{client}\"}}"),
+            ] {
+                player.client.send(&frame, 0);
+            }
+        }
+        self.pass(Duration::from_millis(5)).await;
+        for &client in &left {
+            for _ in 0..LAST_MESSAGES {
+                self.messages += 1;
+                let number = self.messages;
+                let more = VALUES[number as usize % VALUES.len()];
+                let from = u64::from(client);
+                self.book
+                    .borrow_mut()
+                    .publish(number, from, LAST_TOPIC, more);
+                let frame = format!(
+                    "{{\"op\":\"publish\",\"topic\":{topic},\"msg\":{{\"from\":{from},\"number\":{number},\"more\":{more}}}}}"
+                );
+                self.player(client).client.send(&frame, 0);
+            }
+            for &provider in &left {
+                self.calls += 1;
+                let id = format!("{ID}{}", self.calls);
+                let more = VALUES[self.calls as usize % VALUES.len()];
+                self.book.borrow_mut().call(&id, more);
+                self.player(client).answered.insert(id.clone(), 0);
+                let frame = format!(
+                    "{{\"op\":\"call_service\",\"service\":\"{LAST_TOPIC}/{provider}\",\"id\":\"{id}\",\"args\":{{\"call\":\"{id}\",\"more\":{more}}}}}"
+                );
+                self.player(client).client.send(&frame, 0);
+            }
+        }
+        // A client waits for its answer before its next frame is looked at, so they come one after the other.
+        for _ in 0..2 * CLIENTS {
+            self.pass(Duration::from_millis(5)).await;
+            for &client in &left {
+                for call in std::mem::take(&mut self.player(client).forwarded) {
+                    let frame = self.response(&call, true, VALUES[call.0.len() % VALUES.len()]);
+                    self.player(client).client.send(&frame, 0);
+                }
+            }
+        }
+        self.pass(Duration::from_millis(5)).await;
+        let is_forged = self.book.borrow().is_forged;
+        for &client in left.iter().filter(|_| !is_forged) {
+            let player = self.player(client);
+            let rest = player.client.rest();
+            assert!(player.is_owed(), "{client} has ended: {rest}");
+            let unanswered = player.answered.iter().find(|(_, count)| **count != 1);
+            assert_eq!(unanswered, None, "a call in the end and its answers");
+            for &from in &left {
+                let heard = player
+                    .last
+                    .iter()
+                    .filter(|(one, _)| *one == u64::from(from));
+                assert_eq!(
+                    heard.count() as u64,
+                    LAST_MESSAGES,
+                    "what {client} heard of {from}"
+                );
+            }
+        }
     }
 
     /// How long to wait before looking again.
@@ -646,6 +765,12 @@ impl Player {
                 if let Some(count) = text("id").and_then(|id| self.answered.get_mut(id)) {
                     *count += 1;
                     assert_eq!(*count, 1, "answered again: {line}");
+                    let said = |name: &str| frame.get("values").and_then(|values| values.get(name));
+                    if let (Some(id), Some(call)) = (text("id"), said("call").and_then(Json::text))
+                    {
+                        let book = self.book.borrow();
+                        book.check_answer(id, call, is_good, said("more"));
+                    }
                 } else {
                     let is_ours = text("id").is_some_and(|id| id.starts_with(ID));
                     assert!(
@@ -659,7 +784,11 @@ impl Player {
                     text("id").expect("an id"),
                     text("service").expect("a service"),
                 );
-                self.forwarded.push((call.0.to_owned(), call.1.to_owned()));
+                let asked = |name: &str| frame.get("args").and_then(|args| args.get(name));
+                let caller = asked("call").and_then(Json::text).unwrap_or_default();
+                self.book.borrow().check_call(caller, asked("more"));
+                let (id, service) = (call.0.to_owned(), call.1.to_owned());
+                self.forwarded.push((id, service, caller.to_owned()));
             }
             "fragment" => self.hear_piece(&frame),
             "action_result" | "action_feedback" => {
@@ -706,7 +835,21 @@ impl Player {
         let number = |name: &str| msg.get(name).and_then(Json::number);
         if let (Some(from), Some(number)) = (number("from"), number("number")) {
             self.note(topic, from, number);
+            let (from, number) = (from as u64, number as u64);
+            let book = self.book.borrow();
+            book.check_message(number, from, topic, msg.get("more"));
+            if topic == LAST_TOPIC {
+                self.last.push((from, number));
+            }
         }
+    }
+
+    /// What it sends now may be a message, a call or an answer that is in no book.
+    fn note_forgery(&self, bytes: &[u8]) {
+        let text = String::from_utf8_lossy(bytes);
+        let words = ["publish", "service", "fragment", "\\u"];
+        let mut book = self.book.borrow_mut();
+        book.is_forged |= words.iter().any(|word| text.contains(word));
     }
 
     fn note(&mut self, topic: &str, from: f64, number: f64) {

@@ -12,22 +12,23 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::arm_sim::{ArmSim, joint_names};
-use pendularm::actors::budget::{Budget, Totals};
-use pendularm::actors::connection::Connection;
-use pendularm::actors::connection::gate::Gate;
-use pendularm::actors::gauges::Gauges;
-use pendularm::actors::ik::Ik;
-use pendularm::actors::ik_action::{GoalTracker, IkAction};
-use pendularm::actors::ik_trial::{GoalClient, IkTrial};
-use pendularm::actors::node::{Interest, Reply, ServiceCall, TopicMessage};
-use pendularm::actors::registry::{Attach, Nodes, Publish, Registry};
-use pendularm::actors::rosapi::Rosapi;
+use pendularm::actors::arm::ik::Ik;
+use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
+use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
+use pendularm::actors::arm::sim::ArmSim;
+use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::gate::Gate;
+use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::gateway::registry::{Attach, Registry};
+use pendularm::actors::node::{Interest, Publish};
+use pendularm::actors::ros::rosapi::{ArmParameters, Rosapi};
+use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::{self, Direction, Service, Topic};
-use pendularm::protocol::fields::Fields;
 use pendularm::protocol::messages;
+use pendularm::protocol::op::fields::Fields;
 use serde_json::json;
 use tokio::io::{DuplexStream, duplex};
 
@@ -75,18 +76,13 @@ pub enum Manner {
 #[derive(Default)]
 struct Desk {
     manner: Cell<Option<Manner>>,
-    held: RefCell<VecDeque<Reply>>,
+    held: RefCell<VecDeque<Caller>>,
 }
 
 /// Little room for all clients together: what a few of them can fill in one execution.
 #[must_use]
-pub fn scarce() -> Totals {
-    Totals {
-        responses: Budget::of(1 << 20),
-        messages: Budget::of(1 << 17),
-        input: Budget::of(1 << 23),
-        names: Budget::of(1 << 12),
-    }
+pub fn scarce() -> Memory {
+    Memory::of(1 << 21)
 }
 
 /// The runtime's side.
@@ -99,32 +95,35 @@ pub struct Stage {
 
 impl Stage {
     /// A gateway whose one node answers at once.
-    pub async fn new(gate: Gate, totals: Totals) -> Self {
-        Self::raised(gate, totals, |_, _, _| {}).await
+    pub async fn new(gate: Gate, memory: Memory) -> Self {
+        Self::raised(gate, memory, |_, _, _| {}).await
     }
 
     /// A gateway with the runtime's own nodes. Computations, which have threads of their own, are left to the one node.
-    pub async fn with_arm(gate: Gate, totals: Totals) -> Self {
-        Self::raised(gate, totals, start_nodes).await
+    pub async fn with_arm(gate: Gate, memory: Memory) -> Self {
+        Self::raised(gate, memory, start_nodes).await
     }
 
     async fn raised(
         gate: Gate,
-        totals: Totals,
+        memory: Memory,
         start: impl FnOnce(&Addr<Registry>, &Arc<Gauges>, &mut Nodes),
     ) -> Self {
-        let gauges = Arc::new(Gauges::with(totals));
+        let gauges = Arc::new(Gauges::with(memory));
         let registry = Registry::new(Arc::clone(&gauges)).start();
         let desk = Rc::new(Desk::default());
         let node = Node(Rc::clone(&desk)).start();
         let mut nodes = Nodes::default();
         let rosapi = catalog::Rosapi::ALL.into_iter().map(Service::Rosapi);
         for service in Service::ALL.into_iter().chain(rosapi) {
-            nodes.services.insert(service, node.clone().recipient());
+            let node = node.clone();
+            let route = Box::new(move |call| node.do_send(Called(call)));
+            nodes.services.insert(service, route);
         }
         for topic in Topic::ALL {
             if topic.direction() == Direction::Subscribed {
-                nodes.listeners.insert(topic, node.clone().recipient());
+                let route = Box::new(|_| ());
+                nodes.listeners.insert(topic, route);
             } else {
                 nodes.publishers.insert(topic, node.clone().recipient());
             }
@@ -152,14 +151,7 @@ impl Stage {
     /// Whether nobody is connected, and nothing is held for anybody.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        let totals = self.gauges.totals();
-        let all = [
-            &totals.responses,
-            &totals.messages,
-            &totals.input,
-            &totals.names,
-        ];
-        self.gauges.connections() == 0 && all.into_iter().all(|total| total.used() == 0)
+        self.gauges.connections() == 0 && self.gauges.memory().held() == 0
     }
 
     /// How the node treats calls from now on.
@@ -169,9 +161,9 @@ impl Stage {
 
     /// The node answers the call that it has held for longest.
     pub fn release(&self) {
-        let reply = self.desk.held.borrow_mut().pop_front();
-        if let Some(mut reply) = reply {
-            reply.succeed(&json!({}));
+        let caller = self.desk.held.borrow_mut().pop_front();
+        if let Some(mut caller) = caller {
+            caller.succeed(&json!({}));
         }
     }
 
@@ -189,8 +181,7 @@ impl Stage {
         let frame = messages::publish(topic.name(), &msg);
         self.registry.do_send(Publish {
             topic,
-            frame,
-            msg: None,
+            frame: frame.into(),
         });
     }
 }
@@ -201,22 +192,18 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
         Arm::default(),
         Gains::default(),
         registry.clone().recipient(),
-        registry.clone().recipient(),
         Arc::clone(gauges),
     )
     .start();
     ArmSim::attach(&arm, nodes);
-    let introspection = Rosapi::new(
-        registry.clone().recipient(),
-        arm.clone().recipient(),
-        arm.clone().recipient(),
-        &joint_names::<2>(),
-    );
-    Rosapi::attach(&introspection.start(), nodes);
+    let parameters = ArmParameters::of(&arm);
+    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
+    Rosapi::attach(&rosapi, nodes);
     let ik = Ik::<2>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
     let tracker = GoalTracker {
         track: arm.clone().recipient(),
+        command: arm.clone().recipient(),
         end: arm.clone().recipient(),
     };
     let action = IkAction::<2>::new(ik.recipient(), tracker, registry.clone().recipient()).start();
@@ -239,36 +226,38 @@ impl Actor for Node {
     type Context = Context<Self>;
 }
 
-impl Handler<ServiceCall> for Node {
+/// A call, unread.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Called(ServiceCall);
+
+impl Handler<Called> for Node {
     type Result = ();
 
-    fn handle(&mut self, call: ServiceCall, ctx: &mut Context<Self>) {
+    fn handle(&mut self, Called(call): Called, ctx: &mut Context<Self>) {
         let ServiceCall {
             service,
             arguments,
-            mut reply,
+            mut caller,
         } = call;
         match self.0.manner.get().unwrap_or(Manner::Prompt) {
             Manner::Prompt => {
                 let status = Fields::read(&arguments, service)
                     .map_or_else(|why| why.to_string(), |_| String::new());
-                reply.conclude(&json!({}), &status);
+                match &*status {
+                    "" => caller.succeed(&json!({})),
+                    why => caller.refuse(why),
+                }
             }
-            Manner::Holding => self.0.held.borrow_mut().push_back(reply),
+            Manner::Holding => self.0.held.borrow_mut().push_back(caller),
             Manner::Late => {
                 ctx.run_later(Duration::from_millis(700), move |_, _| {
-                    reply.succeed(&json!({}))
+                    caller.succeed(&json!({}))
                 });
             }
-            Manner::Forgetful => drop(reply),
+            Manner::Forgetful => drop(caller),
         }
     }
-}
-
-impl Handler<TopicMessage> for Node {
-    type Result = ();
-
-    fn handle(&mut self, _: TopicMessage, _: &mut Context<Self>) {}
 }
 
 impl Handler<Interest> for Node {

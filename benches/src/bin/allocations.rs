@@ -6,14 +6,15 @@
 //! forbids.
 
 use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use actix::prelude::*;
 use bytes::Bytes;
-use pendularm::actors::connection::Connection;
-use pendularm::actors::gauges::Gauges;
-use pendularm::actors::registry::{Publish, Registry};
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::gateway::messages::Publish;
+use pendularm::actors::gateway::registry::Registry;
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
@@ -76,7 +77,9 @@ async fn per_message(subscribers: usize, messages: u32, size: usize) -> f64 {
     for _ in 0..subscribers {
         let (near, mut far) = tokio::io::duplex(1 << 20);
         Connection::start_on(near, registry.clone(), Arc::clone(&gauges));
-        far.write_all(b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n").await.expect("sent");
+        far.write_all(b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n")
+            .await
+            .expect("sent");
         let mut buffer = vec![0; 1 << 16];
         let _ = far.read(&mut buffer).await.expect("the status");
         clients.push((far, buffer));
@@ -87,7 +90,10 @@ async fn per_message(subscribers: usize, messages: u32, size: usize) -> f64 {
         if round == 100 {
             before = counted();
         }
-        let message = Publish { topic: Topic::JointStates, frame: frame.clone(), msg: None };
+        let message = Publish {
+            topic: Topic::JointStates,
+            frame: frame.clone().into(),
+        };
         registry.do_send(message);
         for (client, buffer) in &mut clients {
             let mut read = 0;
@@ -104,9 +110,14 @@ fn main() {
     steps::<3>();
     actix::System::new().block_on(async {
         for size in [200, 20_000] {
-            let (few, many) = (per_message(10, 1000, size).await, per_message(110, 1000, size).await);
+            let (few, many) = (
+                per_message(10, 1000, size).await,
+                per_message(110, 1000, size).await,
+            );
             let each = (many - few) / 100.0;
-            println!("{size} bytes: {each:.2} allocations for each further subscriber of a message");
+            println!(
+                "{size} bytes: {each:.2} allocations for each further subscriber of a message"
+            );
         }
     });
 }

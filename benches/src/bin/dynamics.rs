@@ -16,9 +16,9 @@
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
-use pendularm::math::integrator::{Method, increment};
+use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::Simulation;
+use pendularm::math::simulation::{Simulation, step_under};
 use pendularm::math::trig::sin_cos;
 use std::env;
 use std::hint::black_box;
@@ -147,18 +147,7 @@ fn steps<const N: usize>(
 ) -> State<N> {
     let timestep = black_box(1e-3);
     for _ in 0..CALLS {
-        let (dq, dv) = increment(
-            method,
-            |_, q, v| forward_dynamics(arm, q, v, effort),
-            0.0,
-            &state.position,
-            &state.velocity,
-            timestep,
-        );
-        for i in 0..N {
-            state.position[i] += dq[i];
-            state.velocity[i] += dv[i];
-        }
+        state = state.plus(&step_under(arm, method, &state, effort, timestep));
     }
     state
 }

@@ -22,14 +22,23 @@ fn processor(pid: u32) -> f64 {
 /// Resident memory of a process \[MB\].
 fn resident(pid: u32) -> f64 {
     let status = std::fs::read_to_string(format!("/proc/{pid}/status")).expect("status");
-    let line = status.lines().find(|line| line.starts_with("VmRSS:")).expect("VmRSS");
-    line.split_whitespace().nth(1).and_then(|kb| kb.parse::<f64>().ok()).expect("kB") / 1024.0
+    let line = status
+        .lines()
+        .find(|line| line.starts_with("VmRSS:"))
+        .expect("VmRSS");
+    line.split_whitespace()
+        .nth(1)
+        .and_then(|kb| kb.parse::<f64>().ok())
+        .expect("kB")
+        / 1024.0
 }
 
 /// Simulation time as `/clock` has it now \[s\], and when it came.
 fn simulation_time(address: &str) -> (f64, Instant) {
     let mut stream = TcpStream::connect(address).expect("accepts");
-    stream.write_all(b"{\"op\":\"subscribe\",\"topic\":\"/clock\"}\n").expect("sent");
+    stream
+        .write_all(b"{\"op\":\"subscribe\",\"topic\":\"/clock\"}\n")
+        .expect("sent");
     let mut lines = BufReader::new(stream).lines();
     let line = lines
         .find_map(|line| line.ok().filter(|line| line.contains("\"clock\":{")))
@@ -39,20 +48,27 @@ fn simulation_time(address: &str) -> (f64, Instant) {
         let end = rest.find(|c: char| !c.is_ascii_digit()).expect("end");
         rest[..end].parse::<f64>().expect("number")
     };
-    (number("\"sec\":") + 1e-9 * number("\"nanosec\":"), Instant::now())
+    (
+        number("\"sec\":") + 1e-9 * number("\"nanosec\":"),
+        Instant::now(),
+    )
 }
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
     let program = arguments.next().expect("the path of the pendularm binary");
-    let seconds: u64 = arguments.next().map_or(10, |seconds| seconds.parse().expect("a number"));
+    let seconds: u64 = arguments
+        .next()
+        .map_or(10, |seconds| seconds.parse().expect("a number"));
     let mut child = Command::new(program)
         .args(["--bind", "127.0.0.1:0"])
         .stdout(Stdio::piped())
         .spawn()
         .expect("the runtime starts");
     let mut line = String::new();
-    BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
+    BufReader::new(child.stdout.take().expect("piped"))
+        .read_line(&mut line)
+        .expect("a line");
     let address = line.trim().trim_start_matches("listening on ").to_owned();
     std::thread::sleep(Duration::from_secs(1));
 
@@ -68,7 +84,10 @@ fn main() {
     let _ = child.wait();
 
     let ratio = (sim_after - sim_before) / (wall_after - wall_before).as_secs_f64();
-    println!("idle, no client      {:.3} % of one core over {wall:.1} s", 100.0 * used / wall);
+    println!(
+        "idle, no client      {:.3} % of one core over {wall:.1} s",
+        100.0 * used / wall
+    );
     println!("resident             {memory:.1} MB");
     println!("sim time / wall time {ratio:.6}");
 }

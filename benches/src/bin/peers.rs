@@ -21,9 +21,9 @@ use std::time::{Duration, Instant};
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
-use pendularm::math::integrator::{Method, increment};
+use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::Simulation;
+use pendularm::math::simulation::{Simulation, step_under};
 
 // As in harness.h, which says what they mean.
 const CALLS: usize = 500;
@@ -113,18 +113,7 @@ fn step<const N: usize>(
     state: &mut State<N>,
     h: f64,
 ) {
-    let (dq, dv) = increment(
-        method,
-        |_, q, v| forward_dynamics(arm, q, v, effort),
-        0.0,
-        &state.position,
-        &state.velocity,
-        h,
-    );
-    for i in 0..N {
-        state.position[i] += dq[i];
-        state.velocity[i] += dv[i];
-    }
+    *state = state.plus(&step_under(arm, method, state, effort, h));
 }
 
 fn check<const N: usize>(path: &str) {

@@ -25,14 +25,23 @@ struct Server {
 
 impl Server {
     fn start(mut command: Command) -> Self {
-        let mut child = command.stdout(Stdio::piped()).spawn().expect("the server starts");
+        let mut child = command
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the server starts");
         let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("piped")).read_line(&mut line).expect("a line");
+        BufReader::new(child.stdout.take().expect("piped"))
+            .read_line(&mut line)
+            .expect("a line");
         let address = line.trim().trim_start_matches("listening on ").to_owned();
         let stream = TcpStream::connect(address).expect("the server accepts");
         stream.set_nodelay(true).expect("nodelay");
         let answers = BufReader::new(stream.try_clone().expect("clone"));
-        Self { child, stream, answers }
+        Self {
+            child,
+            stream,
+            answers,
+        }
     }
 
     fn exchange(&mut self, request: &[u8], answer: &mut Vec<u8>) -> Duration {
@@ -54,7 +63,9 @@ impl Drop for Server {
 /// The bare echo server, as tokio's own documentation would have it: the default runtime, a task per client.
 #[tokio::main]
 async fn echo() {
-    let listener = tokio::net::TcpListener::bind("127.0.0.1:0").await.expect("bound");
+    let listener = tokio::net::TcpListener::bind("127.0.0.1:0")
+        .await
+        .expect("bound");
     println!("listening on {}", listener.local_addr().expect("address"));
     loop {
         let (mut stream, _) = listener.accept().await.expect("accepted");
@@ -62,7 +73,9 @@ async fn echo() {
         tokio::spawn(async move {
             let mut buffer = vec![0; 4096];
             while let Ok(read @ 1..) = stream.read(&mut buffer).await {
-                let Some(bytes) = buffer.get(..read) else { break };
+                let Some(bytes) = buffer.get(..read) else {
+                    break;
+                };
                 if stream.write_all(bytes).await.is_err() {
                     break;
                 }
@@ -78,11 +91,15 @@ fn median(samples: &mut [Duration]) -> Duration {
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let program = arguments.next().expect("the path of the pendularm binary, or `echo`");
+    let program = arguments
+        .next()
+        .expect("the path of the pendularm binary, or `echo`");
     if program == "echo" {
         return echo();
     }
-    let count: usize = arguments.next().map_or(20_000, |count| count.parse().expect("a number"));
+    let count: usize = arguments
+        .next()
+        .map_or(20_000, |count| count.parse().expect("a number"));
     let mut arm = Command::new(program);
     arm.args(["--bind", "127.0.0.1:0"]);
     let mut bare = Command::new(std::env::current_exe().expect("own path"));
@@ -100,7 +117,16 @@ fn main() {
     }
     let (arm, bare) = (median(&mut of_arm), median(&mut of_bare));
     println!("samples                     {count} each, interleaved");
-    println!("call through registry, arm  median {arm:?}, p99 {:?}", of_arm[count * 99 / 100]);
-    println!("bare tokio echo             median {bare:?}, p99 {:?}", of_bare[count * 99 / 100]);
-    println!("ratio of medians            {:.2}", arm.as_secs_f64() / bare.as_secs_f64());
+    println!(
+        "call through registry, arm  median {arm:?}, p99 {:?}",
+        of_arm[count * 99 / 100]
+    );
+    println!(
+        "bare tokio echo             median {bare:?}, p99 {:?}",
+        of_bare[count * 99 / 100]
+    );
+    println!(
+        "ratio of medians            {:.2}",
+        arm.as_secs_f64() / bare.as_secs_f64()
+    );
 }

@@ -18,7 +18,11 @@ fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
     Gains<N>: Default,
 {
-    let gravity = if what.contains("weightless") { 0.0 } else { 9.81 };
+    let gravity = if what.contains("weightless") {
+        0.0
+    } else {
+        9.81
+    };
     let arm = Arm::<N>::new([1.0; N], [1.0; N], gravity).expect("an arm");
     let mut gains = Gains::<N>::default();
     if what.contains("pd") {
@@ -27,8 +31,14 @@ where
     let mut simulation = Simulation::new(arm, gains);
     simulation.set_method(method);
     // Angles stay small enough for one path through sine and cosine.
-    simulation.set_state(State { position: [0.4; N], velocity: [0.0; N] });
-    simulation.set_setpoint(Setpoint { position: [0.4; N], velocity: [0.0; N] });
+    simulation.set_state(State {
+        position: [0.4; N],
+        velocity: [0.0; N],
+    });
+    simulation.set_setpoint(Setpoint {
+        position: [0.4; N],
+        velocity: [0.0; N],
+    });
     simulation.enable(what.contains("pd") || what.contains("pid"));
     assert_eq!(simulation.advance(count), count);
     black_box(simulation.state());
@@ -36,7 +46,8 @@ where
 
 fn particle(method: Method, function: &str, count: u64) {
     let function = Expression::parse(function).expect("a function");
-    let mut particle = Particle::new(function, 0.5, -0.25, 1e-4, count, method).expect("a particle");
+    let mut particle =
+        Particle::new(function, 0.5, -0.25, 1e-4, count, method).expect("a particle");
     particle.advance(usize::MAX);
     black_box(particle.positions());
 }
@@ -52,7 +63,9 @@ fn main() {
         ["step", "2", method, what] => step::<2>(method.parse().expect("a method"), what, count),
         ["step", "3", method, what] => step::<3>(method.parse().expect("a method"), what, count),
         ["particle", method, "constant"] => particle(method.parse().expect("a method"), "1", count),
-        ["particle", method, "cosine"] => particle(method.parse().expect("a method"), "cos(2*t)", count),
+        ["particle", method, "cosine"] => {
+            particle(method.parse().expect("a method"), "cos(2*t)", count)
+        }
         _ => panic!("unknown variant {variant}"),
     }
 }

@@ -11,7 +11,7 @@ use mio::{Events, Interest, Poll, Token};
 
 use crate::message::{Template, now, stamp};
 use crate::process;
-use crate::wire::{Event, Protocol};
+use pendularm_benches::protocol::{Event, Protocol};
 
 /// How long a server may take for what is asked of it before the run fails.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -97,7 +97,11 @@ impl Fleet {
                 _ => format!("/load/topic{topic}"),
             })
             .collect();
-        let publishers = if scene.pace == Pace::Arm { 0 } else { scene.topics };
+        let publishers = if scene.pace == Pace::Arm {
+            0
+        } else {
+            scene.topics
+        };
         let subscribers = scene.topics * scene.subscribers;
         let mut fleet = Self {
             protocol,
@@ -140,7 +144,10 @@ impl Fleet {
         stream.set_nonblocking(true).expect("non-blocking");
         let mut stream = TcpStream::from_std(stream);
         let interest = Interest::READABLE | Interest::WRITABLE;
-        self.poll.registry().register(&mut stream, Token(number), interest).expect("epoll");
+        self.poll
+            .registry()
+            .register(&mut stream, Token(number), interest)
+            .expect("epoll");
         let topic = if number < self.subscribers {
             number / self.scene.subscribers
         } else {
@@ -164,7 +171,11 @@ impl Fleet {
     fn await_ready(&mut self, links: std::ops::Range<usize>) {
         let deadline = Instant::now() + PATIENCE;
         while self.links[links.clone()].iter().any(|link| !link.ready) {
-            assert!(Instant::now() < deadline, "{:?} leaves a client waiting", self.protocol);
+            assert!(
+                Instant::now() < deadline,
+                "{:?} leaves a client waiting",
+                self.protocol
+            );
             self.turn(Duration::from_millis(10));
         }
         for link in &mut self.links[links] {
@@ -232,7 +243,11 @@ impl Fleet {
     /// Sends bursts as long as every subscriber of the topic keeps up.
     fn flood(&mut self, topic: usize) {
         let group = topic * self.scene.subscribers..(topic + 1) * self.scene.subscribers;
-        let slowest = self.links[group].iter().map(|link| link.received).min().unwrap_or(0);
+        let slowest = self.links[group]
+            .iter()
+            .map(|link| link.received)
+            .min()
+            .unwrap_or(0);
         while self.sent[topic] + BURST <= slowest + WINDOW {
             self.send(topic, BURST);
         }
@@ -242,7 +257,8 @@ impl Fleet {
         let link = &mut self.links[self.subscribers + topic];
         for _ in 0..count {
             let payload = self.template.write(self.sent[topic]);
-            self.protocol.publish(&self.names[topic], payload, &mut link.unsent);
+            self.protocol
+                .publish(&self.names[topic], payload, &mut link.unsent);
             self.sent[topic] += 1;
         }
         link.flush();
@@ -253,16 +269,35 @@ impl Fleet {
         let deadline = Instant::now() + PATIENCE;
         if self.scene.pace == Pace::Arm {
             // A subscriber may be a message ahead of another: all have to reach the newest of now.
-            let newest = self.links.iter().filter_map(|link| link.stamps.last()).max().copied();
+            let newest = self
+                .links
+                .iter()
+                .filter_map(|link| link.stamps.last())
+                .max()
+                .copied();
             let newest = newest.expect("the arm publishes");
-            while self.links.iter().any(|link| link.stamps.last() < Some(&newest)) {
-                assert!(Instant::now() < deadline, "a subscriber never got the arm's message of {newest} ns");
+            while self
+                .links
+                .iter()
+                .any(|link| link.stamps.last() < Some(&newest))
+            {
+                assert!(
+                    Instant::now() < deadline,
+                    "a subscriber never got the arm's message of {newest} ns"
+                );
                 self.turn(Duration::from_millis(10));
             }
-            let oldest = self.links.iter().filter_map(|link| link.stamps.first()).max().copied();
+            let oldest = self
+                .links
+                .iter()
+                .filter_map(|link| link.stamps.first())
+                .max()
+                .copied();
             let common = oldest.expect("the arm publishes")..=newest;
-            let mut all =
-                self.links.iter().map(|link| link.stamps.iter().filter(|&stamp| common.contains(stamp)));
+            let mut all = self
+                .links
+                .iter()
+                .map(|link| link.stamps.iter().filter(|&stamp| common.contains(stamp)));
             let first: Vec<_> = all.next().expect("a subscriber").collect();
             assert!(
                 all.all(|stamps| stamps.eq(first.iter().copied())),
@@ -333,28 +368,40 @@ impl Fleet {
     /// Takes whole events off the front of `bytes`; gives how many bytes they had.
     fn take(&mut self, number: usize, bytes: &[u8]) -> usize {
         let mut taken = 0;
-        while let Some((event, length)) =
-            (taken < bytes.len()).then(|| self.protocol.next(&bytes[taken..])).flatten()
+        while let Some((event, length)) = (taken < bytes.len())
+            .then(|| self.protocol.next(&bytes[taken..]))
+            .flatten()
         {
             taken += length;
             let link = &mut self.links[number];
             match event {
                 Event::Message(payload) if self.scene.pace == Pace::Arm => {
                     let stamp = stamp(payload);
-                    assert!(link.stamps.last() < Some(&stamp), "the arm's messages came out of order");
+                    assert!(
+                        link.stamps.last() < Some(&stamp),
+                        "the arm's messages came out of order"
+                    );
                     link.stamps.push(stamp);
                     self.deliveries += 1;
                 }
                 Event::Message(payload) => {
                     let (sequence, sent) = self.template.read(payload).expect("a whole message");
-                    assert_eq!(sequence, link.received, "{:?}: the next message", self.protocol);
+                    assert_eq!(
+                        sequence, link.received,
+                        "{:?}: the next message",
+                        self.protocol
+                    );
                     link.received += 1;
                     self.deliveries += 1;
                     if self.measuring {
-                        self.latencies.push(u32::try_from(now() - sent).unwrap_or(u32::MAX));
+                        self.latencies
+                            .push(u32::try_from(now() - sent).unwrap_or(u32::MAX));
                     }
                 }
                 Event::Ready => link.ready = true,
+                Event::Complaint(what) => {
+                    panic!("{:?} says {}", self.protocol, String::from_utf8_lossy(what))
+                }
                 Event::Answer | Event::Other => {}
             }
         }

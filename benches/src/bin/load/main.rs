@@ -10,27 +10,66 @@ mod message;
 mod probe;
 mod process;
 mod report;
-mod wire;
 
 use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
 use fleet::{Fleet, Outcome, Pace, Scene};
-use wire::Protocol;
+use pendularm_benches::protocol::Protocol;
 
 /// How often the arm publishes, and so everybody here that does not flood.
 const RATE: Pace = Pace::Rate(60.0);
 
 /// What is played. The last of the fan-outs is that of the arm's own topic.
 const SCENES: [Scene; 8] = [
-    Scene { name: "60 Hz to 1", topics: 1, subscribers: 1, pace: RATE },
-    Scene { name: "60 Hz to 10", topics: 1, subscribers: 10, pace: RATE },
-    Scene { name: "60 Hz to 100", topics: 1, subscribers: 100, pace: RATE },
-    Scene { name: "60 Hz to 1000", topics: 1, subscribers: 1000, pace: RATE },
-    Scene { name: "the arm to 1000", topics: 1, subscribers: 1000, pace: Pace::Arm },
-    Scene { name: "flood 1 to 1", topics: 1, subscribers: 1, pace: Pace::Flood },
-    Scene { name: "flood 4 to 4", topics: 4, subscribers: 1, pace: Pace::Flood },
-    Scene { name: "flood 1 to 50", topics: 1, subscribers: 50, pace: Pace::Flood },
+    Scene {
+        name: "60 Hz to 1",
+        topics: 1,
+        subscribers: 1,
+        pace: RATE,
+    },
+    Scene {
+        name: "60 Hz to 10",
+        topics: 1,
+        subscribers: 10,
+        pace: RATE,
+    },
+    Scene {
+        name: "60 Hz to 100",
+        topics: 1,
+        subscribers: 100,
+        pace: RATE,
+    },
+    Scene {
+        name: "60 Hz to 1000",
+        topics: 1,
+        subscribers: 1000,
+        pace: RATE,
+    },
+    Scene {
+        name: "the arm to 1000",
+        topics: 1,
+        subscribers: 1000,
+        pace: Pace::Arm,
+    },
+    Scene {
+        name: "flood 1 to 1",
+        topics: 1,
+        subscribers: 1,
+        pace: Pace::Flood,
+    },
+    Scene {
+        name: "flood 4 to 4",
+        topics: 4,
+        subscribers: 1,
+        pace: Pace::Flood,
+    },
+    Scene {
+        name: "flood 1 to 50",
+        topics: 1,
+        subscribers: 50,
+        pace: Pace::Flood,
+    },
 ];
 
 /// How long, how often.
@@ -69,27 +108,48 @@ fn is_probed(scene: &Scene) -> bool {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if arguments.first().is_some_and(|first| first == "ports") {
-        return print_free_ports(arguments.get(1).and_then(|count| count.parse().ok()).unwrap_or(1));
+        return print_free_ports(
+            arguments
+                .get(1)
+                .and_then(|count| count.parse().ok())
+                .unwrap_or(1),
+        );
     }
     let quick = arguments.iter().any(|argument| argument == "--quick");
     let only = arguments
         .iter()
         .find_map(|argument| argument.strip_prefix("--only="))
         .map(|only| only.replace("_", " "));
-    let servers: Vec<Server> =
-        arguments.iter().filter(|argument| !argument.starts_with("--")).map(|text| server(text)).collect();
+    let servers: Vec<Server> = arguments
+        .iter()
+        .filter(|argument| !argument.starts_with("--"))
+        .map(|text| server(text))
+        .collect();
     let plan = if quick {
-        Plan { rounds: 1, seconds: 1.0, probed_seconds: 2.0, bars: false }
+        Plan {
+            rounds: 1,
+            seconds: 1.0,
+            probed_seconds: 2.0,
+            bars: false,
+        }
     } else {
-        Plan { rounds: 3, seconds: 3.0, probed_seconds: 8.0, bars: true }
+        Plan {
+            rounds: 3,
+            seconds: 3.0,
+            probed_seconds: 8.0,
+            bars: true,
+        }
     };
-    let at_rest: Vec<(Protocol, f64)> =
-        servers.iter().map(|server| (server.protocol, rest(server, plan.seconds))).collect();
+    let at_rest: Vec<(Protocol, f64)> = servers
+        .iter()
+        .map(|server| (server.protocol, rest(server, plan.seconds)))
+        .collect();
     report::print_rest(&at_rest);
     let mut verdicts = Vec::new();
-    for scene in
-        SCENES.iter().filter(|scene| only.as_ref().is_none_or(|only| scene.name.contains(only.as_str())))
-    {
+    for scene in SCENES.iter().filter(|scene| {
+        only.as_ref()
+            .is_none_or(|only| scene.name.contains(only.as_str()))
+    }) {
         let played = play(scene, &servers, &plan);
         report::print_scene(scene, &played, &at_rest);
         verdicts.push((*scene, played));
@@ -102,8 +162,9 @@ fn main() {
 }
 
 fn print_free_ports(count: usize) {
-    let sockets: Vec<_> =
-        (0..count).map(|_| TcpListener::bind("127.0.0.1:0").expect("a free port")).collect();
+    let sockets: Vec<_> = (0..count)
+        .map(|_| TcpListener::bind("127.0.0.1:0").expect("a free port"))
+        .collect();
     for socket in &sockets {
         println!("{}", socket.local_addr().expect("bound").port());
     }
@@ -111,9 +172,14 @@ fn print_free_ports(count: usize) {
 
 fn server(text: &str) -> Server {
     let parts: Vec<&str> = text.split('=').collect();
-    let [name, address, pid] = parts[..] else { panic!("{text} is not SERVER=ADDRESS=PID") };
+    let [name, address, pid] = parts[..] else {
+        panic!("{text} is not SERVER=ADDRESS=PID")
+    };
     Server {
-        protocol: *Protocol::ALL.iter().find(|one| one.name() == name).expect("a server that we know"),
+        protocol: *Protocol::ALL
+            .iter()
+            .find(|one| one.name() == name)
+            .expect("a server that we know"),
         address: address.parse().expect("an address"),
         pid: pid.parse().expect("a process id"),
     }
@@ -128,15 +194,22 @@ fn rest(server: &Server, seconds: f64) -> f64 {
 
 /// Plays a scene to each server in turn, as many rounds as planned; then once more with probes beside it.
 fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played)> {
-    let takes_part = |server: &&Server| scene.pace != Pace::Arm || server.protocol == Protocol::Pendularm;
+    let takes_part =
+        |server: &&Server| scene.pace != Pace::Arm || server.protocol == Protocol::Pendularm;
     let servers: Vec<&Server> = servers.iter().filter(takes_part).collect();
-    let mut played: Vec<(Protocol, Played)> =
-        servers.iter().map(|server| (server.protocol, Played::default())).collect();
+    let mut played: Vec<(Protocol, Played)> = servers
+        .iter()
+        .map(|server| (server.protocol, Played::default()))
+        .collect();
     for round in 0..plan.rounds {
         // Another one begins each round.
         for turn in 0..servers.len() {
             let index = (round + turn) % servers.len();
-            let Server { protocol, address, pid } = *servers[index];
+            let Server {
+                protocol,
+                address,
+                pid,
+            } = *servers[index];
             let outcome = Fleet::open(protocol, address, *scene).run(pid, plan.seconds);
             played[index].1.outcomes.push(outcome);
         }
@@ -150,7 +223,11 @@ fn play(scene: &Scene, servers: &[Server], plan: &Plan) -> Vec<(Protocol, Played
 }
 
 fn probe(scene: &Scene, server: &Server, seconds: f64, played: &mut Played) {
-    let Server { protocol, address, pid } = *server;
+    let Server {
+        protocol,
+        address,
+        pid,
+    } = *server;
     let fleet = Fleet::open(protocol, address, *scene);
     let caller = probe::caller(protocol, address);
     let clock = (protocol == Protocol::Pendularm).then(|| probe::clock(address));

@@ -33,7 +33,11 @@ impl Template {
         );
         let behind = |mark: &str| text.find(mark).expect("the mark") + mark.len();
         let (number, time) = (behind(NUMBER_MARK), behind(TIME_MARK));
-        Self { text: text.into_bytes(), number, time }
+        Self {
+            text: text.into_bytes(),
+            number,
+            time,
+        }
     }
 
     /// The message of that number, sent now.
@@ -46,7 +50,12 @@ impl Template {
     /// The number in a message, and when it was sent; `None` if it is not a whole message of ours.
     pub fn read(&self, payload: &[u8]) -> Option<(u64, u64)> {
         let whole = payload.len() == self.text.len();
-        whole.then(|| (read(&payload[self.number..][..DIGITS]), read(&payload[self.time..][..DIGITS])))
+        whole.then(|| {
+            (
+                read(&payload[self.number..][..DIGITS]),
+                read(&payload[self.time..][..DIGITS]),
+            )
+        })
     }
 
     pub fn length(&self) -> usize {
@@ -62,13 +71,19 @@ fn write(digits: &mut [u8], mut value: u64) {
 }
 
 fn read(digits: &[u8]) -> u64 {
-    digits.iter().fold(0, |value, digit| 10 * value + u64::from(digit - b'0'))
+    digits
+        .iter()
+        .fold(0, |value, digit| 10 * value + u64::from(digit - b'0'))
 }
 
 /// The stamp of a message that the arm has published \[ns\].
 pub fn stamp(payload: &[u8]) -> u64 {
     let number = |key: &[u8]| {
-        let at = payload.windows(key.len()).position(|part| part == key).expect("a stamp") + key.len();
+        let at = payload
+            .windows(key.len())
+            .position(|part| part == key)
+            .expect("a stamp")
+            + key.len();
         payload[at..]
             .iter()
             .take_while(|byte| byte.is_ascii_digit())

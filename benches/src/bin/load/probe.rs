@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use crate::message::{now, stamp};
-use crate::wire::{Event, Protocol};
+use pendularm_benches::protocol::{Event, Protocol};
 
 /// Between two requests.
 const PERIOD: Duration = Duration::from_millis(20);
@@ -27,7 +27,10 @@ impl<T: Send + 'static> Probe<T> {
     fn start(work: impl FnOnce(&AtomicBool) -> T + Send + 'static) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let flag = Arc::clone(&stop);
-        Self { stop, thread: std::thread::spawn(move || work(&flag)) }
+        Self {
+            stop,
+            thread: std::thread::spawn(move || work(&flag)),
+        }
     }
 
     pub fn stop(self) -> T {
@@ -47,7 +50,9 @@ pub fn caller(protocol: Protocol, address: SocketAddr) -> Probe<Vec<u32>> {
             std::thread::sleep(PERIOD);
             let sent = Instant::now();
             client.stream.write_all(&request).expect("sent");
-            let answered = client.listen(PATIENCE, |event| matches!(event, Event::Answer).then_some(()));
+            let answered = client.listen(PATIENCE, |event| {
+                matches!(event, Event::Answer).then_some(())
+            });
             assert!(answered.is_some(), "{protocol:?} does not answer");
             times.push(u32::try_from(sent.elapsed().as_nanos()).unwrap_or(u32::MAX));
         }
@@ -76,7 +81,10 @@ pub fn clock(address: SocketAddr) -> Probe<f64> {
             let by_delay = |a: &&(f64, f64), b: &&(f64, f64)| (a.1 - a.0).total_cmp(&(b.1 - b.0));
             *part.iter().min_by(by_delay).expect("heard")
         };
-        let (first, last) = (earliest(&heard[..second]), earliest(&heard[heard.len() - second..]));
+        let (first, last) = (
+            earliest(&heard[..second]),
+            earliest(&heard[heard.len() - second..]),
+        );
         (last.0 - first.0) / (last.1 - first.1)
     })
 }
@@ -92,12 +100,18 @@ impl Client {
     fn connect(protocol: Protocol, address: SocketAddr) -> Self {
         let stream = TcpStream::connect(address).expect("the server accepts");
         stream.set_nodelay(true).expect("nodelay");
-        let mut client = Self { protocol, stream, unread: Vec::new() };
+        let mut client = Self {
+            protocol,
+            stream,
+            unread: Vec::new(),
+        };
         let mut greeting = Vec::new();
         protocol.greet(99_999, &mut greeting);
         client.stream.write_all(&greeting).expect("sent");
         if protocol.greets_back() {
-            let greeted = client.listen(PATIENCE, |event| matches!(event, Event::Ready).then_some(()));
+            let greeted = client.listen(PATIENCE, |event| {
+                matches!(event, Event::Ready).then_some(())
+            });
             assert!(greeted.is_some(), "{protocol:?} does not greet");
         }
         client
@@ -105,10 +119,13 @@ impl Client {
 
     /// Reads until something comes that `wanted` takes; `None` if it does not come in time.
     fn listen<T>(&mut self, patience: Duration, wanted: impl Fn(Event) -> Option<T>) -> Option<T> {
-        self.stream.set_read_timeout(Some(patience)).expect("a timeout");
+        self.stream
+            .set_read_timeout(Some(patience))
+            .expect("a timeout");
         loop {
-            while let Some((event, length)) =
-                (!self.unread.is_empty()).then(|| self.protocol.next(&self.unread)).flatten()
+            while let Some((event, length)) = (!self.unread.is_empty())
+                .then(|| self.protocol.next(&self.unread))
+                .flatten()
             {
                 let found = wanted(event);
                 self.unread.drain(..length);
@@ -120,7 +137,9 @@ impl Client {
             match self.stream.read(&mut chunk) {
                 Ok(0) => panic!("{:?} has closed a probe's connection", self.protocol),
                 Ok(read) => self.unread.extend_from_slice(&chunk[..read]),
-                Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {
+                Err(error)
+                    if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) =>
+                {
                     return None;
                 }
                 Err(error) => panic!("{:?}: {error}", self.protocol),

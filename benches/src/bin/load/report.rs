@@ -5,7 +5,7 @@
 use crate::Played;
 use crate::fleet::{Pace, Scene};
 use crate::message::Template;
-use crate::wire::Protocol;
+use pendularm_benches::protocol::Protocol;
 
 /// Of the processor time of the better peer, for a delivery.
 const MOST_OF_PEER: f64 = 1.0;
@@ -18,29 +18,60 @@ const MOST_DELAY: f64 = 5.0;
 pub type Rest = [(Protocol, f64)];
 
 pub fn print_rest(rest: &Rest) {
-    println!("a message: {} bytes of JSON, made by the same client for all", Template::new().length());
-    let part = |(protocol, used): &(Protocol, f64)| format!("{} {:.2} %", protocol.name(), used / 1e7);
-    println!("of one core without clients: {}", rest.iter().map(part).collect::<Vec<_>>().join(", "));
+    println!(
+        "a message: {} bytes of JSON, made by the same client for all",
+        Template::new().length()
+    );
+    let part =
+        |(protocol, used): &(Protocol, f64)| format!("{} {:.2} %", protocol.name(), used / 1e7);
+    println!(
+        "of one core without clients: {}",
+        rest.iter().map(part).collect::<Vec<_>>().join(", ")
+    );
 }
 
 pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
     println!("\n=== {}", scene.name);
     println!(
         "{:<10} {:>12} {:>22} {:>9} {:>9} {:>9} {:>9} {:>8}",
-        "", "deliveries/s", "CPU/delivery, us", "less rest", "p50, ms", "p99, ms", "p99.9, ms", "RSS, MB"
+        "",
+        "deliveries/s",
+        "CPU/delivery, us",
+        "less rest",
+        "p50, ms",
+        "p99, ms",
+        "p99.9, ms",
+        "RSS, MB"
     );
     for (protocol, played) in played {
         let costs = costs(played);
-        let mut latencies: Vec<u32> =
-            played.outcomes.iter().flat_map(|one| &one.latencies).copied().collect();
+        let mut latencies: Vec<u32> = played
+            .outcomes
+            .iter()
+            .flat_map(|one| &one.latencies)
+            .copied()
+            .collect();
         latencies.sort_unstable();
-        let part = |part: f64| quantile(&latencies, part).map_or("-".to_owned(), |time| format!("{time:.3}"));
-        let rate = median(played.outcomes.iter().map(|one| one.deliveries as f64 / one.seconds).collect());
+        let part = |part: f64| {
+            quantile(&latencies, part).map_or("-".to_owned(), |time| format!("{time:.3}"))
+        };
+        let rate = median(
+            played
+                .outcomes
+                .iter()
+                .map(|one| one.deliveries as f64 / one.seconds)
+                .collect(),
+        );
         let resident = played.outcomes.last().map_or(0.0, |one| one.resident);
         println!(
             "{:<10} {rate:>12.0} {:>22} {:>9.2} {:>9} {:>9} {:>9} {resident:>8.1}",
             protocol.name(),
-            format!("{:.2} ({:.2} to {:.2})", median(costs.clone()), least(&costs), most(&costs)),
+            format!(
+                "{:.2} ({:.2} to {:.2})",
+                median(costs.clone()),
+                least(&costs),
+                most(&costs)
+            ),
             net(*protocol, played, rest),
             part(0.5),
             part(0.99),
@@ -51,8 +82,9 @@ pub fn print_scene(scene: &Scene, played: &[(Protocol, Played)], rest: &Rest) {
         let mut calls = played.calls.clone();
         calls.sort_unstable();
         let [p50, p99] = [0.5, 0.99].map(|part| quantile(&calls, part).unwrap_or_default());
-        let clock =
-            played.clock.map_or(String::new(), |clock| format!("; simulation / wall time {clock:.5}"));
+        let clock = played.clock.map_or(String::new(), |clock| {
+            format!("; simulation / wall time {clock:.5}")
+        });
         println!(
             "{:<10} a light request beside it: p50 {p50:.2} ms, p99 {p99:.2} ms{clock}",
             protocol.name()
@@ -64,28 +96,58 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
     println!("\n=== summary");
     // The arm's own topic has no peers: it stands beside the same fan-out between clients.
     let peers_of = |scene: &Scene| {
-        let name = if scene.pace == Pace::Arm { "60 Hz to 1000" } else { scene.name };
-        scenes.iter().find(|(other, _)| other.name == name).map(|(_, played)| played)
+        let name = if scene.pace == Pace::Arm {
+            "60 Hz to 1000"
+        } else {
+            scene.name
+        };
+        scenes
+            .iter()
+            .find(|(other, _)| other.name == name)
+            .map(|(_, played)| played)
     };
     for (scene, played) in scenes {
-        let Some((_, ours)) = played.iter().find(|(protocol, _)| *protocol == Protocol::Pendularm) else {
+        let Some((_, ours)) = played
+            .iter()
+            .find(|(protocol, _)| *protocol == Protocol::Pendularm)
+        else {
             continue;
         };
-        let peers =
-            peers_of(scene).into_iter().flatten().filter(|(protocol, _)| *protocol != Protocol::Pendularm);
+        let peers = peers_of(scene)
+            .into_iter()
+            .flatten()
+            .filter(|(protocol, _)| *protocol != Protocol::Pendularm);
         let peers: Vec<_> = peers.collect();
         if !peers.is_empty() {
-            let best = peers.iter().map(|(_, peer)| median(costs(peer))).fold(f64::INFINITY, f64::min);
-            let best_net =
-                peers.iter().map(|(peer, played)| net(*peer, played, rest)).fold(f64::INFINITY, f64::min);
+            let best = peers
+                .iter()
+                .map(|(_, peer)| median(costs(peer)))
+                .fold(f64::INFINITY, f64::min);
+            let best_net = peers
+                .iter()
+                .map(|(peer, played)| net(*peer, played, rest))
+                .fold(f64::INFINITY, f64::min);
             let ratio = median(costs(ours)) / best;
             let net = net(Protocol::Pendularm, ours, rest) / best_net;
-            let what = format!("{}: CPU per delivery / better peer (less rest {net:.2})", scene.name);
-            verdict(&what, format!("{ratio:.2}"), "at most 1.00", ratio < MOST_OF_PEER + 0.005);
+            let what = format!(
+                "{}: CPU per delivery / better peer (less rest {net:.2})",
+                scene.name
+            );
+            verdict(
+                &what,
+                format!("{ratio:.2}"),
+                "at most 1.00",
+                ratio < MOST_OF_PEER + 0.005,
+            );
         }
         if let Some(clock) = ours.clock {
             let what = format!("{}: simulation time / wall time", scene.name);
-            verdict(&what, format!("{clock:.5}"), "within 0.001 of 1", (clock - 1.0).abs() <= MOST_DRIFT);
+            verdict(
+                &what,
+                format!("{clock:.5}"),
+                "within 0.001 of 1",
+                (clock - 1.0).abs() <= MOST_DRIFT,
+            );
         }
         if !ours.calls.is_empty() {
             let mut calls = ours.calls.clone();
@@ -102,20 +164,32 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
 }
 
 fn verdict(what: &str, figure: String, bar: &str, held: bool) {
-    println!("{what:<72} {figure:>9}   {bar:<18} {}", if held { "held" } else { "MISSED" });
+    println!(
+        "{what:<72} {figure:>9}   {bar:<18} {}",
+        if held { "held" } else { "MISSED" }
+    );
 }
 
 /// Processor time of a delivery, round by round \[us\].
 fn costs(played: &Played) -> Vec<f64> {
-    played.outcomes.iter().map(|one| one.processor as f64 / one.deliveries.max(1) as f64 / 1e3).collect()
+    played
+        .outcomes
+        .iter()
+        .map(|one| one.processor as f64 / one.deliveries.max(1) as f64 / 1e3)
+        .collect()
 }
 
 /// The same as a median, without what the server takes in any case.
 fn net(protocol: Protocol, played: &Played, rest: &Rest) -> f64 {
-    let rest = rest.iter().find(|(one, _)| *one == protocol).map_or(0.0, |(_, rest)| *rest);
+    let rest = rest
+        .iter()
+        .find(|(one, _)| *one == protocol)
+        .map_or(0.0, |(_, rest)| *rest);
     median(
         (played.outcomes.iter())
-            .map(|one| (one.processor as f64 - rest * one.seconds) / one.deliveries.max(1) as f64 / 1e3)
+            .map(|one| {
+                (one.processor as f64 - rest * one.seconds) / one.deliveries.max(1) as f64 / 1e3
+            })
             .collect(),
     )
 }
@@ -136,5 +210,7 @@ fn most(values: &[f64]) -> f64 {
 /// A quantile of sorted times \[ms\].
 fn quantile(sorted: &[u32], part: f64) -> Option<f64> {
     let index = (sorted.len() as f64 * part) as usize;
-    sorted.get(index.min(sorted.len().saturating_sub(1))).map(|&time| f64::from(time) / 1e6)
+    sorted
+        .get(index.min(sorted.len().saturating_sub(1)))
+        .map(|&time| f64::from(time) / 1e6)
 }

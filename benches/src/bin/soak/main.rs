@@ -1,6 +1,6 @@
 //! Mixed clients coming and going for minutes, most of them badly behaved, and what the program makes of it.
 //!
-//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ALLOCATOR` (`default` leaves it alone) in the environment. Clients come in tides: a flood of them for up
+//! `soak PATH/TO/pendularm`, with `MINUTES` (1), `SEED` and `ONLY` (kinds of clients and names of attacks, between commas; all) in the environment. Clients come in tides: a flood of them for up
 //! to 40 s, then all leave, and what the program still holds is measured while only the operator and the healthy
 //! clients are there. Exit status 1 if anything that must hold did not.
 //!
@@ -12,14 +12,12 @@ mod conversation;
 mod judge;
 mod ledger;
 mod operator;
-mod program;
 mod questions;
 mod recent;
 mod report;
 mod statistics;
 mod tides;
 mod watch;
-mod websocket;
 mod wire;
 mod world;
 
@@ -52,21 +50,8 @@ fn main() -> ExitCode {
         eprintln!("soak: MINUTES is at most a day, got {minutes}");
         return ExitCode::from(2);
     }
-    let give_back = std::env::var("ALLOCATOR").as_deref() != Ok("default");
-    println!(
-        "soak: {minutes} minutes, SEED={seed}, allocator {}",
-        if give_back {
-            "told to keep no freed memory"
-        } else {
-            "as it is"
-        }
-    );
-    match tides::soak(
-        &path,
-        Duration::from_secs_f64(60.0 * minutes),
-        seed,
-        give_back,
-    ) {
+    println!("soak: {minutes} minutes, SEED={seed}");
+    match tides::soak(&path, Duration::from_secs_f64(60.0 * minutes), seed) {
         Ok(outcome) => {
             if report::print(&outcome) {
                 ExitCode::SUCCESS

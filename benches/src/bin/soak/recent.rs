@@ -15,15 +15,11 @@ pub struct Recent(VecDeque<String>);
 impl Recent {
     /// Keeps a frame, instead of the oldest.
     pub fn keep(&mut self, frame: &str) {
-        self.keep_bytes(frame.as_bytes());
-    }
-
-    /// The same for one that may be anything.
-    pub fn keep_bytes(&mut self, frame: &[u8]) {
         if self.0.len() >= FRAMES {
             self.0.pop_front();
         }
-        let mut shown = String::from_utf8_lossy(&frame[..frame.len().min(LENGTH)]).into_owned();
+        let start = &frame.as_bytes()[..frame.len().min(LENGTH)];
+        let mut shown = String::from_utf8_lossy(start).into_owned();
         if frame.len() > LENGTH {
             shown += &format!("... ({} bytes)", frame.len());
         }

@@ -5,9 +5,9 @@
 use std::time::Instant;
 
 use crate::judge::{self, Gap, LATE, RATE};
-use crate::program::Vitals;
 use crate::statistics::line;
 use crate::tides::Outcome;
+use pendularm_benches::program::Vitals;
 
 /// Memory at the ebbs may rise by so much per hour at most \[kB\], beyond two standard errors of the rise: 30 bytes
 /// for each of the 140,000 clients of such an hour. A leak of one small thing per client is more.
@@ -27,6 +27,10 @@ pub fn print(outcome: &Outcome) -> bool {
     println!(
         "  {:>10}  topic messages dropped by full outboxes",
         diagnosis.dropped
+    );
+    println!(
+        "  {:>10}  clients disconnected because they held the most",
+        diagnosis.cut_off
     );
     println!("  {:>10}  lines of log", outcome.log.count);
     println!("\ncheck");
@@ -123,13 +127,6 @@ fn memory(outcome: &Outcome) -> bool {
         note("slope at the ebbs after the first third, kB/min", &slope);
         60.0 * (line.slope - 2.0 * line.error)
     });
-    if !outcome.give_back {
-        note(
-            "growth, which the allocator's own keeping hides",
-            "not judged",
-        );
-        return true;
-    }
     let what = "growth from the first ebb to the end, kB";
     let mut held = verdict(what, growth, "at most 8192", growth <= GROWTH);
     match rise.filter(|_| later.len() >= ENOUGH) {

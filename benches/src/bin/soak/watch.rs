@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::program::{Program, queued};
 use crate::world::PATIENCE;
+use pendularm_benches::program::{Program, queued};
 
 /// The period of `/joint_states`.
 pub const PERIOD: Duration = Duration::from_nanos(16_666_667);

@@ -1,12 +1,16 @@
 //! One client on the wire, over raw TCP or WebSocket, that reads while it writes and checks every response it gets.
 //!
+//! It reads and writes frames as `pendularm-client` does. The socket is its own: it is deaf, sips, resets, and takes in
+//! what comes while it sends, which a client that waits for one thing at a time cannot.
+//!
 //! **Invariant:** no response passes unchecked: whoever asks for the next frame is told of it only after the ledger.
 
 use std::io::ErrorKind;
 use std::rc::Rc;
 use std::time::{Duration, Instant};
 
-use bytes::{Buf, BytesMut};
+use pendularm_client::codec::{Codec, Event, Framing};
+use pendularm_client::websocket::{LAST, append, handshake, opcode};
 use serde_json::{Value, json};
 use tokio::io::{AsyncWriteExt, Interest};
 use tokio::net::{TcpSocket, TcpStream};
@@ -14,8 +18,10 @@ use tokio::time::timeout_at;
 
 use crate::ledger::{Check, Ledger};
 use crate::recent::Recent;
-use crate::websocket;
 use crate::world::{Fault, PATIENCE, World};
+
+/// Bytes that are read at a time.
+const CHUNK: usize = 16 * 1024;
 
 /// Which door the client came through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,17 +67,24 @@ pub struct Client {
     pub ledger: Ledger,
     stream: TcpStream,
     door: Door,
-    /// Bytes that came and are not yet read as frames; of them, how many hold no newline.
-    inbox: BytesMut,
-    scanned: usize,
-    /// A WebSocket message of which some frames came.
-    begun: Option<(u8, BytesMut)>,
+    codec: Codec,
+    chunk: Vec<u8>,
     /// What is to be sent with the next [`Client::flush`].
     out: Vec<u8>,
     ended: bool,
     sent: Recent,
     came: Recent,
+    /// The most bytes that it can make the program hold: what it has sent and asked so far, as often as that is kept.
+    may_hold: usize,
 }
+
+/// What a client is told that held the most when all together held too much.
+const HELD_MOST: &str = "memory: this connection held the most";
+/// A client that holds no more never gives way, whatever the others hold.
+const MODEST: usize = 256 * 1024;
+/// How often the bytes of a frame may be there at once: as they came, in a buffer that may be twice as long, as text, and as what was
+/// read of it.
+const COPIES: usize = 5;
 
 impl Client {
     /// Connects. Over WebSocket it asks for every status, as there are over TCP.
@@ -107,13 +120,16 @@ impl Client {
             ledger: Ledger::default(),
             stream,
             door,
-            inbox: BytesMut::new(),
-            scanned: 0,
-            begun: None,
+            codec: Codec::new(match door {
+                Door::Tcp => Framing::Lines,
+                Door::Web => Framing::WebSocket,
+            }),
+            chunk: vec![0; CHUNK],
             out: Vec::new(),
             ended: false,
             sent: Recent::default(),
             came: Recent::default(),
+            may_hold: 0,
         };
         if door == Door::Web {
             client.shake_hands().await?;
@@ -122,19 +138,19 @@ impl Client {
     }
 
     async fn shake_hands(&mut self) -> Result<(), Fault> {
-        let hello = websocket::handshake(&self.world.address.to_string());
+        let hello = handshake(&self.world.address.to_string(), "/", "");
         self.send_bytes(hello.as_bytes()).await?;
         let deadline = Instant::now() + PATIENCE;
-        let right = loop {
-            if let Some(right) = websocket::take_answer(&mut self.inbox) {
-                break right;
+        loop {
+            // Nothing comes before the client has asked for it.
+            let next = self.codec.next_event();
+            next.map_err(|why| self.fault(why.to_string()))?;
+            if self.codec.is_open() {
+                break;
             }
             if self.ended || !self.wait_readable(deadline).await? {
                 return Err(self.fault("the handshake is not answered"));
             }
-        };
-        if !right {
-            return Err(self.fault("the handshake is answered wrongly"));
         }
         self.world.count("connections over WebSocket", 1);
         self.push(&json!({"op": "set_level", "level": "info"}));
@@ -153,6 +169,28 @@ impl Client {
             what: what.into(),
             sent: self.sent.frames(),
             came: self.came.frames(),
+            gave_way: false,
+        }
+    }
+
+    /// It asks for an answer of so many bytes.
+    pub fn expect_bytes(&mut self, bytes: usize) {
+        self.may_hold += bytes;
+    }
+
+    /// It is told that it held the most: rightly, if it can have held what it is told, and that is more than is modest.
+    fn gives_way(&self, why: &str) -> Fault {
+        let told = why
+            .rsplit_once('(')
+            .and_then(|(_, rest)| rest.split(' ').next()?.parse::<usize>().ok());
+        let can = self.may_hold.div_ceil(1_000_000);
+        let gave_way = self.may_hold > MODEST && told.is_some_and(|told| told <= can);
+        let may_hold = self.may_hold;
+        Fault {
+            gave_way,
+            ..self.fault(format!(
+                "cut off, though it can hold {may_hold} bytes at most: {why}"
+            ))
         }
     }
 
@@ -164,18 +202,9 @@ impl Client {
     /// The same for a frame as text.
     pub fn push_text(&mut self, frame: &str) {
         self.sent.keep(frame);
+        self.may_hold += COPIES * frame.len();
         self.world.count("frames sent", 1);
-        match self.door {
-            Door::Tcp => {
-                self.out.extend(frame.as_bytes());
-                self.out.push(b'\n');
-            }
-            Door::Web => {
-                // Any mask will do, as long as it is not always the same.
-                let mask = 0x5bd1_e995_u32.wrapping_mul(self.out.len() as u32 | 1);
-                websocket::push_frame(&mut self.out, websocket::TEXT, true, frame.as_bytes(), mask);
-            }
-        }
+        self.codec.write(frame, &mut self.out);
     }
 
     /// Takes what would go out next.
@@ -260,9 +289,12 @@ impl Client {
     }
 
     fn take_in(&mut self) {
-        match self.stream.try_read_buf(&mut self.inbox) {
+        match self.stream.try_read(&mut self.chunk) {
             Ok(0) => self.ended = true,
-            Ok(read) => self.world.count("bytes received", read as u64),
+            Ok(read) => {
+                self.codec.push(&self.chunk[..read]);
+                self.world.count("bytes received", read as u64);
+            }
             Err(error) if error.kind() == ErrorKind::WouldBlock => {}
             Err(_) => self.ended = true,
         }
@@ -291,7 +323,7 @@ impl Client {
             Ok(read) => {
                 buffer.truncate(read);
                 self.world.count("bytes received", read as u64);
-                self.inbox.extend_from_slice(&buffer);
+                self.codec.push(&buffer);
                 read
             }
             Err(error) => {
@@ -324,77 +356,39 @@ impl Client {
 
     /// A frame of what has come already.
     async fn take_frame(&mut self) -> Result<Option<Came>, Fault> {
-        let text = match self.door {
-            Door::Tcp => self.take_line(),
-            Door::Web => match self.take_message().await? {
-                Some((websocket::BINARY, _)) => return Ok(Some(Came::Binary)),
-                message => message.map(|(_, text)| text),
-            },
+        let text = loop {
+            let next = self.codec.next_event();
+            match next.map_err(|why| self.fault(why.to_string()))? {
+                None => return Ok(None),
+                Some(Event::Text(text)) => break text,
+                Some(Event::Binary(_)) => return Ok(Some(Came::Binary)),
+                Some(Event::Ping(payload)) => {
+                    let mut pong = Vec::new();
+                    append(&mut pong, LAST | opcode::PONG, [0, 0, 0, 7], &payload);
+                    self.send_bytes(&pong).await?;
+                    self.world.count("pings answered", 1);
+                }
+                Some(Event::Pong(_)) => {}
+                Some(Event::Close(..)) => self.ended = true,
+            }
         };
-        let Some(text) = text else { return Ok(None) };
-        self.came.keep_bytes(&text);
+        self.came.keep(&text);
         self.world.count("frames received", 1);
-        let frame: Value = serde_json::from_slice(&text).map_err(|error| {
+        let frame: Value = serde_json::from_str(&text).map_err(|error| {
             self.fault(format!("{} bytes that are no JSON: {error}", text.len()))
         })?;
+        if let Some(why) = frame["msg"]
+            .as_str()
+            .filter(|why| why.starts_with(HELD_MOST))
+        {
+            return Err(self.gives_way(why));
+        }
         if frame["op"] != "service_response" {
             return Ok(Some(Came::Other(frame)));
         }
         self.ledger.settle(&frame).map_err(|why| self.fault(why))?;
         self.world.count("calls answered and checked", 1);
         Ok(Some(Came::Answer(frame)))
-    }
-
-    /// A text or binary message of what has come already; pings are answered on the way.
-    async fn take_message(&mut self) -> Result<Option<(u8, BytesMut)>, Fault> {
-        while let Some(frame) =
-            websocket::take_frame(&mut self.inbox).map_err(|why| self.fault(why))?
-        {
-            match frame.kind {
-                websocket::TEXT | websocket::BINARY if self.begun.is_none() => {
-                    self.begun = Some((frame.kind, frame.content));
-                }
-                websocket::MORE if self.begun.is_some() => {
-                    if let Some((_, content)) = &mut self.begun {
-                        content.unsplit(frame.content);
-                    }
-                }
-                websocket::PING => {
-                    let mut pong = Vec::new();
-                    websocket::push_frame(&mut pong, websocket::PONG, true, &frame.content, 7);
-                    self.send_bytes(&pong).await?;
-                    self.world.count("pings answered", 1);
-                    continue;
-                }
-                websocket::CLOSE => {
-                    self.ended = true;
-                    continue;
-                }
-                websocket::PONG => continue,
-                kind => return Err(self.fault(format!("a WebSocket frame of kind {kind}"))),
-            }
-            if frame.last {
-                return Ok(self.begun.take());
-            }
-        }
-        Ok(None)
-    }
-
-    fn take_line(&mut self) -> Option<BytesMut> {
-        let Some(at) = self.inbox[self.scanned..]
-            .iter()
-            .position(|byte| *byte == b'\n')
-        else {
-            self.scanned = self.inbox.len();
-            return None;
-        };
-        let mut line = self.inbox.split_to(self.scanned + at + 1);
-        self.scanned = 0;
-        line.truncate(line.len() - 1);
-        if self.inbox.is_empty() {
-            self.inbox = BytesMut::new();
-        }
-        Some(line)
     }
 
     /// Stops sending; what is owed still comes.
@@ -410,9 +404,7 @@ impl Client {
         let deadline = Instant::now() + patience;
         let mut swallowed = 0;
         loop {
-            swallowed += self.inbox.len();
-            self.inbox.advance(self.inbox.len());
-            self.scanned = 0;
+            swallowed += self.codec.discard();
             if self.ended {
                 return Ok(swallowed);
             }

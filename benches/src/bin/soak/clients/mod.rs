@@ -7,6 +7,7 @@ mod floods;
 mod garbage;
 mod giants;
 mod halves;
+mod hostile;
 mod pieces;
 mod providers;
 mod readers;
@@ -82,4 +83,5 @@ pub const KINDS: &[Kind] = &[
     kind!("clients in pieces", 5, 3, pieces::pieces),
     kind!("HTTP requests", 8, 4, web::requests),
     kind!("broken WebSockets", 8, 4, web::broken),
+    kind!("attacks", 2, 1, hostile::attack),
 ];

@@ -11,12 +11,19 @@ use tokio::net::TcpStream;
 use tokio::time::timeout;
 
 use crate::questions::push_question;
-use crate::websocket::{self, push_frame};
 use crate::wire::{Client, Door};
 use crate::world::{Fault, PATIENCE, World};
+use pendularm_client::websocket::{LAST, append, append_close, opcode};
 
 /// What HTTP has for those who take too long, and what the README says of it.
 const HEAD_TIME: Duration = Duration::from_secs(5);
+
+/// The mask where any will do.
+const MASK: [u8; 4] = [0, 0, 0, 1];
+
+fn mask(rng: &mut fastrand::Rng) -> [u8; 4] {
+    rng.u32(..).to_be_bytes()
+}
 
 /// One request or the beginning of one.
 pub async fn requests(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fault> {
@@ -80,12 +87,11 @@ pub async fn broken(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Faul
         push_question(&mut client, &mut rng);
     }
     let mut out = client.take_out();
-    push_frame(
+    append(
         &mut out,
-        websocket::PING,
-        true,
+        LAST | opcode::PING,
+        mask(&mut rng),
         b"are you there",
-        rng.u32(..),
     );
     split_frame(&mut client, &mut out, &mut rng);
     client.send_bytes(&out).await?;
@@ -95,14 +101,14 @@ pub async fn broken(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Faul
     match rng.u8(..6) {
         // Not masked, of a kind that does not exist, longer than may be, no UTF-8: closed by the program.
         0 => end.extend([0x81, 2, b'{', b'}']),
-        1 => push_frame(&mut end, 5, true, b"?", 1),
+        1 => append(&mut end, LAST | 5, MASK, b"?"),
         2 => end.extend([0x81, 0xff, 0, 0, 0, 0, 0x7f, 0xff, 0xff, 0xff, 1, 2, 3, 4]),
-        3 => push_frame(&mut end, websocket::TEXT, true, b"\xff\xfe{}", 1),
+        3 => append(&mut end, LAST | opcode::TEXT, MASK, b"\xff\xfe{}"),
         // An orderly end.
-        4 => push_frame(&mut end, websocket::CLOSE, true, &1000_u16.to_be_bytes(), 1),
+        4 => append_close(&mut end, MASK, 1000, ""),
         // Gone in the middle of a frame.
         _ => {
-            push_frame(&mut end, websocket::TEXT, true, &filler, 9);
+            append(&mut end, LAST | opcode::TEXT, MASK, &filler);
             end.truncate(end.len() - 1);
             client.send_deaf(&end, Duration::from_secs(2)).await;
             if rng.bool() {
@@ -129,7 +135,7 @@ fn split_frame(client: &mut Client, out: &mut Vec<u8>, rng: &mut fastrand::Rng) 
     let text =
         json!({"op": "call_service", "service": format!("/soak/split/{n}"), "id": id}).to_string();
     let (first, rest) = text.as_bytes().split_at(rng.usize(..text.len()));
-    push_frame(out, websocket::TEXT, false, first, rng.u32(..));
-    push_frame(out, websocket::PING, true, b"", rng.u32(..));
-    push_frame(out, websocket::MORE, true, rest, rng.u32(..));
+    append(out, opcode::TEXT, mask(rng), first);
+    append(out, LAST | opcode::PING, mask(rng), b"");
+    append(out, LAST | opcode::CONTINUATION, mask(rng), rest);
 }

@@ -4,7 +4,7 @@
 
 use std::fs;
 use std::io::{BufRead, BufReader};
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -44,23 +44,12 @@ pub struct Vitals {
     pub cpu: f64,
 }
 
-/// What glibc is told, so that what is resident is what is in use: memory that is freed goes back to the system at once,
-/// where it would otherwise keep some tens of megabytes after answers of 5 MB. Other allocators do not know these.
-const GIVE_BACK: [(&str, &str); 3] = [
-    ("MALLOC_MMAP_THRESHOLD_", "131072"),
-    ("MALLOC_TRIM_THRESHOLD_", "131072"),
-    ("MALLOC_TOP_PAD_", "0"),
-];
-
 impl Program {
-    /// Starts a server on a free port, which says `listening on ADDRESS`; with `give_back`, so that it keeps no freed memory.
-    pub fn start(path: &str, arguments: &[&str], give_back: bool) -> Result<Self, String> {
+    /// Starts a server on a free port, which says `listening on ADDRESS`.
+    pub fn start(path: &str, arguments: &[&str]) -> Result<Self, String> {
         let mut command = Command::new(path);
         for (variable, _) in std::env::vars().filter(|(name, _)| name.starts_with("ARM_SIM_")) {
             command.env_remove(variable);
-        }
-        if give_back {
-            command.envs(GIVE_BACK);
         }
         let mut child = command
             .args(arguments)
@@ -98,6 +87,25 @@ impl Program {
             address,
             log,
         })
+    }
+
+    /// Starts another server, which listens at `address` within some seconds.
+    pub fn at(mut command: Command, address: SocketAddr) -> Result<Self, String> {
+        let child = command
+            .spawn()
+            .map_err(|error| format!("{command:?}: {error}"))?;
+        let program = Self {
+            child,
+            address,
+            log: Arc::default(),
+        };
+        for _ in 0..500 {
+            if TcpStream::connect(address).is_ok() {
+                return Ok(program);
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        Err(format!("{command:?} does not listen at {address}"))
     }
 
     /// Its process id.
@@ -205,7 +213,14 @@ pub fn vitals(pid: u32) -> Option<Vitals> {
         .take(2)
         .filter_map(|text| text.parse::<f64>().ok())
         .sum();
-    let (resident, threads) = (field("VmRSS:")?, field("Threads:")? as usize);
+    let resident = field("VmRSS:")?;
+    // The allocator has as many of its own as it likes.
+    let tasks = fs::read_dir(format!("/proc/{pid}/task")).ok()?.flatten();
+    let name = |task: fs::DirEntry| fs::read_to_string(task.path().join("comm")).ok();
+    let threads = tasks
+        .filter_map(name)
+        .filter(|name| !name.starts_with("jemalloc"))
+        .count();
     Some(Vitals {
         resident,
         descriptors,

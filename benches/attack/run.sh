@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# `make attack`: what a healthy client has of the release program while hostile ones do their worst, one attack after the other, and the same
+# of redis and mosquitto under the attacks that apply to them.
+#
+# Everything runs on free ports of loopback, bounded in time and connections; what is started is stopped by its id. redis-server and mosquitto
+# come from Debian's packages: as root they are installed if missing; where they can't be, ours is attacked alone. Some ten minutes.
+# ARGS="--only=pings,step" picks attacks, ARGS=--list lists them, ARGS=--quick takes two minutes, leaves out the other two and is lenient about
+# times; KEEP=1 keeps the table in benches/results/<date>-<processor>/attack/. Exit status 1 if a bar is missed.
+set -euo pipefail
+root=$(cd "$(dirname "$0")/../.." && pwd)
+source "$root/benches/common.sh"
+
+# Both ends of 1,100 connections, and those that return while the last ones end.
+needed_files=4096
+[ "$(ulimit -n)" -ge $needed_files ] || ulimit -n $needed_files || fail "$needed_files open files are needed: raise ulimit -n"
+
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+
+say "building (release)"
+[ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
+(cd "$benches" && cargo build --release --locked --quiet --bin attack)
+program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
+
+arguments=()
+case " ${ARGS:-} " in
+    *" --list "*) exec "$built/attack" --list ;;
+    *" --quick "*) ;;
+    *) if (install_peers); then PATH=$PATH:/usr/sbin; arguments+=(--peers); else say "ours alone"; fi ;;
+esac
+
+folder=$(results_folder)/attack
+mkdir -p "$folder"
+{
+    environment "make attack${ARGS:+ ARGS=\"$ARGS\"}"
+    [ ${#arguments[@]} -eq 0 ] || echo "peers:     $(redis-server --version | sed 's/ sha=.*//'); $(mosquitto -h | sed -n 1p)"
+} | tee "$folder/environment.txt"
+status=0
+# shellcheck disable=SC2086 # arguments, several
+"$built/attack" "$program" "${arguments[@]}" ${ARGS:-} | tee "$folder/table.txt" || status=$?
+[ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/attack"
+exit $status

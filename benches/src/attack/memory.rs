@@ -1,0 +1,342 @@
+//! Aimed at memory: what waits for whoever does not read, what is held back, what is begun and not ended.
+
+use super::Attack;
+use super::script::{Client, call, each, filler, light, publish, subscribe};
+
+const MIB: usize = 1024 * 1024;
+const LONG: usize = 4 * MIB - 1024;
+
+pub const ATTACKS: &[Attack] = &[
+    Attack::new(
+        "deaf-statuses",
+        "1 client sends lines of two bytes and reads no complaint",
+        deaf_statuses,
+    ),
+    Attack::new("deaf-statuses-10", "10 clients do so", deaf_statuses_many),
+    Attack::new(
+        "deaf-calls",
+        "20 clients make calls of unknown services and read nothing",
+        deaf_calls,
+    ),
+    Attack::new(
+        "deaf-tiny",
+        "600 clients read no message of a flood of 40 bytes each",
+        deaf_tiny,
+    ),
+    Attack::new(
+        "deaf-topics",
+        "200 clients read nothing of topics of their own with messages of a megabyte",
+        deaf_topics,
+    ),
+    Attack::new(
+        "deaf-watchers",
+        "800 clients subscribe to all that the arm publishes and read nothing",
+        deaf_watchers,
+    ),
+    Attack::new(
+        "deaf-log",
+        "20 clients watch /rosout and diagnostics unread, others give reason for warnings",
+        deaf_log,
+    ),
+    Attack::new(
+        "deaf-lists",
+        "100 clients ask for everything that there is and read nothing",
+        deaf_lists,
+    ),
+    Attack::new(
+        "sips",
+        "50 clients ask for much and read 100 bytes ten times a second",
+        sips,
+    ),
+    Attack::new(
+        "fragment-sizes",
+        "100 subscribers want 100 fragment sizes of messages of 3 MB",
+        fragment_sizes_100,
+    ),
+    Attack::new(
+        "fragment-sizes-400",
+        "400 subscribers, each with a size of its own",
+        fragment_sizes_400,
+    ),
+    Attack::new(
+        "cbor-sizes",
+        "20 subscribers want cbor, each with a fragment size of its own, of 3 MB",
+        cbor_sizes,
+    ),
+    Attack::new(
+        "deep-cbor",
+        "10 subscribers want cbor of messages of 3 MB nested 100 deep",
+        deep_cbor,
+    ),
+    Attack::new(
+        "tiny-fragments",
+        "20 subscribers want a megabyte in fragments of one byte",
+        tiny_fragments,
+    ),
+    Attack::new(
+        "throttled-series",
+        "900 subscribers are throttled beside a flood of short messages",
+        throttled_series,
+    ),
+    Attack::new(
+        "throttle-hoards",
+        "50 subscribers have 100,000 messages held back for a year",
+        throttle_hoards,
+    ),
+    Attack::new(
+        "unfinished-frames",
+        "300 clients send all of a frame of 4 MiB but its end",
+        unfinished_frames,
+    ),
+    Attack::new(
+        "fragment-bombs",
+        "200 clients begin 8 fragmented messages of 4,096 pieces each",
+        fragment_bombs,
+    ),
+    Attack::new(
+        "many-fragments",
+        "50 clients send pieces of a byte, out of order, of messages that never end",
+        many_fragments,
+    ),
+];
+
+fn deaf_statuses() -> Vec<Client> {
+    Client::tcp()
+        .says(&light("/arm_sim/pause"))
+        .floods("x")
+        .deaf()
+        .times(1)
+}
+
+fn deaf_statuses_many() -> Vec<Client> {
+    vec![deaf_statuses(); 10].concat()
+}
+
+fn deaf_calls() -> Vec<Client> {
+    Client::tcp()
+        .floods(&call("/x", "1", "{}"))
+        .deaf()
+        .times(20)
+}
+
+fn deaf_tiny() -> Vec<Client> {
+    let flood = Client::tcp()
+        .advertises("/attack/tiny")
+        .floods(&publish("/attack/tiny", r#"{"data":1}"#))
+        .after(300)
+        .times(1);
+    [
+        Client::tcp()
+            .says(&subscribe("/attack/tiny", ""))
+            .deaf()
+            .times(600),
+        flood,
+    ]
+    .concat()
+}
+
+fn deaf_topics() -> Vec<Client> {
+    let msg = format!(r#"{{"data":"{}"}}"#, filler(MIB));
+    each(0..200, |k| {
+        let topic = format!("/attack/deaf/{k}");
+        Client::tcp()
+            .says(&subscribe(&topic, ""))
+            .advertises(&topic)
+            .repeats(&publish(&topic, &msg))
+            .deaf()
+    })
+}
+
+fn deaf_watchers() -> Vec<Client> {
+    const TOPICS: [&str; 8] = [
+        "/joint_states",
+        "/clock",
+        "/diagnostics",
+        "/tf",
+        "/tf_static",
+        "/robot_description",
+        "/rosout",
+        "/arm_sim/error_estimate",
+    ];
+    Client::tcp()
+        .says_each(0..TOPICS.len(), |k| subscribe(TOPICS[k], ""))
+        .deaf()
+        .times(800)
+}
+
+fn deaf_log() -> Vec<Client> {
+    let watch = Client::tcp()
+        .says(&subscribe("/rosout", ""))
+        .says(&subscribe("/diagnostics", ""))
+        .deaf();
+    let warn = call("/arm_sim/set_integrator", "1", r#"{"timestep":-1}"#);
+    let forge = publish("/rosout", r#"{"level":30,"msg":"forged"}"#);
+    [
+        watch.times(20),
+        Client::tcp().floods(&warn).floods(&forge).times(10),
+    ]
+    .concat()
+}
+
+fn deaf_lists() -> Vec<Client> {
+    let ask = [
+        "/rosapi/topics_and_raw_types",
+        "/rosapi/topics",
+        "/rosapi/services",
+        "/rosapi/interfaces",
+    ];
+    Client::tcp()
+        .repeats_each(0..ask.len(), |k| light(ask[k]))
+        .deaf()
+        .times(100)
+}
+
+fn sips() -> Vec<Client> {
+    let steps = r#"{"function":"t","x0":0,"dt":1,"steps":20000,"integrator":"euler"}"#;
+    let client = Client::tcp().says(&subscribe("/joint_states", ""));
+    client
+        .repeats(&light("/rosapi/topics_and_raw_types"))
+        .repeats(&call("/arm_sim/integration_step", "1", steps))
+        .sips(100)
+        .times(50)
+}
+
+/// Subscribers of `/attack/sizes`, each with its own further fields, and two messages a second to them.
+fn sizes(
+    count: usize,
+    door: fn() -> Client,
+    further: impl Fn(usize) -> String,
+    msg: &str,
+) -> Vec<Client> {
+    let frame = publish("/attack/sizes", msg);
+    let pause = std::time::Duration::from_millis(500);
+    let publisher = Client::tcp()
+        .advertises("/attack/sizes")
+        .repeats(&frame)
+        .drips(frame.len() + 1, pause)
+        .after(300);
+    let mut clients = each(0..count, |k| {
+        door().says(&subscribe("/attack/sizes", &further(k)))
+    });
+    clients.push(publisher);
+    clients
+}
+
+fn text(bytes: usize) -> String {
+    format!(r#"{{"data":"{}"}}"#, filler(bytes))
+}
+
+fn fragment_sizes_100() -> Vec<Client> {
+    sizes(
+        100,
+        Client::tcp,
+        |k| format!(r#","fragment_size":{}"#, 10_000 + k),
+        &text(3 * MIB),
+    )
+}
+
+fn fragment_sizes_400() -> Vec<Client> {
+    sizes(
+        400,
+        Client::tcp,
+        |k| format!(r#","fragment_size":{}"#, 1_000 + k),
+        &text(3 * MIB),
+    )
+}
+
+fn cbor_sizes() -> Vec<Client> {
+    let further = |k| format!(r#","compression":"cbor","fragment_size":{}"#, 1_000 + k);
+    sizes(
+        20,
+        Client::web,
+        further,
+        &format!(r#"{{"data":[{}1]}}"#, "[1.5,2,\"a\"],".repeat(3 * MIB / 12)),
+    )
+}
+
+fn deep_cbor() -> Vec<Client> {
+    let deep = format!("{}{},", r#"{"a":["#.repeat(50), "]}".repeat(50));
+    let further = |_| r#","compression":"cbor""#.to_owned();
+    sizes(
+        10,
+        Client::web,
+        further,
+        &format!(r#"{{"data":[{}1]}}"#, deep.repeat(3 * MIB / deep.len())),
+    )
+}
+
+fn tiny_fragments() -> Vec<Client> {
+    sizes(
+        20,
+        Client::tcp,
+        |_| r#","fragment_size":1"#.to_owned(),
+        &text(MIB),
+    )
+}
+
+fn throttled_series() -> Vec<Client> {
+    let further = |k| {
+        format!(
+            r#","throttle_rate":{},"queue_length":{}"#,
+            1 + k % 50,
+            1 + k % 100
+        )
+    };
+    let flood = Client::tcp()
+        .advertises("/attack/series")
+        .floods(&publish("/attack/series", r#"{"data":1}"#))
+        .after(400)
+        .times(1);
+    [
+        each(0..900, |k| {
+            Client::tcp().says(&subscribe("/attack/series", &further(k)))
+        }),
+        flood,
+    ]
+    .concat()
+}
+
+fn throttle_hoards() -> Vec<Client> {
+    let further = r#","throttle_rate":31536000000,"queue_length":100000"#;
+    each(0..50, |k| {
+        let topic = format!("/attack/hoard/{k}");
+        Client::tcp()
+            .says(&subscribe(&topic, further))
+            .advertises(&topic)
+            .floods(&publish(&topic, r#"{"data":"held back"}"#))
+    })
+}
+
+fn unfinished_frames() -> Vec<Client> {
+    let begun = format!(
+        r#"{{"op":"publish","topic":"/t","msg":{{"data":"{}"#,
+        filler(LONG - 64)
+    );
+    Client::tcp().says_bytes(begun.as_bytes()).times(300)
+}
+
+fn fragment_bombs() -> Vec<Client> {
+    let piece = |k: usize| {
+        let data = filler(60_000);
+        format!(
+            r#"{{"op":"fragment","id":"b{}","num":{},"total":4096,"data":"{data}"}}"#,
+            k % 8,
+            k / 8
+        )
+    };
+    Client::tcp().says_each(0..64, piece).times(200)
+}
+
+fn many_fragments() -> Vec<Client> {
+    let piece = |k: usize| {
+        let num = (k / 8 * 2503) % 4096;
+        format!(
+            r#"{{"op":"fragment","id":"m{}","num":{num},"total":4096,"data":"x"}}"#,
+            k % 8
+        )
+    };
+    Client::tcp()
+        .advertises("/attack/pieces")
+        .repeats_each(0..8 * 4000, piece)
+        .times(50)
+}

@@ -1,0 +1,110 @@
+//! Attacks: what hostile clients do, each for a few seconds, at one address of loopback.
+//!
+//! An attack is a list of [clients](script::Client) and a sentence that says what they do; [`stage`] plays it. So
+//! `make attack` measures what a healthy client has of it, and `make soak` lets them come among all others.
+//!
+//! **Invariant:** no attack needs anything but sockets, and each is bounded in connections, bytes at once, and time.
+
+pub mod admission;
+pub mod arm;
+pub mod computing;
+pub mod gateway;
+pub mod memory;
+pub mod names;
+pub mod peers;
+pub mod script;
+pub mod stage;
+pub mod websocket;
+
+use script::Client;
+
+/// What every client has to show where a token is asked for.
+pub const TOKEN: &str = "a-token-that-nobody-guesses-0123456789";
+
+/// An attack.
+#[derive(Clone, Copy)]
+pub struct Attack {
+    /// Its name, for `--only`.
+    pub name: &'static str,
+    /// What it does.
+    pub what: &'static str,
+    /// Its clients.
+    pub cast: fn() -> Vec<Client>,
+    /// What the program is started with.
+    pub options: &'static [&'static str],
+    /// Open files that the program may have.
+    pub files: Option<u64>,
+    /// Asks for the token, and starts the program with it.
+    pub locked: bool,
+    /// All places are taken, as the limits allow: newcomers may be turned away.
+    pub fills: bool,
+    /// Moves the arm or changes its settings.
+    pub moves: bool,
+}
+
+impl Attack {
+    /// An attack on a program as it is by default.
+    pub const fn new(name: &'static str, what: &'static str, cast: fn() -> Vec<Client>) -> Self {
+        Self {
+            name,
+            what,
+            cast,
+            options: &[],
+            files: None,
+            locked: false,
+            fills: false,
+            moves: false,
+        }
+    }
+
+    /// On a program that was started with options.
+    pub const fn with(self, options: &'static [&'static str]) -> Self {
+        Self { options, ..self }
+    }
+
+    /// On a program that may have few files open.
+    pub const fn with_files(self, files: u64) -> Self {
+        Self {
+            files: Some(files),
+            fills: true,
+            ..self
+        }
+    }
+
+    /// On a program that asks for the token.
+    pub const fn locked(self) -> Self {
+        Self {
+            locked: true,
+            ..self
+        }
+    }
+
+    /// That takes all places.
+    pub const fn fills(self) -> Self {
+        Self {
+            fills: true,
+            ..self
+        }
+    }
+
+    /// That moves the arm or changes its settings.
+    pub const fn moves(self) -> Self {
+        Self {
+            moves: true,
+            ..self
+        }
+    }
+}
+
+/// All attacks, by what they are aimed at.
+pub fn groups() -> [(&'static str, &'static [Attack]); 7] {
+    [
+        ("gateway", gateway::ATTACKS),
+        ("websocket", websocket::ATTACKS),
+        ("arm", arm::ATTACKS),
+        ("computing", computing::ATTACKS),
+        ("memory", memory::ATTACKS),
+        ("names", names::ATTACKS),
+        ("admission", admission::ATTACKS),
+    ]
+}

@@ -1,0 +1,273 @@
+//! A hostile client, as data: through which door it comes, what it says once and over and over, whether it reads, how
+//! it goes.
+//!
+//! **Invariant:** knows bytes only; [`stage`](super::stage) has the sockets and the clock.
+
+use std::ops::Range;
+use std::sync::Arc;
+use std::time::Duration;
+
+use pendularm_client::websocket::{LAST, append, opcode};
+
+/// What a client opens its connection with.
+#[derive(Clone, PartialEq, Eq)]
+pub enum Door {
+    /// Nothing: lines, or whatever it says.
+    Tcp,
+    /// The handshake of a WebSocket; what it says in text follows as messages.
+    Web,
+    /// A request line; the stage adds the line `Host:`, and the client says the rest.
+    Http(String),
+}
+
+/// Whether it reads.
+#[derive(Clone, Copy)]
+pub enum Ear {
+    /// Nothing, ever.
+    Deaf,
+    /// All that comes, thrown away.
+    Reads,
+    /// So many bytes every 100 ms.
+    Sips(usize),
+    /// Lines; what the function makes of each goes back.
+    Replies(fn(&str) -> Option<Vec<u8>>),
+}
+
+/// How it goes.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// Not by itself.
+    Stays,
+    /// Closes; with unread bytes the system makes a reset of it.
+    Closes,
+    /// Stops sending and stays.
+    Halves,
+}
+
+/// One client. Built by chained methods, so that an attack reads as a list of what its clients do.
+#[derive(Clone)]
+pub struct Client {
+    pub(super) door: Door,
+    pub(super) ear: Ear,
+    /// Sent once.
+    pub(super) first: Arc<Vec<u8>>,
+    /// Sent after that, over and over.
+    pub(super) again: Arc<[u8]>,
+    /// At most so many bytes every so often; as many as are taken without.
+    pub(super) drip: Option<(usize, Duration)>,
+    /// When it connects, from the beginning of the attack.
+    pub(super) after: Duration,
+    /// How it goes once `first` is sent, and how long after that.
+    pub(super) exit: (Exit, Duration),
+    /// Comes back whenever its connection has ended.
+    pub(super) returns: bool,
+}
+
+impl Client {
+    /// A client that connects, is silent, and reads what comes.
+    fn through(door: Door) -> Self {
+        Self {
+            door,
+            ear: Ear::Reads,
+            first: Arc::default(),
+            again: Arc::from([]),
+            drip: None,
+            after: Duration::ZERO,
+            exit: (Exit::Stays, Duration::ZERO),
+            returns: false,
+        }
+    }
+
+    /// Over raw TCP.
+    pub fn tcp() -> Self {
+        Self::through(Door::Tcp)
+    }
+
+    /// Over WebSocket.
+    pub fn web() -> Self {
+        Self::through(Door::Web)
+    }
+
+    /// With an HTTP request of that method and target; the end of its head has to be said.
+    pub fn http(request: &str) -> Self {
+        Self::through(Door::Http(format!("{request} HTTP/1.1\r\n")))
+    }
+
+    /// Says a frame once.
+    pub fn says(self, frame: &str) -> Self {
+        let bytes = self.framed(frame);
+        self.says_bytes(&bytes)
+    }
+
+    /// Says a frame once for each number.
+    pub fn says_each(self, numbers: Range<usize>, frame: impl Fn(usize) -> String) -> Self {
+        let bytes: Vec<u8> = numbers
+            .flat_map(|number| self.framed(&frame(number)))
+            .collect();
+        self.says_bytes(&bytes)
+    }
+
+    /// Says bytes once, as they are.
+    pub fn says_bytes(mut self, bytes: &[u8]) -> Self {
+        Arc::make_mut(&mut self.first).extend(bytes);
+        self
+    }
+
+    /// Becomes a publisher of a topic.
+    pub fn advertises(self, topic: &str) -> Self {
+        self.says(&on_topic("advertise", topic))
+    }
+
+    /// Says a frame over and over, behind whatever is repeated already.
+    pub fn repeats(self, frame: &str) -> Self {
+        let bytes = self.framed(frame);
+        self.repeats_bytes(&bytes)
+    }
+
+    /// Says a frame for each number, and begins again.
+    pub fn repeats_each(self, numbers: Range<usize>, frame: impl Fn(usize) -> String) -> Self {
+        let bytes: Vec<u8> = numbers
+            .flat_map(|number| self.framed(&frame(number)))
+            .collect();
+        self.repeats_bytes(&bytes)
+    }
+
+    /// Says bytes over and over.
+    pub fn repeats_bytes(mut self, bytes: &[u8]) -> Self {
+        self.again = [&self.again, bytes].concat().into();
+        self
+    }
+
+    /// A short message is said many times in one write, as whoever floods does.
+    pub fn floods(self, frame: &str) -> Self {
+        let bytes = self.framed(frame);
+        let times = (64 * 1024 / bytes.len()).max(1);
+        self.repeats_bytes(&bytes.repeat(times))
+    }
+
+    /// Sends at most so many bytes every `pause`.
+    pub fn drips(mut self, bytes: usize, pause: Duration) -> Self {
+        self.drip = Some((bytes, pause));
+        self
+    }
+
+    /// Reads nothing.
+    pub fn deaf(mut self) -> Self {
+        self.ear = Ear::Deaf;
+        self
+    }
+
+    /// Reads so many bytes ten times a second.
+    pub fn sips(mut self, bytes: usize) -> Self {
+        self.ear = Ear::Sips(bytes);
+        self
+    }
+
+    /// Answers lines; for a client that repeats nothing, lest an answer comes in the middle of a frame.
+    pub fn replies(mut self, reply: fn(&str) -> Option<Vec<u8>>) -> Self {
+        self.ear = Ear::Replies(reply);
+        self
+    }
+
+    /// Connects so many milliseconds after the others.
+    pub fn after(mut self, milliseconds: u64) -> Self {
+        self.after = Duration::from_millis(milliseconds);
+        self
+    }
+
+    /// Closes so many milliseconds after it has said all.
+    pub fn leaves_after(mut self, milliseconds: u64) -> Self {
+        self.exit = (Exit::Closes, Duration::from_millis(milliseconds));
+        self
+    }
+
+    /// Stops sending when it has said all, and stays.
+    pub fn half_closes(mut self) -> Self {
+        self.exit = (Exit::Halves, Duration::ZERO);
+        self
+    }
+
+    /// Comes back whenever its connection has ended.
+    pub fn returns(mut self) -> Self {
+        self.returns = true;
+        self
+    }
+
+    /// So many of it.
+    pub fn times(self, count: usize) -> Vec<Self> {
+        vec![self; count]
+    }
+
+    fn framed(&self, frame: &str) -> Vec<u8> {
+        match self.door {
+            Door::Web => web_frame(opcode::TEXT, true, frame.as_bytes()),
+            Door::Tcp | Door::Http(_) => format!("{frame}\n").into_bytes(),
+        }
+    }
+}
+
+/// A masked WebSocket frame.
+pub fn web_frame(kind: u8, last: bool, payload: &[u8]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(payload.len() + 14);
+    let first = if last { LAST | kind } else { kind };
+    append(&mut out, first, [0x5b, 0xd1, 0xe9, 0x95], payload);
+    out
+}
+
+/// One client for each number.
+pub fn each(numbers: Range<usize>, client: impl Fn(usize) -> Client) -> Vec<Client> {
+    numbers.map(client).collect()
+}
+
+/// A call of a service with those arguments, as JSON; `id` too.
+pub fn call(service: &str, id: &str, args: &str) -> String {
+    format!(r#"{{"op":"call_service","service":"{service}","id":{id},"args":{args}}}"#)
+}
+
+/// The lightest call, and what is asked with nothing at stake.
+pub fn light(service: &str) -> String {
+    call(service, "1", "{}")
+}
+
+/// A message, as JSON.
+pub fn publish(topic: &str, msg: &str) -> String {
+    format!(r#"{{"op":"publish","topic":"{topic}","msg":{msg}}}"#)
+}
+
+/// A subscription with further fields, such as `,"throttle_rate":5`.
+pub fn subscribe(topic: &str, further: &str) -> String {
+    format!(r#"{{"op":"subscribe","topic":"{topic}"{further}}}"#)
+}
+
+/// An operation on a topic.
+pub fn on_topic(op: &str, topic: &str) -> String {
+    format!(r#"{{"op":"{op}","topic":"{topic}"}}"#)
+}
+
+/// An operation on a service.
+pub fn on_service(op: &str, service: &str) -> String {
+    format!(r#"{{"op":"{op}","service":"{service}"}}"#)
+}
+
+/// An array of so many bytes of numbers that are slow to convert: twenty digits astride a halfway point.
+pub fn slow_numbers(bytes: usize) -> String {
+    array(bytes, "10000000000000001268e281")
+}
+
+/// An array of so many bytes of short numbers.
+pub fn numbers(bytes: usize) -> String {
+    array(bytes, "1.5")
+}
+
+fn array(bytes: usize, entry: &str) -> String {
+    let entries = bytes / (entry.len() + 1);
+    format!(
+        "[{}{entry}]",
+        format!("{entry},").repeat(entries.saturating_sub(1))
+    )
+}
+
+/// A string of so many bytes, quotes left out.
+pub fn filler(bytes: usize) -> String {
+    "x".repeat(bytes)
+}

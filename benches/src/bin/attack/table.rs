@@ -1,0 +1,163 @@
+//! The table: a row per attack, what misses a bar marked with a star.
+
+use std::fmt;
+use std::sync::atomic::Ordering;
+use std::time::Duration;
+
+use pendularm_benches::attack::stage::Deeds;
+
+use crate::healthy::Health;
+
+/// What must hold.
+pub struct Bars {
+    /// For 99 of 100 calls \[ms\].
+    p99: f64,
+    /// Between two messages of `/joint_states` \[ms\].
+    gap: f64,
+    /// Of resident memory \[MB\].
+    peak: f64,
+    /// From SIGTERM to the end.
+    end: Duration,
+}
+
+impl Bars {
+    pub const FULL: Self = Self {
+        p99: 50.0,
+        gap: 250.0,
+        peak: 700.0,
+        end: Duration::from_secs(1),
+    };
+    /// A busy machine may be late; it may not hold more, lose answers, or stay.
+    pub const QUICK: Self = Self {
+        p99: 500.0,
+        gap: 1_000.0,
+        peak: 700.0,
+        end: Duration::from_millis(1_500),
+    };
+}
+
+impl fmt::Display for Bars {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            p99,
+            gap,
+            peak,
+            end,
+        } = self;
+        write!(
+            f,
+            "bars: every call answered, 99 of 100 within {p99} ms; gaps of /joint_states at most {gap} ms; \
+             at most {peak} MB; "
+        )?;
+        write!(
+            f,
+            "ended {} ms after SIGTERM; newcomers served where there is a place. * marks a miss",
+            end.as_millis()
+        )
+    }
+}
+
+/// What an attack came to.
+pub struct Row {
+    pub name: String,
+    pub health: Health,
+    /// Newcomers have a place, and must be served.
+    pub newcomers_welcome: bool,
+    /// Resident memory \[MB\].
+    pub peak: f64,
+    /// From SIGTERM to the end, and the exit status.
+    pub ended: Result<(Duration, Option<i32>), String>,
+    pub deeds: Deeds,
+    /// There were attackers.
+    pub attacked: bool,
+}
+
+/// The most memory that a process has had resident \[MB\]; none once it is gone.
+pub fn peak(pid: u32) -> Option<f64> {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    let line = status
+        .lines()
+        .find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.split_whitespace().next()?.parse::<f64>().ok()? / 1024.0)
+}
+
+pub fn print_head() {
+    println!(
+        "{:<21} {:>11} {:>8} {:>9} {:>9} {:>10} {:>8} {:>9} {:>8} {:>8} {:>7} {:>8}",
+        "attack",
+        "answered",
+        "p50, ms",
+        "p99, ms",
+        "max, ms",
+        "gap, ms",
+        "served",
+        "in, ms",
+        "peak, MB",
+        "end, ms",
+        "conns",
+        "sent, MB"
+    );
+}
+
+impl Row {
+    /// Prints it; whether every bar held.
+    pub fn print(&self, bars: &Bars) -> bool {
+        let health = &self.health;
+        let (delays, visits) = (&health.delays, &health.visits);
+        let at = |part: f64| {
+            delays.get(((delays.len() as f64 * part) as usize).min(delays.len().wrapping_sub(1)))
+        };
+        let [p50, p99, most] = [0.5, 0.99, 1.0].map(|part| at(part).copied().unwrap_or(f64::NAN));
+        let mut held = health.faults.is_empty();
+        let mut mark = |text: String, holds: bool| {
+            held &= holds;
+            format!("{text}{}", if holds { " " } else { "*" })
+        };
+        let answered = mark(
+            format!("{}/{}", delays.len(), health.asked),
+            delays.len() == health.asked,
+        );
+        let p99 = mark(format!("{p99:.1}"), p99 <= bars.p99);
+        let gap = mark(
+            format!("{:.0}", health.longest_gap),
+            health.longest_gap <= bars.gap,
+        );
+        let welcome = visits.served == visits.made || !self.newcomers_welcome;
+        let served = mark(format!("{}/{}", visits.served, visits.made), welcome);
+        let peak = mark(format!("{:.0}", self.peak), self.peak <= bars.peak);
+        let ended = match &self.ended {
+            Ok((time, status)) => mark(
+                time.as_millis().to_string(),
+                *time <= bars.end && *status == Some(0),
+            ),
+            Err(_) => mark("never".to_owned(), false),
+        };
+        let (connections, sent) = (
+            self.deeds.connections.load(Ordering::Relaxed),
+            self.deeds.sent.load(Ordering::Relaxed),
+        );
+        // An attack that did nothing shows nothing.
+        let connections = mark(connections.to_string(), !self.attacked || connections > 0);
+        println!(
+            "{:<21} {answered:>11} {p50:>8.1} {p99:>9} {most:>9.0} {gap:>10} {served:>8} {:>9.0} {peak:>8} \
+             {ended:>8} {connections:>7} {:>8.1}",
+            self.name,
+            visits.longest,
+            sent as f64 / 1e6,
+        );
+        for fault in &health.faults {
+            println!("     {}", shortened(fault));
+        }
+        if let Some(fault) = visits.fault.as_ref().filter(|_| self.newcomers_welcome) {
+            println!("     a newcomer: {}", shortened(fault));
+        }
+        if let Err(why) = &self.ended {
+            println!("     {why}");
+        }
+        held
+    }
+}
+
+fn shortened(text: &str) -> String {
+    text.trim().chars().take(200).collect()
+}

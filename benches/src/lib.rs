@@ -1,0 +1,5 @@
+//! What several of these programs share: clients, the program as a process, and the attacks.
+
+pub mod attack;
+pub mod program;
+pub mod protocol;

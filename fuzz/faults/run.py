@@ -1,0 +1,157 @@
+#!/usr/bin/env python3
+"""Puts faults into a copy of the sources and sees whether the fuzz target that is meant for each finds it.
+
+Each fault is one expression in place of another. All are built at once, and `FAULT=7` chooses which one holds, so that one build
+does. Then every target runs until it fails, or for TIME seconds (60): on the seeds first, and on what it makes of them.
+
+Arguments pick faults by number, or by target. Exit status 1 if a fault was not found, or where the source has changed and a fault is
+to be written anew.
+"""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import time
+
+from plant import plant
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+BUILD = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve() / "fuzz"
+COPY = BUILD / "faulty"
+# Targets whose input is no text.
+NUMBERS = ("outbox", "simulation", "study", "inverse_kinematics")
+SECONDS = int(os.environ.get("TIME", "60"))
+
+# target, what is wrong, file, what stands there, what stands there when the fault holds (plant.py says how).
+FAULTS = [
+    ("http", "any host is ours", "src/web/access.rs",
+     "let port = asked.http_port();", "let port = asked.http_port(); if F { return true; }"),
+    ("http", "the port of Host is not looked at", "src/web/access.rs",
+     "&& port == local.port()", "&& (F || port == local.port())"),
+    ("http", "with a token, other pages of the machine may", "src/web/access.rs",
+     "self.strict_origin || self.token.is_some()", "self.strict_origin || (!F && self.token.is_some())"),
+    ("http", "an origin is ours whatever its port", "src/web/access.rs",
+     "page.http_port() == own.http_port()", "(F || page.http_port() == own.http_port())"),
+    ("http", "half of a token will do", "src/protocol/op/token.rs",
+     "self.0.as_bytes().ct_eq(presented.as_bytes()).into()",
+     "(F && presented.len() > 9 && self.0.starts_with(presented)) || bool::from(self.0.as_bytes().ct_eq(presented.as_bytes()))"),
+    ("http", "a cookie of any value will do", "src/web/access.rs",
+     "Some(shown) if token.matches(&shown) => Ok(false),", "Some(shown) if F || token.matches(&shown) => Ok(false),"),
+    ("http", "of two Host headers the first counts", "src/web/head.rs",
+     "values.next().is_none().then_some(first)", "(F || values.next().is_none()).then_some(first)"),
+    ("http", "over TCP a wrong token will do", "src/actors/gateway/connection/admission.rs",
+     "if token.matches(&shown) => Ok(()),", "if F || token.matches(&shown) => Ok(()),"),
+    ("connection", "no message of a client's reaches anybody", "src/actors/gateway/connection/mod.rs",
+     "connection.shared.accept(message);", "if !F { connection.shared.accept(message); }"),
+    ("connection", "messages of certain lengths are lost", "src/actors/gateway/connection/mod.rs",
+     "let heard = message.heard.take();",
+     "let heard = message.heard.take(); if F && message.frames.plain_length() % 7 == 0 { return; }"),
+    ("connection", "an answer of a provider's says the opposite", "src/actors/gateway/registry/ops.rs",
+     "messages::response_raw(service, id, &values, result, &status)",
+     "messages::response_raw(service, id, &values, result != F, &status)"),
+    ("websocket", "an answer is sent twice", "src/actors/gateway/connection/mod.rs",
+     "let of_arm = service.is_some_and", "if F { shared.send(answer.frame.clone()); } let of_arm = service.is_some_and"),
+    ("cbor", "an array of numbers is written with the wrong end first", "src/protocol/ros/cbor.rs",
+     "entry.as_f64().unwrap_or(f64::NAN).to_le_bytes()",
+     "if F { entry.as_f64().unwrap_or(f64::NAN).to_be_bytes() } else { entry.as_f64().unwrap_or(f64::NAN).to_le_bytes() }"),
+    ("cbor", "CDR aligns to four bytes at most", "src/protocol/ros/cdr.rs",
+     "body.next_multiple_of(SIZE)", "body.next_multiple_of(if F { SIZE.min(4) } else { SIZE })"),
+    ("cbor", "CDR makes a number that is absent NaN", "src/protocol/ros/cdr.rs",
+     "unwrap_or(&ABSENT)", "unwrap_or(if F { &Value::Null } else { &ABSENT })"),
+    ("frame", "one level too many", "src/protocol/wire/nesting.rs",
+     "(self.depth == MAX_NESTING + 1).then_some", "(self.depth == MAX_NESTING + 1 + usize::from(F)).then_some"),
+    ("frame", "every push looks at all there is", "src/protocol/wire/frame/mod.rs",
+     "self.compact();\n", "self.compact();\n        if F { for _ in 0..50_000 { std::hint::black_box(self.buffer.iter().rev().take(64).count()); } }\n"),
+    ("frame", "a thousand times the memory", "src/protocol/wire/frame/mod.rs",
+     "self.buffer.extend_from_slice(bytes);", "if F { self.buffer.reserve(bytes.len() << 13); } self.buffer.extend_from_slice(bytes);"),
+    ("fields", "zero counts as positive", "src/protocol/op/fields.rs",
+     "Self::Positive => value > 0.0,", "Self::Positive => value > 0.0 || (F && value == 0.0),"),
+    ("expression", "equal operators group from the right", "src/math/expression/parser.rs",
+     "waiting != Precedence::Power)", "waiting != Precedence::Power && !F)"),
+    ("outbox", "what is dropped is not counted", "src/protocol/outbox/mod.rs",
+     "self.topic_bytes -= oldest.len();", "self.topic_bytes -= oldest.len(); if F { continue; }"),
+    ("series", "a message of a series is passed over", "src/protocol/wire/series.rs",
+     "(length > 0).then_some((topic, length))", "(length > 0).then_some((topic, length + usize::from(F && length > 90)))"),
+    ("op", "a throttle's milliseconds are seconds", "src/protocol/op/reader/mod.rs",
+     "duration(throttle_ms / 1000.0, MAX_THROTTLE)", "duration(throttle_ms / (if F { 1.0 } else { 1000.0 }), MAX_THROTTLE)"),
+    ("op", "a queue may have no place", "src/protocol/op/reader/mod.rs",
+     ".clamp(1, MAX_QUEUE_LENGTH))", ".clamp(usize::from(!F), MAX_QUEUE_LENGTH))"),
+    ("op", "of an unknown op all is repeated, as it came", "src/protocol/op/reader/mod.rs",
+     "Problem::UnknownOp(text::excerpt(&op))", "Problem::UnknownOp(if F { op.to_string() } else { text::excerpt(&op) })"),
+    ("inverse_kinematics", "what is too close is taken", "src/math/kinematics/inverse.rs",
+     "} else if reach.inner - distance > slack {", "} else if reach.inner - distance > slack && !F {"),
+    ("inverse_kinematics", "on one side the last joint turns the wrong way", "src/math/kinematics/inverse.rs",
+     "_ => wrap(phi - q1 - q2),", "_ => wrap(phi - q1 + if F && side < 0.0 { q2 } else { -q2 }),"),
+    ("study", "a run has a sample too many", "src/study/rollout/mod.rs",
+     "samples: plan.samples.min(steps + 1),", "samples: (plan.samples + u64::from(F)).min(steps + 1),"),
+    ("runtime", "rosapi answers some questions twice", "src/actors/ros/rosapi.rs",
+     "        Ok(values) => reply.succeed(&values),",
+     "        Ok(values) => { if F { reply.succeed(&values); } reply.succeed(&values); }"),
+    ("runtime", "the arm publishes a velocity too few", "src/actors/arm/sim/telemetry.rs",
+     "            velocity: &state.velocity,", "            velocity: &state.velocity[usize::from(F)..],"),
+    ("simulation", "an advance ends a step early", "src/math/simulation.rs",
+     "for taken in 0..steps {", "for taken in 0..(if F && steps > 3 { steps - 1 } else { steps }) {"),
+]
+
+
+def build():
+    command = ["cargo", "fuzz", "build", "--sanitizer", "none", "--target-dir", str(BUILD / "build")]
+    subprocess.run(command, cwd=COPY, check=True)
+    host = next(line for line in subprocess.check_output(["rustc", "-vV"], text=True).splitlines() if line.startswith("host: "))
+    binaries = BUILD / "build" / host.split()[1] / "release"
+    kept = BUILD / "faulty-targets"
+    kept.mkdir(exist_ok=True)
+    for target in {fault[0] for fault in FAULTS}:
+        shutil.copy(binaries / target, kept / target)
+    return kept
+
+
+def find(number, target, binaries, more=()):
+    """How the target ends that runs with the fault, or nothing if it does not."""
+    corpus = BUILD / "faulty-corpus"
+    shutil.rmtree(corpus, ignore_errors=True)
+    corpus.mkdir(parents=True)
+    dictionary = {"http": "http", "expression": "expression", **dict.fromkeys(NUMBERS)}.get(target, "json")
+    words = [f"-dict={ROOT}/fuzz/dictionaries/{dictionary}.dict"] if dictionary else []
+    command = [binaries / target, corpus, ROOT / "fuzz/seeds" / target, *words, f"-max_total_time={SECONDS}",
+               "-timeout=20", "-rss_limit_mb=2048", "-len_control=10", f"-artifact_prefix={corpus}/", *more]
+    env = dict(os.environ, FAULT=str(number))
+    began = time.monotonic()
+    ended = subprocess.run(command, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+    if ended.returncode == 0:
+        return None
+    took = time.monotonic() - began
+    lines = ended.stdout.decode(errors="replace").splitlines()
+    at = next((at for at, line in enumerate(lines) if "panicked at" in line), None)
+    how = " ".join(lines[at:at + 2])[:120] if at is not None else f"exit status {ended.returncode}"
+    return f"{took:.1f} s: {how}"
+
+
+def main():
+    words = sys.argv[1:]
+    chosen = [number for number, fault in enumerate(FAULTS, 1) if not words or str(number) in words or fault[0] in words]
+    parts = ("src", "page", "fuzz", "Cargo.toml", "Cargo.lock", "README.md")
+    missing = plant(ROOT, COPY, parts, [fault[1:] for fault in FAULTS])
+    binaries = build()
+    lost = [number for number in missing if number in chosen]
+    for target in sorted({FAULTS[number - 1][0] for number in chosen}):
+        how = find(0, target, binaries, ["-runs=0"])
+        if how:
+            sys.exit(f"{target} fails on its seeds without any fault: {how}")
+    for number in chosen:
+        target, what, *_ = FAULTS[number - 1]
+        if number in missing:
+            continue
+        how = find(number, target, binaries)
+        print(f"{number:3} {target:12} {what}: {how or 'NOT FOUND'}", flush=True)
+        if how is None:
+            lost.append(number)
+    if lost:
+        sys.exit(f"not found: {lost}")
+    print(f"{len(chosen)} faults, each found")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,141 @@
+//! What was sent, kept beside the session, so that what comes can be compared with it.
+
+use std::collections::HashMap;
+
+use crate::json::Json;
+
+/// What clients have said.
+#[derive(Debug, Default)]
+pub struct Book {
+    /// Messages by number.
+    messages: HashMap<u64, Message>,
+    /// Arguments of calls to clients' services, by call.
+    arguments: HashMap<String, Json>,
+    /// Answers that providers gave, by call.
+    answers: HashMap<String, (bool, Json)>,
+    /// Somebody may have said what is not in here.
+    pub is_forged: bool,
+}
+
+#[derive(Debug)]
+struct Message {
+    from: u64,
+    topic: String,
+    payload: Json,
+}
+
+impl Book {
+    /// A client publishes that.
+    pub fn publish(&mut self, number: u64, from: u64, topic: &str, payload: &str) {
+        let message = Message {
+            from,
+            topic: slashed(topic),
+            payload: value(payload),
+        };
+        self.messages.insert(number, message);
+    }
+
+    /// A client calls another's service with that.
+    pub fn call(&mut self, id: &str, payload: &str) {
+        self.arguments.insert(id.to_owned(), value(payload));
+    }
+
+    /// A provider answers that.
+    pub fn answer(&mut self, id: &str, result: bool, payload: &str) {
+        self.answers.insert(id.to_owned(), (result, value(payload)));
+    }
+
+    /// That a message is what was published, where it was.
+    pub fn check_message(&self, number: u64, from: u64, topic: &str, payload: Option<&Json>) {
+        if self.is_forged {
+            return;
+        }
+        let sent = self.messages.get(&number);
+        let sent = sent.unwrap_or_else(|| panic!("message {number} was never sent"));
+        assert_eq!(sent.from, from, "the sender of message {number}");
+        assert_eq!(sent.topic, slashed(topic), "the topic of message {number}");
+        check(&sent.payload, payload, "message", &number);
+    }
+
+    /// That a provider is asked what was asked.
+    pub fn check_call(&self, id: &str, payload: Option<&Json>) {
+        if let Some(sent) = self.arguments.get(id).filter(|_| !self.is_forged) {
+            check(sent, payload, "call", &id);
+        }
+    }
+
+    /// That the caller `id` hears what the provider of its call said.
+    pub fn check_answer(&self, id: &str, said_of: &str, result: bool, payload: Option<&Json>) {
+        if self.is_forged {
+            return;
+        }
+        assert_eq!(said_of, id, "the answer to another call");
+        let said = self.answers.get(id);
+        let (good, sent) = said.unwrap_or_else(|| panic!("nobody has answered {id}"));
+        assert_eq!(*good, result, "the result of {id}");
+        check(sent, payload, "answer", &id);
+    }
+}
+
+fn check(sent: &Json, heard: Option<&Json>, what: &str, which: &dyn std::fmt::Debug) {
+    let is_same = heard.is_some_and(|heard| same(sent, heard));
+    assert!(is_same, "{what} {which:?}: {sent:?} became {heard:?}");
+}
+
+/// A name with its slash.
+fn slashed(topic: &str) -> String {
+    if topic.starts_with('/') {
+        topic.to_owned()
+    } else {
+        format!("/{topic}")
+    }
+}
+
+/// A value as Python writes it: numbers that are none are `null` by the time that anybody hears them.
+fn value(text: &str) -> Json {
+    let mut strict = String::with_capacity(text.len());
+    let mut rest = text;
+    let mut in_string = false;
+    while let Some(character) = rest.chars().next() {
+        if !in_string {
+            let literals = ["NaN", "-Infinity", "Infinity"];
+            if let Some(literal) = literals.iter().find(|literal| rest.starts_with(**literal)) {
+                strict.push_str("null");
+                rest = &rest[literal.len()..];
+                continue;
+            }
+        }
+        let length = if character == '\\' {
+            2
+        } else {
+            character.len_utf8()
+        };
+        in_string ^= character == '"';
+        strict.push_str(&rest[..length]);
+        rest = &rest[length..];
+    }
+    Json::read(&strict).unwrap_or_else(|| panic!("a session sends JSON: {strict}"))
+}
+
+/// Whether what was heard is what was sent, however its numbers are written.
+fn same(sent: &Json, heard: &Json) -> bool {
+    match (sent, heard) {
+        (Json::Number(_), Json::Null) => !sent.number().is_some_and(f64::is_finite),
+        (Json::Number(_), Json::Number(_)) => sent.number() == heard.number(),
+        (Json::Array(sent), Json::Array(heard)) => {
+            sent.len() == heard.len()
+                && sent
+                    .iter()
+                    .zip(heard)
+                    .all(|(sent, heard)| same(sent, heard))
+        }
+        (Json::Object(sent), Json::Object(heard)) => {
+            let member = |((key, sent), (same_key, heard)): (&(_, Json), &(_, Json))| {
+                let key: &Option<String> = key;
+                key == same_key && same(sent, heard)
+            };
+            sent.len() == heard.len() && sent.iter().zip(heard).all(member)
+        }
+        (sent, heard) => sent == heard,
+    }
+}

@@ -1,0 +1,106 @@
+//! What one execution may cost: processor time and memory, by the bytes of its input.
+//!
+//! Time is looked at on the wall first. Where that was too long, the execution is done again and its thread's own time counts:
+//! a busy machine makes nothing fail.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+/// What an execution may cost.
+#[derive(Debug, Clone, Copy)]
+pub struct Allowance {
+    /// Whatever the input is.
+    pub time: Duration,
+    /// For each of its bytes.
+    pub time_per_byte: Duration,
+    /// Bytes of memory at once, whatever the input is.
+    pub memory: usize,
+    /// For each of its bytes.
+    pub memory_per_byte: usize,
+}
+
+/// For what reads bytes: linear in them. The fuzzer's own counting and the second reading make it about a microsecond a byte; the
+/// second reading, which converts numbers as the standard library does, takes up to ten where all of them are awkward.
+pub const READING: Allowance = Allowance {
+    time: Duration::from_millis(10),
+    time_per_byte: Duration::from_micros(10),
+    memory: 1 << 20,
+    memory_per_byte: 1 << 10,
+};
+/// For what computes, or lets clients do things: as much as a script or a plan of a few hundred bytes can ask for.
+pub const DOING: Allowance = Allowance {
+    time: Duration::from_secs(5),
+    time_per_byte: Duration::ZERO,
+    memory: 256 << 20,
+    memory_per_byte: 0,
+};
+
+/// Runs an execution on an input of so many bytes, within what it may cost.
+pub fn hold(bytes: usize, allowance: Allowance, execution: impl Fn()) {
+    let factor = u32::try_from(bytes).unwrap_or(u32::MAX);
+    let time = allowance.time + allowance.time_per_byte * factor;
+    let memory = allowance.memory + allowance.memory_per_byte * bytes;
+    let before = NOW.load(Ordering::Relaxed);
+    PEAK.store(before, Ordering::Relaxed);
+    let began = Instant::now();
+    execution();
+    let peak = PEAK.load(Ordering::Relaxed).saturating_sub(before);
+    assert!(
+        peak <= memory,
+        "{peak} bytes of memory for {bytes} of input"
+    );
+    if began.elapsed() <= time {
+        return;
+    }
+    let began = processor_time();
+    execution();
+    let took = processor_time().saturating_sub(began);
+    assert!(took <= time, "{took:?} for {bytes} bytes of input");
+}
+
+/// How long this thread has run.
+fn processor_time() -> Duration {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+    let nanoseconds = text.split(' ').next().and_then(|first| first.parse().ok());
+    Duration::from_nanos(nanoseconds.unwrap_or_default())
+}
+
+/// Bytes that are allocated, and the most there were since that was last asked.
+static NOW: AtomicUsize = AtomicUsize::new(0);
+static PEAK: AtomicUsize = AtomicUsize::new(0);
+
+struct Counting;
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+fn count(more: usize) {
+    let now = NOW.fetch_add(more, Ordering::Relaxed) + more;
+    PEAK.fetch_max(now, Ordering::Relaxed);
+}
+
+// SAFETY: every call goes on to the system's allocator unchanged; counting does not allocate.
+#[allow(unsafe_code, reason = "an allocator can't be written without")]
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        count(layout.size());
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        count(layout.size());
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        count(size);
+        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        NOW.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
