@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow test-browser test-clients fuzz lint audit doc report mutants bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -25,7 +25,16 @@ test: ## Run every test but those of the page
 
 test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"
-	$(CARGO) test --locked --test wire_faults_slow -- --ignored --nocapture --test-threads 1
+	$(CARGO) test --locked --test wire -- faults_slow:: memory_slow:: --ignored --nocapture --test-threads 1
+
+test-page: node_modules ## Check the page's types and try its logic without a browser; needs node 20 with npm
+	@echo "make test-page: types, then unit tests"
+	node_modules/.bin/tsc
+	node --test tests/page/
+
+node_modules: package-lock.json
+	npm ci --silent --no-audit --no-fund
+	@touch node_modules
 
 test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS="-k trial" picks tests
 	@echo "make test-browser: the page in headless Chromium"
@@ -35,16 +44,30 @@ test-clients: build ## Run clients that nobody here wrote against it: roslibpy, 
 	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
+simulate: ## Run the whole runtime in virtual time under SEEDS=1000 seeds that the commit chooses; FROM=n, MINUTES=n, SEED=n
+	@echo "make simulate: builds, then some 10 to 20 seeds a second"
+	@CARGO="$(CARGO)" SEED="$(SEED)" SEEDS="$(SEEDS)" MINUTES="$(MINUTES)" FROM="$(FROM)" WITHOUT="$(WITHOUT)" GO_ON="$(GO_ON)" \
+		bash scripts/simulate.sh
+
+simulate-faults: ## Put faults into a copy of the sources and see at which seed the simulation finds each; ARGS="3 7" picks some
+	@echo "make simulate-faults: up to $(or $(SEEDS),1000) seeds each, after a build of some minutes"
+	@SEEDS="$(SEEDS)" FROM="$(FROM)" python3 tests/simulate/faults.py $(ARGS)
+
 fuzz: ## Run every fuzz target for TIME=60 seconds; ARGS="frame op" picks some; needs cargo-fuzz
 	@echo "make fuzz: $(or $(TIME),60) s each, after a build of some minutes"
 	@CARGO="$(CARGO)" TIME="$(TIME)" bash scripts/fuzz.sh $(ARGS)
 
+fuzz-faults: ## Put faults into a copy of the sources and see each found by its fuzz target; ARGS="3 7" picks some; needs cargo-fuzz
+	@echo "make fuzz-faults: up to $(or $(TIME),60) s each, after a build of some minutes"
+	@TIME="$(or $(TIME),60)" python3 fuzz/faults/run.py $(ARGS)
+
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
-	$(CARGO) fmt --check
+	$(CARGO) fmt --check --all
 	$(CARGO) fmt --check --manifest-path fuzz/Cargo.toml
-	$(CARGO) clippy --locked --all-targets -- -D warnings
+	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
+	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
 
 audit: ## Check the dependencies: licences, duplicates, sources, advisories where there is a copy of the database
 	@echo "make audit: cargo-deny against deny.toml"
@@ -56,12 +79,21 @@ doc: ## Build the documentation; any warning fails
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 
-report: build ## Measure error against run time and stability, and write report/index.html; ARGS="--quick" or "--only error"
+report: build ## Measure error against run time and stability: report/index.html; ARGS="--quick" or "--only error"; KEEP=1 keeps figures
 	@echo "make report: report/index.html"
 	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
+	@[ -z "$(KEEP)" ] || python3 scripts/keep-figures.py report
 
-mutants: ## Change src/math and src/protocol bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs"
+picture: build ## Take the README's picture of the page: docs/page.png; needs chromium
+	@echo "make picture: docs/page.png"
+	PENDULARM="$(TARGET_DIR)/release/pendularm" python3 scripts/picture.py
+
+features: ## Build with and without each feature and print size, crates and build time; KEEP=1 puts them into the README
+	@echo "make features: five release builds from nothing, some minutes"
+	@CARGO="$(CARGO)" python3 scripts/features.py $(if $(KEEP),--keep) $(ARGS)
+
+mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"
 	@bash scripts/mutants.sh $(ARGS)
 
@@ -77,9 +109,13 @@ bench-peers: ## Measure beside Pinocchio and MuJoCo, installed from PyPI into be
 	@echo "make bench-peers: downloads about 100 MB once, compiles, then some minutes"
 	@KEEP="$(KEEP)" bash benches/peers/run.sh
 
+attack: ## Attack the program in a hundred ways and measure what a healthy client has of it; ARGS="--only=pings", --list or --quick
+	@echo "make attack: some ten minutes; installs redis-server and mosquitto as bench-load does, and attacks them too"
+	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/attack/run.sh
+
 soak: ## Let badly behaved clients come and go for MINUTES (1), and check what must hold; SEED=n repeats one
 	@echo "make soak: builds, then $(or $(MINUTES),1) minutes and a little more"
-	@MINUTES="$(MINUTES)" SEED="$(SEED)" ALLOCATOR="$(ALLOCATOR)" bash scripts/soak.sh
+	@MINUTES="$(MINUTES)" SEED="$(SEED)" ONLY="$(ONLY)" bash scripts/soak.sh
 
 clean: ## Remove what was built and packed; vendored sources stay
 	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"

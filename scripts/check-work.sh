@@ -13,8 +13,9 @@ if [ "${1:-}" != --record ] && ! grep -qx "# $toolchain" "$recorded"; then
     exit 0
 fi
 
-target=${CARGO_TARGET_DIR:-$root/target}/benches
-(cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work)
+# The folder of `make soak` and its like, which want the same build.
+target=${CARGO_TARGET_DIR:-$root/benches/target}
+(cd "$root/benches" && cargo build --release --locked --quiet --bin work)
 
 # The difference between two runs: the start of the program is not the step's.
 short=5000 long=15000

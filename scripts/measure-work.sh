@@ -9,6 +9,8 @@ out=${1:?usage: scripts/measure-work.sh DIRECTORY}
 root=$(cd "$(dirname "$0")/.." && pwd)
 command -v valgrind >/dev/null || { echo "measure-work: valgrind is not installed; instruction counts stay unmeasured" >&2; exit 0; }
 mkdir -p "$out"
+# Functions and symbols are counted by their names, which a release build does without otherwise.
+export CARGO_PROFILE_RELEASE_STRIP=none
 target=${CARGO_TARGET_DIR:-$root/target}/benches
 scratch=$(mktemp -d)
 server=
@@ -17,7 +19,7 @@ trap 'if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; fi; rm -rf "
 (cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work --bin allocations)
 program=${CARGO_TARGET_DIR:-$root/target}/release/pendularm
 if grep -q '^web = ' "$root/Cargo.toml"; then
-    (cd "$root" && cargo build --release --locked --quiet --no-default-features)
+    (cd "$root" && cargo build --release --locked --quiet --no-default-features --features runtime)
     cp "$program" "$scratch/bare"
 fi
 # Last, so that the program left behind is the whole one.

@@ -1,10 +1,13 @@
 #!/usr/bin/env bash
-# Changes src/math and src/protocol one small thing at a time (cargo-mutants) and counts how many changes a test notices: the mutation score.
-# usage: scripts/mutants.sh [--fresh] [math|protocol] [options of cargo mutants, such as --file src/math/pid.rs or --shard 0/8]
+# Changes src/math, src/protocol, src/actors and src/web one small thing at a time (cargo-mutants) and counts how many changes a test notices: the
+# mutation score.
+# usage: scripts/mutants.sh [--fresh] [math|protocol|actors] [options of cargo mutants, such as --file src/math/pid.rs or --shard 0/8]
+#
+# `actors`, only when it is asked for, is src/actors with src/web; what they are made of (src/math, src/protocol, src/study, src/report) is a crate below, compiled once.
 #
 # The whole project would take minutes per mutant. So a layer is laid out alone, as a crate of its own under target/mutants (or MUTANTS_DIR),
 # with its integration tests as modules: one file to compile, incrementally, and one program to link and run. It ends at its first failed test.
-# Fewer tests run than in `make test`, which can only lower the score: no documentation tests, not the long runs of tests/math_default_gains.rs, and 64
+# Fewer tests run than in `make test`, which can only lower the score: no documentation tests, not the long runs of tests/math/default_gains.rs, and 64
 # random cases where a property test takes its number from proptest (256).
 #
 # Outcomes are kept. A later run takes up where the last one ended, and redoes what was missed and what is in a source file that has changed. A test
@@ -14,8 +17,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 bar=90
-# Processor time of one run of a layer's tests, which need about 2 s and 0.6 s: what loops is caught so, however busy the machine is.
-declare -A cpu_seconds=([math]=10 [protocol]=6)
+# Processor time of one run of a layer's tests, which need about 2 s and 0.6 s (the actors' are not measured yet): what loops is caught so, however busy the machine is.
+declare -A cpu_seconds=([math]=10 [protocol]=6 [actors]=60)
 base=${MUTANTS_DIR:-$root/target/mutants}
 # Each layer builds in its own folder.
 unset CARGO_TARGET_DIR RUSTFLAGS
@@ -25,15 +28,35 @@ fail() { echo "mutants: $*" >&2; exit 1; }
 fresh=0
 [ "${1:-}" != --fresh ] || { fresh=1; shift; }
 layers=(math protocol)
-case "${1:-}" in math | protocol) layers=("$1"); shift ;; esac
+case "${1:-}" in math | protocol | actors) layers=("$1"); shift ;; esac
 cargo mutants --version >/dev/null 2>&1 || fail "needs cargo-mutants: cargo install --locked cargo-mutants"
 
 # The dependencies that the layer or its tests name, as Cargo.toml has them.
 dependencies() { # layer, section of Cargo.toml
     awk -v section="[$2]" '/^\[/ { on = $0 == section; next } on && /^[a-z]/' "$root/Cargo.toml" | while read -r line; do
         name=${line%% *}
-        if grep -rqE "\b${name//-/_}::" "$root/src/$1" "$root"/tests/"$1"_*; then echo "$line"; fi
+        if grep -rqE "\b${name//-/_}::" "$root/src/$1" "$root/tests/$1"; then echo "$line"; fi
     done
+}
+
+section() { # name, of Cargo.toml
+    awk -v section="[$1]" '/^\[/ { on = $0 == section } on && NF' "$root/Cargo.toml"
+}
+
+# What the actors are made of, a crate of its own that no mutant changes, and what stands beside them.
+lay_out_below() { # folder
+    local part
+    rm -rf "$1/below" "$1/page"
+    mkdir -p "$1/below/src"
+    for part in math protocol report study; do cp -R "$root/src/$part" "$1/below/src/"; echo "pub mod $part;"; done >"$1/below/src/lib.rs"
+    sed -i 's/^pub(crate) mod /pub mod /; s/^pub(crate) fn /pub fn /' "$1"/below/src/protocol/{mod,wire/mod,wire/text}.rs
+    {
+        echo '[package]'; echo 'name = "below"'; grep '^\(edition\|version\)' "$root/Cargo.toml"
+        section features; section dependencies
+    } >"$1/below/Cargo.toml"
+    cp -R "$root/page" "$1/"
+    cp -R "$root/src/web" "$root/src/options" "$root/src/logging.rs" "$1/src/"
+    printf 'examine_globs = ["src/actors/**", "src/web/**"]\n' >"$1/.cargo/mutants.toml"
 }
 
 lay_out() { # layer, folder
@@ -43,26 +66,39 @@ lay_out() { # layer, folder
     mkdir "$2/src" "$2/tests"
     # New files, with new times: a mutant that an interrupted run left behind was compiled after the original was written.
     cp -R "$root/src/$1" "$2/src/"
-    cp -R "$root"/tests/"$1"_* "$root/tests/data" "$2/tests/"
+    cp -R "$root/tests/$1" "$root"/tests/{data,support} "$2/tests/"
     cp "$root/Cargo.lock" "$2/"
+    if [ "$1" = actors ]; then lay_out_below "$2"; fi
     {
         echo '[package]'; echo 'name = "pendularm"'; grep '^edition' "$root/Cargo.toml"; echo 'autotests = false'; echo '[workspace]'
-        echo '[dependencies]'; dependencies "$1" dependencies
-        echo '[dev-dependencies]'; dependencies "$1" dev-dependencies
-        echo '[profile.dev]'; echo 'opt-level = 1'; echo 'debug = false'; echo 'lto = "off"'
+        if [ "$1" = actors ]; then
+            section features; section dependencies; echo 'below = { path = "below" }'; section dev-dependencies
+        else
+            echo '[dependencies]'; dependencies "$1" dependencies
+            echo '[dev-dependencies]'; dependencies "$1" dev-dependencies
+        fi
+        echo '[profile.dev]'; echo 'debug = false'; echo 'lto = "off"'
+        # The actors are compiled again for each mutant and compute little; what they are made of is compiled once.
+        if [ "$1" = actors ]; then echo '[profile.dev.package."*"]'; fi
+        echo 'opt-level = 1'
     } >"$2/Cargo.toml"
     {
         echo 'extern crate self as pendularm;'
+        if [ "$1" = actors ]; then
+            echo 'pub use below::{math, protocol, report, study};'
+            echo 'pub mod logging; pub mod options; pub mod web;'
+        fi
         echo "pub mod $1;"
         echo '#[cfg(test)] mod first_failure;'
-        for test in "$root"/tests/"$1"_*; do
-            name=$(basename "$test" .rs)
-            [ "$name" != math_default_gains ] || continue
+        # What the tests share stands at the root of their crate, under its own name.
+        sed -n 's|^#\[path = "../support/\(.*\)\.rs"\]$|#[cfg(test)] #[path = "../tests/support/\1.rs"] mod \1;|p' "$root/tests/$1/main.rs"
+        sed -n 's/^mod \([a-z_]*\);$/\1/p' "$root/tests/$1/main.rs" | while read -r name; do
+            if [ "$name" = default_gains ] || [ -e "$root/tests/support/$name.rs" ]; then continue; fi
             # Tests run in the order of their names: those that take a second come last.
-            case $name in math_expression) order=slow_ ;; *) order= ;; esac
-            test="../tests/$name"
-            if [ -d "$2/src/$test" ]; then test=$test/main; fi
-            echo "#[cfg(test)] #[path = \"$test.rs\"] mod $order$name;"
+            case $name in expression) order=slow ;; *) order=test ;; esac
+            test="../tests/$1/$name"
+            if [ -d "$2/src/$test" ]; then test=$test/mod; fi
+            echo "#[cfg(test)] #[path = \"$test.rs\"] mod ${order}_$name;"
         done
     } >"$2/src/lib.rs"
     cat >"$2/src/first_failure.rs" <<'RUST'
