@@ -114,12 +114,12 @@ fn plot(panel: &Panel, x: &Axis, y: &Axis) -> Plot {
                     "c3" => parts.rounding,
                     _ => parts.hold,
                 };
-                let told = format!(
+                let tooltip = format!(
                     "{name}: {} rad at {}",
                     scientific(value),
                     seconds(parts.timestep)
                 );
-                Point::new(parts.timestep, value, told)
+                Point::new(parts.timestep, value, tooltip)
             })
             .filter(|point| point.y != 0.0)
             .collect();

@@ -165,7 +165,7 @@ fn figure(swings: &[Swing]) -> Figure {
                     plot.marks.push(Mark::Vertical {
                         x: at,
                         class: method.name(),
-                        told: format!("{method}: horizon {} s", number(at)),
+                        tooltip: format!("{method}: horizon {} s", number(at)),
                     });
                 }
             }
@@ -297,14 +297,14 @@ fn verdict(swing: &Swing) -> Verdict {
         .into_iter()
         .map(|method| swing.horizon(method, SHOWN).unwrap_or(f64::INFINITY))
         .collect();
-    let told = |at: &f64| {
+    let shown = |at: &f64| {
         if at.is_finite() {
             format!("{} s", number(*at))
         } else {
             format!("after {} s", number(swing.known_until()))
         }
     };
-    let text: Vec<String> = horizons.iter().map(told).collect();
+    let text: Vec<String> = horizons.iter().map(shown).collect();
     let holds = match horizons.as_slice() {
         &[euler, midpoint, verlet, rk4] => {
             euler < midpoint.min(verlet) && midpoint.max(verlet) < rk4

@@ -71,16 +71,16 @@ pub(crate) struct Point {
     pub(crate) y: f64,
     /// From and to, along x.
     pub(crate) spread: Option<(f64, f64)>,
-    pub(crate) told: String,
+    pub(crate) tooltip: String,
 }
 
 impl Point {
-    pub(crate) fn new(x: f64, y: f64, told: impl Into<String>) -> Self {
+    pub(crate) fn new(x: f64, y: f64, tooltip: impl Into<String>) -> Self {
         Self {
             x,
             y,
             spread: None,
-            told: told.into(),
+            tooltip: tooltip.into(),
         }
     }
 }
@@ -130,7 +130,7 @@ pub(crate) enum Mark {
     Vertical {
         x: f64,
         class: &'static str,
-        told: String,
+        tooltip: String,
     },
     /// A line across at `y`, labelled.
     Horizontal {

@@ -141,12 +141,12 @@ impl Plot {
     fn mark(&self, out: &mut String, mark: &Mark) -> std::fmt::Result {
         let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
         match mark {
-            Mark::Vertical { x, class, told } if self.x.holds(*x) => {
+            Mark::Vertical { x, class, tooltip } if self.x.holds(*x) => {
                 let x = self.across(*x);
                 write!(
                     out,
                     "<path class=\"edge {class}\" d=\"M{x:.1} {bottom}V{TOP}\"><title>{}</title></path>",
-                    escape(told)
+                    escape(tooltip)
                 )
             }
             Mark::Horizontal {
@@ -241,12 +241,12 @@ impl Plot {
     }
 
     fn point(&self, out: &mut String, marker: Marker, point: &Point) -> std::fmt::Result {
-        let told = escape(&point.told);
+        let tooltip = escape(&point.tooltip);
         let x = self.across(point.x);
         if self.lost(point) {
             return write!(
                 out,
-                "<path class=\"lost\" d=\"M{:.1} {:.1}l7 7m0 -7l-7 7\"><title>{told}</title></path>",
+                "<path class=\"lost\" d=\"M{:.1} {:.1}l7 7m0 -7l-7 7\"><title>{tooltip}</title></path>",
                 x - 3.5,
                 TOP + 2.5
             );
@@ -264,7 +264,7 @@ impl Plot {
         }
         write!(
             out,
-            "<path class=\"marker\" d=\"{}\"><title>{told}</title></path>",
+            "<path class=\"marker\" d=\"{}\"><title>{tooltip}</title></path>",
             marker.path(x, y)
         )
     }

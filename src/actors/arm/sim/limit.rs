@@ -11,8 +11,9 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::ArmSim;
-use crate::math::arm::State;
+use super::messages::{ArmSettings, Consult, HeldLimit, Present};
+use super::node::ArmSim;
+use super::state::limit::{resemble, share_limit};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::ErrorEstimateMessage;
 use crate::study::control_loop::ControlLoop;
@@ -22,71 +23,6 @@ use crate::study::motion::Motion;
 /// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may come
 /// by the thousand a second.
 pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
-
-// ---- state ----------------------------------------------------------------------------------------------------------
-
-/// The arm's memory of its limit.
-pub(super) struct LimitWatch<const N: usize> {
-    /// Who predicts, if anybody does.
-    study: Option<Recipient<HeldLimit<N>>>,
-    /// The loop that was last asked about, and when.
-    asked: Option<(ControlLoop<N>, Instant)>,
-    /// The answer is on its way.
-    waiting: bool,
-    /// The latest answer \[s\], infinite where nothing limits, and the loop that it is about.
-    known: Option<(ControlLoop<N>, f64)>,
-    /// Whether the timestep was too long when that was last published.
-    warned: bool,
-}
-
-impl<const N: usize> Default for LimitWatch<N> {
-    fn default() -> Self {
-        Self {
-            study: None,
-            asked: None,
-            waiting: false,
-            known: None,
-            warned: false,
-        }
-    }
-}
-
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// Whether two loops have one limit: it depends on everything but the timestep.
-fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.setpoint == other.setpoint && resemble(one, other)
-}
-
-/// Whether two loops differ in setpoint and timestep at most.
-fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.arm == other.arm && one.gains == other.gains && one.method == other.method
-}
-
-/// The arm's settings as they are now. From `study`, at every call.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Present<N>")]
-pub struct ArmSettings<const N: usize>;
-
-/// The arm's settings at one instant.
-#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
-pub struct Present<const N: usize> {
-    /// The loop, with the gains as they are set, whether the controller is on or off.
-    pub control: ControlLoop<N>,
-    /// Where the arm is and how it moves.
-    pub state: State<N>,
-}
-
-/// The largest stable timestep \[s\] of a loop with held control, infinite where nothing limits. From the arm to `study`;
-/// none if the runtime ends meanwhile.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Option<f64>")]
-pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
-
-/// Whom to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 

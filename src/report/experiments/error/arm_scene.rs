@@ -115,9 +115,9 @@ impl<const N: usize> ArmScene<N> {
         }
     }
 
-    fn tip_distance(&self, exact: &[DoubleDouble; N], position: &[f64; N]) -> f64 {
-        let tip = |q| forward(self.arm.lengths(), q).position;
-        tip(&exact.map(DoubleDouble::to_f64)).distance(tip(position))
+    fn end_effector_distance(&self, exact: &[DoubleDouble; N], position: &[f64; N]) -> f64 {
+        let end_effector = |q| forward(self.arm.lengths(), q).position;
+        end_effector(&exact.map(DoubleDouble::to_f64)).distance(end_effector(position))
     }
 
     /// The control loop that the live arm would have.
@@ -150,12 +150,12 @@ impl<const N: usize> Scene for ArmScene<N> {
         let law = match &self.drive {
             Drive::Free => "no control".to_owned(),
             Drive::Continuous(gains, setpoint) => {
-                format!("law in every stage, {}", told(gains, setpoint))
+                format!("law in every stage, {}", describe(gains, setpoint))
             }
             Drive::Held(gains, setpoint) => {
                 format!(
                     "effort held for each step, {}, error against the continuous law",
-                    told(gains, setpoint)
+                    describe(gains, setpoint)
                 )
             }
         };
@@ -217,7 +217,7 @@ impl<const N: usize> Scene for ArmScene<N> {
                 worst.take(
                     spacing * in_f64(step / every),
                     largest_difference(exact, &state.position),
-                    self.tip_distance(exact, &state.position),
+                    self.end_effector_distance(exact, &state.position),
                 )
             },
         );
@@ -228,7 +228,7 @@ impl<const N: usize> Scene for ArmScene<N> {
             evaluations,
             error: worst.error,
             end_error: worst.end_error,
-            tip_error: worst.tip_error,
+            end_effector_error: worst.end_effector_error,
             energy_drift: conserved.then_some(drift / self.energy_scale),
             diverged: worst.diverged,
         }
@@ -293,7 +293,7 @@ fn law<const N: usize>(
     pid.control(&state, 0.0).effort
 }
 
-fn told<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> String {
+fn describe<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> String {
     format!(
         "kp {:?}, kd {:?}, to {:?} rad",
         gains.kp, gains.kd, setpoint.position

@@ -83,7 +83,7 @@ impl Scene for ParticleScene {
             evaluations,
             error: worst.error,
             end_error: worst.end_error,
-            tip_error: worst.tip_error,
+            end_effector_error: worst.end_effector_error,
             energy_drift: None,
             diverged: worst.diverged,
         }

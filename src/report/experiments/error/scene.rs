@@ -27,8 +27,8 @@ pub struct Outcome {
     pub error: f64,
     /// Largest angle error at the last output \[rad\].
     pub end_error: f64,
-    /// Largest distance of the tip from where it should be \[m\].
-    pub tip_error: f64,
+    /// Largest distance of the end effector from where it should be \[m\].
+    pub end_effector_error: f64,
     /// Largest `|E - E(0)|` over the scene's energy scale; `None` where energy is not conserved.
     pub energy_drift: Option<f64>,
     /// The output time at which the run was lost or left the finite numbers \[s\], if it was.
@@ -69,7 +69,7 @@ pub trait Scene {
 pub(super) struct Worst {
     pub(super) error: f64,
     pub(super) end_error: f64,
-    pub(super) tip_error: f64,
+    pub(super) end_effector_error: f64,
     pub(super) diverged: Option<f64>,
 }
 
@@ -77,22 +77,22 @@ impl Worst {
     pub(super) const NONE: Self = Self {
         error: 0.0,
         end_error: 0.0,
-        tip_error: 0.0,
+        end_effector_error: 0.0,
         diverged: None,
     };
 
     /// Takes in one output; `false` once there is nothing left to compare.
-    pub(super) fn take(&mut self, time: f64, error: f64, tip_error: f64) -> bool {
+    pub(super) fn take(&mut self, time: f64, error: f64, end_effector_error: f64) -> bool {
         if error.is_nan() || error > LOST {
             self.diverged = Some(time);
             self.error = f64::INFINITY;
             self.end_error = f64::INFINITY;
-            self.tip_error = f64::INFINITY;
+            self.end_effector_error = f64::INFINITY;
             return false;
         }
         self.error = self.error.max(error);
         self.end_error = error;
-        self.tip_error = self.tip_error.max(tip_error);
+        self.end_effector_error = self.end_effector_error.max(end_effector_error);
         true
     }
 }

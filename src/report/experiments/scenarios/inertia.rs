@@ -1,4 +1,4 @@
-//! S16 to S26: light and heavy tips, short and long links, stretched, folded, whirling.
+//! S16 to S26: light and heavy outer links, short and long links, stretched, folded, whirling.
 //!
 //! **Invariant:** accelerations are compared with ones in twice the digits, measured limits with predicted ones.
 
@@ -34,7 +34,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "2 links, outer mass 1e-3 kg, kp 200 and 100, kd 30 and 12",
         expected: LIGHT,
         slow: false,
-        check: || light_tip(1e-3),
+        check: || light_outer_link(1e-3),
     },
     Scenario {
         id: "S17",
@@ -42,7 +42,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "2 links, outer mass 1e-6 kg, kp 200 and 100, kd 30 and 12",
         expected: LIGHT,
         slow: false,
-        check: || light_tip(1e-6),
+        check: || light_outer_link(1e-6),
     },
     Scenario {
         id: "S18",
@@ -50,7 +50,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "2 links, outer mass 1e-9 kg, kp 200 and 100, kd 30 and 12",
         expected: LIGHT,
         slow: false,
-        check: || light_tip(1e-9),
+        check: || light_outer_link(1e-9),
     },
     Scenario {
         id: "S19",
@@ -58,7 +58,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "3 links, outer mass 1e3 kg, anywhere",
         expected: HEAVY,
         slow: false,
-        check: || heavy_tip(1e3),
+        check: || heavy_outer_link(1e3),
     },
     Scenario {
         id: "S20",
@@ -66,7 +66,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "3 links, outer mass 1e6 kg, anywhere",
         expected: HEAVY,
         slow: false,
-        check: || heavy_tip(1e6),
+        check: || heavy_outer_link(1e6),
     },
     Scenario {
         id: "S21",
@@ -74,7 +74,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "3 links, outer mass 1e9 kg, anywhere",
         expected: HEAVY,
         slow: false,
-        check: || heavy_tip(1e9),
+        check: || heavy_outer_link(1e9),
     },
     Scenario {
         id: "S22",
@@ -118,8 +118,8 @@ pub(super) const SCENES: [Scenario; 11] = [
     },
 ];
 
-fn light_tip(tip: f64) -> Verdict {
-    let Some(arm) = arm([1.0, tip], 9.81) else {
+fn light_outer_link(mass: f64) -> Verdict {
+    let Some(arm) = arm([1.0, mass], 9.81) else {
         return verdict(false, "no such arm".to_owned());
     };
     let digits = digits_lost(&arm, &states([0.0, 0.0], PI));
@@ -141,7 +141,7 @@ fn light_tip(tip: f64) -> Verdict {
         .map(|(measured, predicted)| measured / predicted);
     let agree = ratio.is_some_and(|ratio| (ratio - 1.0).abs() < 0.01);
     // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.
-    let alone = 2.0 * (tip / 3.0) / gains.kd[1];
+    let alone = 2.0 * (mass / 3.0) / gains.kd[1];
     let as_light = predicted.is_some_and(|limit| (limit / alone - 1.0).abs() < 0.01);
     verdict(
         digits <= DIGITS && agree && as_light,
@@ -153,8 +153,8 @@ fn light_tip(tip: f64) -> Verdict {
     )
 }
 
-fn heavy_tip(tip: f64) -> Verdict {
-    let digits = arm([1.0, 1.0, tip], 9.81).map(|arm| digits_lost(&arm, &states([0.0; 3], PI)));
+fn heavy_outer_link(mass: f64) -> Verdict {
+    let digits = arm([1.0, 1.0, mass], 9.81).map(|arm| digits_lost(&arm, &states([0.0; 3], PI)));
     verdict(
         digits.is_some_and(|digits| digits <= DIGITS),
         digits.map_or_else(String::new, |digits| format!("{digits:.1} digits lost")),

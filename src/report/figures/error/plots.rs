@@ -2,8 +2,9 @@
 //!
 //! **Invariant:** the same error axis in every panel.
 
+use super::data::{Data, Run};
 use super::words::{headline_evaluations, headline_time, headline_timestep};
-use super::{Data, Run, in_f64};
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::experiments::error::Outcome;
 use crate::report::section::Figure;
@@ -14,7 +15,7 @@ fn error_axis() -> Axis {
     Axis::log_between("largest error [rad]", Unit::Number, 1e-17, 10.0)
 }
 
-fn told(data: &Data, run: &Run) -> String {
+fn tooltip(data: &Data, run: &Run) -> String {
     let Outcome {
         timestep,
         evaluations,
@@ -45,7 +46,7 @@ fn panels(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
                 let points = data.of(method).map(|run| {
                     // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
                     let error = run.outcome.error.max(1e-17);
-                    Point::new(of(run), error, told(data, run))
+                    Point::new(of(run), error, tooltip(data, run))
                 });
                 plot.series.push(Series::of(method, points.collect()));
             }
@@ -132,7 +133,7 @@ pub(super) fn against_timestep(data: &[Data]) -> Figure {
                 plot.marks.push(Mark::Vertical {
                     x: limit,
                     class: method.name(),
-                    told: format!("{method}: predicted stability limit {}", seconds(limit)),
+                    tooltip: format!("{method}: predicted stability limit {}", seconds(limit)),
                 });
             }
         }

@@ -1,9 +1,10 @@
-//! The tables: cheapest methods, orders, real-time factors, scenes.
+//! The tables: cheapest methods, orders, real-time factors, scenes, and every run in numbers.
 //!
 //! **Invariant:** what no run reached is called not reached.
 
-use super::{Data, TARGETS, best};
+use super::data::{Data, Run, TARGETS, best};
 use crate::math::integrator::Method;
+use crate::report::csv::{Csv, Field};
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, power, scientific, seconds};
 
@@ -129,4 +130,47 @@ pub(super) fn scene_list(data: &[Data]) -> Table {
         ]);
     }
     table
+}
+
+/// Every run in numbers, for the file beside the page.
+pub(super) fn table_of_runs(data: &[Data]) -> Csv {
+    let mut csv = Csv::new(
+        "scene,links,method,variant,control,dt,n_steps,rhs_evals,wall_min_s,wall_med_s,wall_iqr_s,repeats,\
+         err_max_rad,err_end_rad,err_tip_m,dE_max_scaled,status,ref_uncertainty",
+    );
+    for data in data {
+        for run in &data.runs {
+            let Run {
+                method,
+                outcome,
+                timing,
+            } = run;
+            let (low, high) = timing.quartiles;
+            csv.row(&[
+                data.scene.name().into(),
+                (data.scene.links() as u64).into(),
+                method.name().into(),
+                "as shipped".into(),
+                data.scene.control().into(),
+                outcome.timestep.into(),
+                outcome.steps.into(),
+                outcome.evaluations.into(),
+                timing.minimum.into(),
+                timing.median.into(),
+                (high - low).into(),
+                timing.repeats.into(),
+                outcome.error.into(),
+                outcome.end_error.into(),
+                outcome.end_effector_error.into(),
+                outcome.energy_drift.into(),
+                Field::Text(if outcome.diverged.is_some() {
+                    "diverged"
+                } else {
+                    "finished"
+                }),
+                data.scene.uncertainty().into(),
+            ]);
+        }
+    }
+    csv
 }

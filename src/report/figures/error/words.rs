@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
-use super::{Data, best};
+use super::data::{Data, best};
 use crate::math::integrator::Method;
 use crate::report::section::Verdict;
 use crate::report::svg::{number, scientific, seconds};

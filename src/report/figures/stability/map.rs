@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
 
-use super::{Meter, stiffened};
+use super::line::{Meter, stiffened};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
@@ -124,8 +124,8 @@ impl Map {
             row.push(level(growth));
             self.cells += 1;
             if growth.is_some_and(|growth| growth < 1.0) != (h < limit) {
-                let told = format!("predicted limit {}", seconds(limit));
-                disagreeing.push(Point::new(h, factor, told));
+                let tooltip = format!("predicted limit {}", seconds(limit));
+                disagreeing.push(Point::new(h, factor, tooltip));
             }
         }
         (limit, row)

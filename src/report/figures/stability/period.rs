@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** what takes too long to measure is called not measured.
 
-use super::{Meter, stiffened};
+use super::line::{Meter, stiffened};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::growth::growth_per_period;
@@ -164,11 +164,11 @@ impl Growth {
                 }
                 self.dots += 1;
                 self.furthest = self.furthest.max((measured / expected - 1.0).abs());
-                let told = format!(
+                let tooltip = format!(
                     "{substeps} steps in {}: {measured:.5} measured, {expected:.5} predicted",
                     seconds(period)
                 );
-                points.push(Point::new(period, measured, told));
+                points.push(Point::new(period, measured, tooltip));
             }
             plot.series.push(Series {
                 class,

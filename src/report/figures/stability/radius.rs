@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** lines are predicted, marks are measured.
 
-use super::{Line, capital, shipped, stiffened, told};
+use super::line::{Line, capital, in_words, shipped, stiffened};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::section::Figure;
@@ -28,7 +28,7 @@ pub(super) fn radius_figure(lines: &[Line]) -> (Figure, Csv) {
 fn panel(lines: &[Line], sampling: Sampling, csv: &mut Csv) -> Plot {
     let x = Axis::log_between("timestep", Unit::Seconds, 5e-4, 2e-2);
     let y = Axis::linear("growth per step (spectral radius)", 0.9, 1.1);
-    let mut plot = Plot::new(capital(told(sampling)), x, y);
+    let mut plot = Plot::new(capital(in_words(sampling)), x, y);
     plot.marks.push(Mark::Horizontal {
         y: 1.0,
         class: "ink",
@@ -57,13 +57,13 @@ fn panel(lines: &[Line], sampling: Sampling, csv: &mut Csv) -> Plot {
             ..Series::line(method.name(), shown)
         });
         if let Some(limit) = shipped(lines, sampling, method).and_then(|line| line.measured) {
-            let told = format!("{method}: measured limit {}", seconds(limit));
+            let tooltip = format!("{method}: measured limit {}", seconds(limit));
             plot.series.push(Series {
                 class: method.name(),
                 marker: Marker::of(method),
                 line: false,
                 dashed: false,
-                points: vec![Point::new(limit, 1.0, told)],
+                points: vec![Point::new(limit, 1.0, tooltip)],
             });
         }
     }

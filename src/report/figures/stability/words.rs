@@ -2,9 +2,9 @@
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
+use super::line::{AGREEMENT, Line, shipped};
 use super::map::Map;
 use super::period::{Growth, Period};
-use super::{AGREEMENT, Line, shipped};
 use crate::math::integrator::Method;
 use crate::report::section::Verdict;
 use crate::report::svg::{number, seconds};

@@ -6,12 +6,13 @@
 //! **Invariant:** no number in here that was not measured for this report.
 
 mod cells;
+mod counts;
 mod server;
 mod tables;
 
-use std::collections::HashMap;
 use std::hint::black_box;
 
+use counts::{Counts, Kind, STEPS, read};
 use tables::{steps_table, table};
 
 use crate::math::arm::{Arm, State};
@@ -25,25 +26,7 @@ use crate::report::csv::Csv;
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Bars, number};
-use crate::report::timing::{Effort, Timing, time};
-
-const STEPS: u64 = 20_000;
-
-/// One kind of step, by the name that `benches/src/bin/work.rs` knows it by.
-struct Kind {
-    name: &'static str,
-    timing: Timing,
-}
-
-impl Kind {
-    /// Time of one step \[s\].
-    fn step_time(&self) -> f64 {
-        self.timing.minimum / in_f64(STEPS)
-    }
-}
-
-/// Counts by name, as the script left them.
-type Counts = HashMap<String, f64>;
+use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let counts = read(making);
@@ -72,18 +55,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         ],
         ..Section::default()
     }
-}
-
-fn read(making: &Making<'_>) -> Counts {
-    let text = std::fs::read_to_string(making.out.join("work.csv")).unwrap_or_default();
-    text.lines()
-        .skip(1)
-        .filter_map(|line| {
-            let mut fields = line.split(',');
-            let name = fields.next()?.to_owned();
-            Some((name, fields.next()?.parse().ok()?))
-        })
-        .collect()
 }
 
 fn start<const N: usize>(

@@ -3,8 +3,9 @@
 //! **Invariant:** what was not counted for this report is called not measured.
 
 use super::cells::{UNMEASURED, percent_saved, unmeasured};
+use super::counts::{Counts, Kind, STEPS};
 use super::server;
-use super::{Counts, Kind, STEPS, in_f64};
+use crate::math::count::in_f64;
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, seconds};
 

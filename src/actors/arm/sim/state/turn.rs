@@ -8,9 +8,6 @@
 
 use std::time::{Duration, Instant};
 
-use actix::prelude::*;
-
-use super::ArmSim;
 use crate::actors::compute::work_clock;
 
 /// Work on messages in a row: what a tick may come late.
@@ -19,13 +16,13 @@ pub const TURN: Duration = Duration::from_millis(1);
 pub const TURN_MESSAGES: usize = 64;
 
 /// The messages since the arm last let its timers have their turn.
-pub(super) struct Turn {
+pub(crate) struct Turn {
     began: Instant,
     messages: usize,
 }
 
 impl Turn {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             began: work_clock::now(),
             messages: 0,
@@ -33,18 +30,8 @@ impl Turn {
     }
 
     /// Counts a message; whether the turn ends with it.
-    fn count(&mut self) -> bool {
+    pub(crate) fn count(&mut self) -> bool {
         self.messages += 1;
         self.messages >= TURN_MESSAGES || work_clock::now() - self.began >= TURN
-    }
-}
-
-impl<const N: usize> ArmSim<N> {
-    /// To be called at every message: ends the turn with it if enough has been done in a row.
-    pub(super) fn count_message(&mut self, ctx: &mut Context<Self>) {
-        if self.turn.count() {
-            let others = tokio::task::yield_now().into_actor(self);
-            ctx.wait(others.map(|(), arm, _| arm.turn = Turn::new()));
-        }
     }
 }
