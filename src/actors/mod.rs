@@ -1,5 +1,5 @@
-//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*; what clients
-//! write is read, and what they read written, beside them.
+//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*; what
+//! clients write is read, and what they read written, beside them.
 //!
 //! ```text
 //!              accepts                 Request, Disconnect                  Call of a question, SetSetpoint, Interest
@@ -9,8 +9,8 @@
 //!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial, rosapi
 //! ```
 //!
-//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read by the `wire` beside the node, or from
-//! another node; the [`node::Reply`] knows the way back.
+//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read by the `wire` beside the node,
+//! or from another node; the [`node::Reply`] knows the way back.
 //!
 //! | message | from | to | meaning |
 //! | --- | --- | --- | --- |
@@ -49,6 +49,7 @@ pub mod compute;
 pub mod gateway;
 pub mod node;
 pub mod panics;
+pub mod resources;
 pub mod ros;
 pub mod runtime;
 pub mod signals;

@@ -1,10 +1,10 @@
 //! The language of the nodes: questions with their one answer, messages on topics, interest.
 //!
-//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. Who asks, a client
-//! or another node, is behind the [`Reply`]: the node does not know.
+//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. Who asks, a
+//! client or another node, is behind the [`Reply`]: the node does not know.
 //!
-//! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that is
-//! dropped unanswered says so itself.
+//! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that
+//! is dropped unanswered says so itself.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use crate::actors::gateway::budget::NoRoom;
+use crate::actors::resources::budget::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::Level;
 
@@ -126,8 +126,8 @@ pub trait Asker<T>: Send {
 
 /// The way back to whoever asked: one answer, then the end of the call.
 ///
-/// A client that called is read no further until this value is dropped, so that a call that has effects after its answer
-/// (a goal's setpoint) has had them before the client's next request is looked at.
+/// A client that called is read no further until this value is dropped, so that a call that has effects after its
+/// answer (a goal's setpoint) has had them before the client's next request is looked at.
 pub struct Reply<T> {
     /// None once the answer has been given.
     asker: Option<Box<dyn Asker<T>>>,
@@ -250,7 +250,8 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has not.
+/// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has
+/// not.
 pub enum Frame {
     /// As it goes out.
     Written(Bytes),
@@ -307,7 +308,8 @@ pub struct Respond {
     pub done: Option<Done>,
 }
 
-/// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the goal.
+/// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the
+/// goal.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Feedback {

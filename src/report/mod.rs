@@ -1,8 +1,9 @@
 //! The study as a page to look at: `pendularm report --out report/`.
 //!
-//! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one `.csv` and
-//! `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their files. What is
-//! measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the drawing are.
+//! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one
+//! `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their
+//! files. What is measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the
+//! drawing are.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 

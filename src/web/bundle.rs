@@ -1,10 +1,10 @@
 //! The page's modules as one file, so that a browser asks once instead of sixty times.
 //!
-//! Each module becomes a function that runs once and returns what the module exports. The file exports them all as `modules`,
-//! by their names.
+//! Each module becomes a function that runs once and returns what the module exports. The file exports them all as
+//! `modules`, by their names.
 //!
-//! **Invariant:** a module stands after all that it imports. The modules keep to the few forms that are known here: imports in
-//! braces from a file beside, exports of one declaration each, and no cycle.
+//! **Invariant:** a module stands after all that it imports. The modules keep to the few forms that are known here:
+//! imports in braces from a file beside, exports of one declaration each, and no cycle.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -59,7 +59,7 @@ fn add(name: &str, modules: &[Module<'_>], added: &mut BTreeSet<String>, text: &
     );
 }
 
-/// What `import { names } from "./file";` names, and the file; `None` while it goes on in the next line.
+/// The names in `import { names } from "./file";`, and the file; `None` while it goes on in the next line.
 fn imported(import: &str) -> Option<(&str, &str)> {
     let (names, from) = import.strip_prefix("import {")?.split_once("} from \"./")?;
     Some((names, from.split_once('"')?.0))

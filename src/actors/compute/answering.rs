@@ -4,10 +4,10 @@
 
 use std::time::Instant;
 
-use super::work_clock;
 use super::workers::{Computation, Progress, WorkerPool};
-use crate::actors::gateway::budget::NoRoom;
 use crate::actors::node::{Pieces, Reply, Unserved};
+use crate::actors::resources::budget::NoRoom;
+use crate::actors::resources::work_clock;
 
 /// The longest number and the comma behind it, and the number itself while the answer is computed.
 pub(super) const NUMBER_BYTES: usize = 25 + 8;

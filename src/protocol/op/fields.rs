@@ -75,7 +75,8 @@ impl<'a> Fields<'a> {
         Ok(read)
     }
 
-    /// The same; arguments that are rejected as a whole count as none, so that the answer can echo the values as they are.
+    /// The same; arguments that are rejected as a whole count as none, so that the answer can echo the values as they
+    /// are.
     #[must_use]
     pub fn read_or_none(args: &'a Arguments, service: Service) -> Self {
         Self::read(args, service).unwrap_or_else(|rejection| Self {

@@ -1,11 +1,12 @@
 //! Where an error comes from: truncation, rounding, and the effort held for a step.
 //!
-//! With `live` the live arm's steps in doubles, `exact` the same steps with 106 bits, `plant` the true motion under the effort
-//! that these steps hold, and `law` the true motion under the law at every instant:
+//! With `live` the live arm's steps in doubles, `exact` the same steps with 106 bits, `plant` the true motion under the
+//! effort that these steps hold, and `law` the true motion under the law at every instant:
 //!
 //! `live - law = (live - exact) + (exact - plant) + (plant - law)`: rounding, truncation, control hold.
 //!
-//! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the others.
+//! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the
+//! others.
 
 use super::error::{OUTPUTS, REACH_GAINS, REACH_SETPOINT, SAMPLES};
 use super::reference::{DoubleDouble, Law, Reference, exact_steps, largest_difference};

@@ -1,8 +1,8 @@
 //! How many digits the accelerations of an arm lose, by mass ratio, pose and way of solving.
 //!
-//! Truth is the Lagrangian with 106 bits ([`exact_acceleration`]). Two ways are compared with it: the live arm's recursion, and
-//! the textbook's: form `M(q)` in joint space and eliminate. What a half-unit change in the last place of the angles does to the
-//! truth is shown beside them: no way can be asked for more.
+//! Truth is the Lagrangian with 106 bits ([`exact_acceleration`]). Two ways are compared with it: the live arm's
+//! recursion, and the textbook's: form `M(q)` in joint space and eliminate. What a half-unit change in the last place
+//! of the angles does to the truth is shown beside them: no way can be asked for more.
 //!
 //! **Invariant:** the same states for every way.
 

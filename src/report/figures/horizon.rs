@@ -267,7 +267,7 @@ fn finding(swing: &Swing) -> Option<String> {
         .into_iter()
         .filter_map(|every| Some((every, swing.horizon(Method::Rk4, every)?)));
     let end = floor.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(every, at)| {
-        // What truncation alone would buy: the fourth power of the ratio of timesteps.
+        // Truncation alone would buy the fourth power of the ratio of timesteps.
         let ratio = timestep(1024) / timestep(every);
         let bought = ratio.powi(4).ln() * swing.lyapunov_time();
         format!(

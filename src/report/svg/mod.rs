@@ -1,7 +1,8 @@
-//! Small SVG plots: log axes, lines, markers, marks that explain, heat maps. No library, no script, no colour of its own.
+//! Small SVG plots: log axes, lines, markers, marks that explain, heat maps. No library, no script, no colour of its
+//! own.
 //!
-//! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with a marker
-//! shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
+//! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with
+//! a marker shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
 //!
 //! **Invariant:** whatever has no place on the axes is drawn at the edge as lost, never dropped in silence.
 

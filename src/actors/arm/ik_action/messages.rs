@@ -9,7 +9,7 @@ use actix::prelude::*;
 use crate::actors::arm::ik::SolveError;
 use crate::actors::arm::sim::Pose;
 use crate::actors::node::{Ask, Done};
-use crate::actors::ros::follower::{Canceller, Follower};
+use crate::actors::wire::follower::{Canceller, Follower};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
 use crate::protocol::catalog::Node;

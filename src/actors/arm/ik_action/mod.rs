@@ -1,9 +1,9 @@
 //! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
 //! `/ik_action/result`.
 //!
-//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the setpoint.
-//! Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears nothing else,
-//! so that goals follow one another whole.
+//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the
+//! setpoint. Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears
+//! nothing else, so that goals follow one another whole.
 //!
 //! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
 //! the old goal's result, the response, the trajectory, feedback, result.

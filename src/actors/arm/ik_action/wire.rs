@@ -12,7 +12,7 @@ use super::{
 };
 use crate::actors::arm::ik::read_target;
 use crate::actors::node::{Asker, Call, Done, Reply, Unserved};
-use crate::actors::ros::follower::{ActionRequest, Follower};
+use crate::actors::wire::follower::{ActionRequest, Follower};
 use crate::actors::wire::{Address, Answered, Nodes, Route, Served};
 use crate::math::goal::Criteria;
 use crate::protocol::catalog::{Action, Service, Topic};

@@ -1,8 +1,8 @@
 //! The arm judges its own timestep: how large it may be at the present setpoint, and by how much each step is off.
 //!
-//! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It is
-//! looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the controller off
-//! the loop in force is the arm left to itself, whatever gains and setpoint wait to be switched on.
+//! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It
+//! is looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the
+//! controller off the loop in force is the arm left to itself, whatever gains and setpoint wait to be switched on.
 //!
 //! **Invariant:** nothing is ever refused or changed because of a limit or an error; they are only published.
 
@@ -20,8 +20,8 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::error_estimate::estimate;
 use crate::study::motion::Motion;
 
-/// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may come
-/// by the thousand a second.
+/// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may
+/// come by the thousand a second.
 pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
@@ -88,8 +88,8 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry.wants(Topic::Diagnostics) || self.telemetry.wants(Topic::ErrorEstimate)
     }
 
-    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none. One for an earlier setpoint will
-    /// do until the next is there; one for another arm, other gains or another method says nothing.
+    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none. One for an earlier setpoint
+    /// will do until the next is there; one for another arm, other gains or another method says nothing.
     pub(super) fn timestep_limit(&self) -> f64 {
         match &self.limit.known {
             Some((of, limit)) if resemble(of, &ControlLoop::in_force(&self.simulation)) => *limit,

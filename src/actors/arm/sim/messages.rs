@@ -1,4 +1,4 @@
-//! What other nodes and the runtime say to the arm, and what it says to them. Questions that clients can ask as well are
+//! Messages between the arm and other nodes or the runtime. Questions that clients can ask as well are
 //! in `services`.
 //!
 //! **Invariant:** every message is plain: it knows nothing of the actor that handles it.
@@ -41,8 +41,8 @@ pub struct Present<const N: usize> {
     pub state: State<N>,
 }
 
-/// The largest stable timestep \[s\] of a loop with held control, infinite where nothing limits. From the arm to `study`;
-/// none if the runtime ends meanwhile.
+/// The largest stable timestep \[s\] of a loop with held control, infinite where nothing limits. From the arm to
+/// `study`; none if the runtime ends meanwhile.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<f64>")]
 pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);

@@ -20,10 +20,10 @@ use super::state::limit::LimitWatch;
 use super::state::steps::Steps;
 use super::state::telemetry::Telemetry;
 use super::state::turn::Turn;
-use crate::actors::compute::work_clock;
-use crate::actors::gateway::awake::stay_awake;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::node::{Interest, Publish};
+use crate::actors::resources::awake::stay_awake;
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::work_clock;
 use crate::math::arm::Arm;
 use crate::math::pacer::Pacer;
 use crate::math::pid::Gains;
@@ -33,8 +33,8 @@ use crate::math::simulation::Simulation;
 pub const PUBLISH_RATE: u32 = 60;
 /// Time that one wake-up may spend on steps: what a message to the arm may have to wait for.
 pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
-/// Between two wake-ups while steps are owed. So the arm takes what it needs of its core, not a share that is fixed by the rate
-/// of publishing; and a timestep that no machine can follow leaves the others some of it.
+/// Between two wake-ups while steps are owed. So the arm takes what it needs of its core, not a share that is fixed by
+/// the rate of publishing; and a timestep that no machine can follow leaves the others some of it.
 pub const BREATHER: Duration = Duration::from_millis(1);
 /// Steps between two looks at the clock: some 10 microseconds of work.
 const BATCH: u64 = 64;
@@ -65,8 +65,8 @@ pub struct ArmSim<const N: usize> {
     pub(super) goals: Goals<N>,
     pub(super) limit: LimitWatch<N>,
     pub(super) turn: Turn,
-    /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next turn is on its
-    /// way.
+    /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next
+    /// turn is on its way.
     pub(super) steps: VecDeque<Steps>,
 }
 

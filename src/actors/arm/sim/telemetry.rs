@@ -1,5 +1,5 @@
-//! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth, `/diagnostics`
-//! once a second and at every change.
+//! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
+//! `/diagnostics` once a second and at every change.
 //!
 //! **Invariant:** nothing is reckoned for a topic that nobody subscribes to; what is published is written elsewhere.
 
@@ -18,7 +18,8 @@ use crate::protocol::messages::{
 
 /// The frame in which everything is expressed.
 const FRAME_ID: &str = "world";
-/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for control.
+/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for
+/// control.
 const ESTIMATE_TICKS: u64 = 6;
 
 impl<const N: usize> ArmSim<N> {

@@ -1,6 +1,7 @@
 //! `/arm_sim/integration_step`: the four methods on `x'' = f(t)`, done on the worker pool, apart from the live arm.
 //!
-//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a time.
+//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
+//! time.
 //!
 //! **Invariant:** nothing here knows the arm; whatever is asked, the arm and the other clients go on.
 

@@ -1,6 +1,7 @@
 //! The question in JSON, and the response, which is written a slice at a time.
 //!
-//! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's thread.
+//! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's
+//! thread.
 
 use actix::prelude::*;
 use bytes::Bytes;

@@ -1,17 +1,24 @@
 //! Whose turn it is on the workers: whoever has had least of their time.
 //!
-//! Fair queueing by a clock that advances, while work is done, at the pace at which each client would be served if all who
-//! are there were served at once (Demers, Keshav and Shenker, *Analysis and Simulation of a Fair Queueing Algorithm*, 1989).
-//! Each piece of work has its own reading, which begins at the clock's and advances by the time that it has had; the least
-//! reading is next. So a newcomer does not wait for what others have begun, nor is it served before them for ever: who has
-//! had more than a share stays behind until the clock has caught up, also when it leaves and comes back.
+//! Fair queueing by a clock that advances, while work is done, at the pace at which each client would be served if all
+//! who are there were served at once (Demers, Keshav and Shenker, *Analysis and Simulation of a Fair Queueing
+//! Algorithm*, 1989). Each piece of work has its own reading, which begins at the clock's and advances by the time that
+//! it has had; the least reading is next. So a newcomer does not wait for what others have begun, nor is it served
+//! before them for ever: who has had more than a share stays behind until the clock has caught up, also when it leaves
+//! and comes back.
 //!
-//! **Invariant:** while several wait, none has had more than another that came with it by more than what each had in one turn.
+//! **Invariant:** while several wait, none has had more than another that came with it by more than what each had in
+//! one turn.
 
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
-use super::Owner;
+use crate::actors::ConnectionId;
+
+/// The client for which a computation is done; none for the runtime's own.
+pub type Owner = Option<ConnectionId>;
+/// For whom the runtime's own computations are done.
+pub const RUNTIME: Owner = None;
 
 /// Pieces of work that take turns.
 pub(super) struct Turns<T> {
@@ -94,7 +101,7 @@ impl<T> Turns<T> {
         self.waiting.drain(..).map(|(_, work)| work).collect()
     }
 
-    /// Those of them that are not to wait any more.
+    /// Takes out the work that is not to wait any more.
     pub(super) fn take_waiting_if(&mut self, is_done: impl Fn(&T) -> bool) -> Vec<T> {
         let waiting = std::mem::take(&mut self.waiting).into_iter();
         let (taken, left) = waiting.partition::<VecDeque<_>, _>(|(_, work)| is_done(work));
@@ -116,7 +123,6 @@ impl<T> Turns<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::actors::ConnectionId;
 
     const SLICE: Duration = Duration::from_millis(1);
 
@@ -165,7 +171,8 @@ mod tests {
         assert!(*most - *least <= 30 * SLICE, "{had:?}");
     }
 
-    /// Five that have computed for minutes: the sixth waits for one turn of each at most, and has a sixth of the time from then on.
+    /// Five that have computed for minutes: the sixth waits for one turn of each at most, and has a sixth of the time
+    /// from then on.
     #[test]
     fn a_newcomer_begins_at_once_and_gets_its_share_and_no_more() {
         let mut turns = entered(1..=5);

@@ -1,8 +1,10 @@
-//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the arm.
+//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the
+//! arm.
 //!
 //! Parameters are read and set by the arm's own questions: the same checks, the same words.
 //!
-//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the arm.
+//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the
+//! arm.
 
 mod messages;
 mod wire;
@@ -16,9 +18,9 @@ pub use self::messages::{
 use crate::actors::arm::sim::{
     ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
 };
-use crate::actors::gateway::aside::{Errand, aside};
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
+use crate::actors::resources::aside::{Errand, aside};
 use crate::protocol::catalog::Node;
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;

@@ -1,7 +1,7 @@
 //! An arm in motion: free, under the law in every stage, or under an effort that is held for the step.
 //!
-//! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the law in
-//! every stage).
+//! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the
+//! law in every stage).
 
 use super::scene::{OUTPUTS, Outcome, SAMPLES, Scene, Worst};
 use crate::math::arm::{Arm, State};

@@ -1,7 +1,7 @@
 //! The 1-DOF service against its closed form: `ẍ = cos 2t`, so `x = x₀ + v₀ t + sin² t / 2`.
 //!
-//! **Invariant:** what is run is the computation behind `/arm_sim/integration_step`, expression and all; the closed form is
-//! evaluated with 106 bits.
+//! **Invariant:** what is run is the computation behind `/arm_sim/integration_step`, expression and all; the closed
+//! form is evaluated with 106 bits.
 
 use super::scene::{OUTPUTS, Outcome, Scene, Worst};
 use crate::math::count::in_f64;

@@ -1,4 +1,4 @@
-//! What is computed by every method, and the outcome of a run.
+//! A scene, which every method computes, and the outcome of a run.
 //!
 //! **Invariant:** every run lands on the same output times, whatever its timestep.
 

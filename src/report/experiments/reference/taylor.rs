@@ -1,13 +1,14 @@
 //! Taylor series of the arm's motion, coefficient by coefficient, in double-double arithmetic.
 //!
-//! Every unknown is a power series in time. With `s' = c φ'` and `c' = -s φ'` sine and cosine cost one recurrence each, products of
-//! series are convolutions, and the equations of motion give one linear system per coefficient, always with the same
-//! matrix. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
+//! Every unknown is a power series in time. With `s' = c φ'` and `c' = -s φ'` sine and cosine cost one recurrence each,
+//! products of series are convolutions, and the equations of motion give one linear system per coefficient, always with
+//! the same matrix. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
 //!
-//! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*,
-//! Experimental Mathematics 14 (2005).
+//! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
+//! methods*, Experimental Mathematics 14 (2005).
 //!
-//! **Invariant:** a step never leaves out more than its tolerance by its own estimate; whoever wants proof compares two settings.
+//! **Invariant:** a step never leaves out more than its tolerance by its own estimate; whoever wants proof compares two
+//! settings.
 
 #![allow(
     clippy::indexing_slicing,

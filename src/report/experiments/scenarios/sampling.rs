@@ -227,8 +227,8 @@ fn too_much_integral() -> Verdict {
     )
 }
 
-/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]: from the largest deviation within two
-/// periods to that within the next two, once other modes have died out.
+/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]: from the largest deviation within
+/// two periods to that within the next two, once other modes have died out.
 fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
     const STEPS: u32 = 20_000;
     let h = 2.0 * swing / f64::from(STEPS);

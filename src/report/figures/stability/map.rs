@@ -152,8 +152,8 @@ impl Map {
     }
 }
 
-/// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor e
-/// meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
+/// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor
+/// e meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
 fn undecided(step: &Matrix) -> bool {
     let watched = in_f64(STEPS);
     2.0 * watched * step.spectral_radius().ln().abs() < 1.0

@@ -1,10 +1,10 @@
 //! `/arm_sim/step`: single steps of a paused arm.
 //!
-//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and those who ask for more take turns: it is as if each had asked for single
-//! steps, one after the other, so what others ask takes effect in between.
+//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and those who ask for more take turns: it is as if each had asked for
+//! single steps, one after the other, so what others ask takes effect in between.
 //!
-//! **Invariant:** a request that is refused at first changes nothing; one that is taken up is done as a whole, unless a divergence,
-//! a resume or the end of the runtime comes in between.
+//! **Invariant:** a request that is refused at first changes nothing; one that is taken up is done as a whole, unless a
+//! divergence, a resume or the end of the runtime comes in between.
 
 use actix::prelude::*;
 use bytes::Bytes;

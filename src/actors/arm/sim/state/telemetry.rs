@@ -1,4 +1,4 @@
-//! What the arm counts between two messages of `/diagnostics`, and the topics that somebody wants.
+//! Counts between two messages of `/diagnostics`, and the topics that somebody wants.
 //!
 //! **Invariant:** rates are of one window, which is never shorter than they can be told from.
 
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::actors::gateway::gauges::Gauges;
+use crate::actors::resources::gauges::Gauges;
 use crate::math::count::in_f64;
 use crate::math::dynamics;
 use crate::math::pacer::CATCH_UP;

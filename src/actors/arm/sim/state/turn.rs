@@ -1,14 +1,14 @@
 //! How much the arm does in a row before its timers and the answers that it waits for have their turn.
 //!
-//! An actor's mailbox is emptied before anything else of it is looked at. So whoever keeps it full would keep the arm from its
-//! tick; the end of a turn lets the thread look up.
+//! An actor's mailbox is emptied before anything else of it is looked at. So whoever keeps it full would keep the arm
+//! from its tick; the end of a turn lets the thread look up.
 //!
-//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, whatever waits for it: [`TURN`], one
-//! message, and one row of steps that were asked for. Steps that are due have their own budget.
+//! **Invariant:** between two ends of a turn the arm does about two milliseconds of work, whatever waits for it:
+//! [`TURN`], one message, and one row of steps that were asked for. Steps that are due have their own budget.
 
 use std::time::{Duration, Instant};
 
-use crate::actors::compute::work_clock;
+use crate::actors::resources::work_clock;
 
 /// Work on messages in a row: what a tick may come late.
 pub const TURN: Duration = Duration::from_millis(1);

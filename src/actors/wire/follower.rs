@@ -8,8 +8,8 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
 use crate::actors::node::{Done, Feedback, Respond};
+use crate::actors::resources::budget::Share;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
