@@ -81,7 +81,8 @@ fn variable(name: &str) -> String {
 mod tests {
     use super::*;
 
-    const MAIN: &str = "import {\n  a as first,\n  B,\n} from \"./low.js\";\nimport { c } from \"./mid.js\";\nfirst(B, c);\n";
+    const MAIN: &str = "import {\n  a as first,\n  B,\n} from \"./low.js\";\nimport { c } from \"./mid.js\";\nfirst(B, \
+                        c);\n";
     const MID: &str = "import { a } from \"./low.js\";\nexport const c = a();\n";
     const LOW: &str = "export async function a() {}\nconst hidden = 1;\nexport class B {}\n";
 
@@ -94,10 +95,10 @@ mod tests {
             ("other.js", ""),
         ];
         let text = bundle("main.js", &modules);
-        let expected = "const $low = (() => {\nasync function a() {}\nconst hidden = 1;\nclass B {}\nreturn { a, B };\n})();\n\
-             const $mid = (() => {\nconst { a } = $low;\nconst c = a();\nreturn { c };\n})();\n\
-             const $main = (() => {\nconst {  a: first,  B,} = $low;\nconst { c } = $mid;\nfirst(B, c);\nreturn {  };\n})();\n\
-             export const modules = { \"low.js\": $low, \"main.js\": $main, \"mid.js\": $mid, };\n";
+        let expected = "const $low = (() => {\nasync function a() {}\nconst hidden = 1;\nclass B {}\nreturn { a, B \
+                        };\n})();\nconst $mid = (() => {\nconst { a } = $low;\nconst c = a();\nreturn { c };\n})();\n\
+             const $main = (() => {\nconst {  a: first,  B,} = $low;\nconst { c } = $mid;\nfirst(B, c);\nreturn {  \
+             };\n})();\nexport const modules = { \"low.js\": $low, \"main.js\": $main, \"mid.js\": $mid, };\n";
         assert_eq!(text, expected);
     }
 }

@@ -107,8 +107,8 @@ fn figure(panels: &[Panel]) -> Figure {
     Figure::new(
         "energy-drift",
         headline(panels),
-        "Timestep 1 ms, no control: energy should stay. The scale is the arm's largest change of potential energy plus its kinetic energy at the \
-         start. A line that ends early left the finite numbers.",
+        "Timestep 1 ms, no control: energy should stay. The scale is the arm's largest change of potential energy plus \
+         its kinetic energy at the start. A line that ends early left the finite numbers.",
         &keys,
         &plots,
     )
@@ -134,8 +134,8 @@ fn findings(panels: &[Panel]) -> Vec<String> {
     let end = |method| of(panels, "Chaotic swing, 2", method).map_or(f64::NAN, Panel::end);
     let duration = panels.first().map_or(0.0, |panel| panel.duration);
     vec![format!(
-        "**Over {} s of chaotic swing at {} the energy error is {} of the scale with Verlet, {} with midpoint and {} with RK4.** This Verlet is not symplectic: the \
-         forces of an arm depend on velocity.",
+        "**Over {} s of chaotic swing at {} the energy error is {} of the scale with Verlet, {} with midpoint and {} \
+         with RK4.** This Verlet is not symplectic: the forces of an arm depend on velocity.",
         number(duration),
         seconds(TIMESTEP),
         scientific(end(Method::Verlet)),
@@ -154,7 +154,8 @@ fn verdicts(panels: &[Panel]) -> Vec<Verdict> {
         holds &= end(Method::Rk4) < order_two && (order_two < euler || !euler.is_finite());
     }
     vec![Verdict {
-        claim: "At 1 ms energy is kept best by RK4, then by the methods of order 2, worst by Euler, in all three swings".to_owned(),
+        claim: "At 1 ms energy is kept best by RK4, then by the methods of order 2, worst by Euler, in all three \
+                swings".to_owned(),
         seen: headline(panels),
         holds,
     }]

@@ -192,8 +192,9 @@ fn figure(swings: &[Swing]) -> Figure {
     Figure::new(
         "separation",
         headline(swings),
-        "Free swing from the horizontal. An error of 0.01 rad is the horizon (dotted upright lines); past it a swing and the true one have only \
-         their energy in common. The panel ends where the reference itself is no longer known, or where it was not taken further.",
+        "Free swing from the horizontal. An error of 0.01 rad is the horizon (dotted upright lines); past it a swing \
+         and the true one have only their energy in common. The panel ends where the reference itself is no longer \
+         known, or where it was not taken further.",
         &keys,
         &plots,
     )
@@ -224,7 +225,8 @@ fn table(swings: &[Swing]) -> Table {
     let mut table = Table::new(
         "horizon",
         "Horizon: when the error passes 0.01 rad [s]",
-        "The Lyapunov time is how long an error takes to grow by e, from two neighbouring swings followed for minutes; in brackets from each half alone.",
+        "The Lyapunov time is how long an error takes to grow by e, from two neighbouring swings followed for minutes; \
+         in brackets from each half alone.",
         &head,
     );
     for swing in swings {
@@ -271,7 +273,8 @@ fn finding(swing: &Swing) -> Option<String> {
         let ratio = timestep(1024) / timestep(every);
         let bought = ratio.powi(4).ln() * swing.lyapunov_time();
         format!(
-            " With steps of {} it is {} s, {} s later, where truncation alone would have bought {} s: rounding ends it.",
+            " With steps of {} it is {} s, {} s later, where truncation alone would have bought {} s: rounding ends \
+             it.",
             seconds(timestep(every)),
             number(at),
             number(at - fine),
@@ -279,8 +282,8 @@ fn finding(swing: &Swing) -> Option<String> {
         )
     });
     Some(format!(
-        "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every {} s, so sixteen times the work \
-         buys {} s.{}",
+        "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every \
+         {} s, so sixteen times the work buys {} s.{}",
         swing.links,
         number(coarse),
         seconds(timestep(64)),

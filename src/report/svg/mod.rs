@@ -188,7 +188,8 @@ impl Key {
         let dashed = if self.dashed { " dashed" } else { "" };
         format!(
             "<svg class=\"swatch\" viewBox=\"0 0 28 12\" width=\"28\" height=\"12\" aria-hidden=\"true\">\
-             <g class=\"series {}{dashed}\"><path class=\"line\" d=\"M1 6H27\"/><path class=\"marker\" d=\"{}\"/></g></svg>",
+             <g class=\"series {}{dashed}\"><path class=\"line\" d=\"M1 6H27\"/><path class=\"marker\" \
+             d=\"{}\"/></g></svg>",
             self.class,
             self.marker.path(14.0, 6.0)
         )
@@ -209,8 +210,8 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
         HEIGHT * length_in_f64(rows) + header,
     );
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\">\
-         <style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
          <text class=\"heading\" x=\"14\" y=\"26\">{}</text>",
         escape(title)
     );

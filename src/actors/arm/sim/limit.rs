@@ -114,7 +114,8 @@ impl<const N: usize> ArmSim<N> {
                 timestep: bears,
             } = motion;
             return Some(format!(
-                "the timestep {timestep:?} s exceeds {bears:.2e} s, up to which {method} is predicted to carry a motion of {speed:.1} rad/s"
+                "the timestep {timestep:?} s exceeds {bears:.2e} s, up to which {method} is predicted to carry a \
+                 motion of {speed:.1} rad/s"
             ));
         }
         let method = self.simulation.method();
@@ -127,7 +128,8 @@ impl<const N: usize> ArmSim<N> {
             format!("{method} is predicted to be unstable at every timestep {place}")
         } else {
             format!(
-                "the timestep {timestep:?} s exceeds {limit:?} s, up to which {method} is predicted to be stable {place}"
+                "the timestep {timestep:?} s exceeds {limit:?} s, up to which {method} is predicted to be stable \
+                 {place}"
             )
         };
         (timestep > limit).then_some(says)

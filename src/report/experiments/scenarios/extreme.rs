@@ -28,7 +28,8 @@ pub(super) const SCENES: [Scenario; 9] = [
         id: "S27",
         name: "gravity from 0 to 1000",
         parameters: "2 links, 9.81, 981, 1e-12 and negative gravity; Runge-Kutta 4",
-        expected: "the error goes with (timestep² gravity)²; tiny gravity lets the arm fall by it; negative gravity is refused",
+        expected: "the error goes with (timestep² gravity)²; tiny gravity lets the arm fall by it; negative gravity is \
+                   refused",
         slow: false,
         check: gravity,
     },

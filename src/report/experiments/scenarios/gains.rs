@@ -50,7 +50,8 @@ pub(super) const SCENES: [Scenario; 4] = [
         id: "S09",
         name: "overdamped",
         parameters: "2 links, kp 200, kd 500, setpoint (0.5, 0.8); all methods, held and continuous",
-        expected: "measured limit within 1 % of the predicted one; 1 % beyond it the held arm chatters with period 2, bounded",
+        expected: "measured limit within 1 % of the predicted one; 1 % beyond it the held arm chatters with period 2, \
+                   bounded",
         slow: false,
         check: overdamped,
     },
@@ -58,7 +59,8 @@ pub(super) const SCENES: [Scenario; 4] = [
         id: "S10",
         name: "undamped",
         parameters: "2 links, gravity as usual, kp 1e4, kd 0, setpoint (0.5, 0.8)",
-        expected: "held: every method unstable at every timestep; continuous: Euler and midpoint too, Verlet up to 2/ω, Runge-Kutta 4 up to 2.828/ω",
+        expected: "held: every method unstable at every timestep; continuous: Euler and midpoint too, Verlet up to \
+                   2/ω, Runge-Kutta 4 up to 2.828/ω",
         slow: false,
         check: undamped,
     },

@@ -24,7 +24,8 @@ use crate::study::stability::{Sampling, largest_timestep, limits};
 /// Digits that a rod arm may lose: a half-unit change of an angle alone changes accelerations by up to 1.6 digits.
 const DIGITS: f64 = 2.5;
 
-const LIGHT: &str = "worst of 200 states loses at most 2.5 digits; the limit falls with the tip's inertia, measured within 1 % of predicted";
+const LIGHT: &str = "worst of 200 states loses at most 2.5 digits; the limit falls with the tip's inertia, measured \
+                     within 1 % of predicted";
 const HEAVY: &str = "worst of 200 states loses at most 2.5 digits";
 
 pub(super) const SCENES: [Scenario; 11] = [
@@ -80,7 +81,8 @@ pub(super) const SCENES: [Scenario; 11] = [
         id: "S22",
         name: "heavy tip, stretched",
         parameters: "3 links, outer mass 1e9 kg, hanging within 1e-6 rad of straight",
-        expected: "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 swings on at 1.6e-5 s and flies apart at 2e-5 s",
+        expected: "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 \
+                   swings on at 1.6e-5 s and flies apart at 2e-5 s",
         slow: false,
         check: heavy_tip_stretched,
     },
@@ -112,7 +114,8 @@ pub(super) const SCENES: [Scenario; 11] = [
         id: "S26",
         name: "whirl",
         parameters: "2 and 3 links stretched, no gravity, 1000 rad/s",
-        expected: "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 %, predicted and measured",
+        expected: "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 \
+                   %, predicted and measured",
         slow: false,
         check: whirl,
     },
@@ -236,7 +239,8 @@ fn folded() -> Verdict {
     verdict(
         straight.holds && covers,
         format!(
-            "{}; limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, minimum over poses {} s",
+            "{}; limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, \
+             minimum over poses {} s",
             straight.observed,
             short(smallest)
         ),

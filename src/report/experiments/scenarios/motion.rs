@@ -32,7 +32,8 @@ pub(super) const SCENES: [Scenario; 6] = [
         id: "S02",
         name: "hanging at rest",
         parameters: "3 links hanging at the double next to -π/2; 10^6 steps of 1 ms",
-        expected: "midpoint, Verlet and Runge-Kutta 4 drift less than 1e-12 rad; under Euler rounding grows at the rate of its step matrix, to 2 %",
+        expected: "midpoint, Verlet and Runge-Kutta 4 drift less than 1e-12 rad; under Euler rounding grows at the \
+                   rate of its step matrix, to 2 %",
         slow: true,
         check: hanging_at_rest,
     },
@@ -48,7 +49,8 @@ pub(super) const SCENES: [Scenario; 6] = [
         id: "S04",
         name: "regular swing",
         parameters: "2 links, 0.3 rad from hanging, 1000 s at 1 ms, all methods",
-        expected: "energy: Euler gains over 1 J, midpoint gains under 1e-3 J, Verlet stays within 1e-4 J, Runge-Kutta 4 within 1e-9 J",
+        expected: "energy: Euler gains over 1 J, midpoint gains under 1e-3 J, Verlet stays within 1e-4 J, Runge-Kutta \
+                   4 within 1e-9 J",
         slow: true,
         check: regular_swing,
     },

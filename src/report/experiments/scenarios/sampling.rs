@@ -25,7 +25,8 @@ pub(super) const SCENES: [Scenario; 5] = [
     Scenario {
         id: "S11",
         name: "slow control",
-        parameters: "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); control period of 1, 10 and 100 steps, measured with 1 and 10",
+        parameters: "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); control period of 1, 10 and 100 \
+                     steps, measured with 1 and 10",
         expected: "midpoint, Verlet and Runge-Kutta 4 share one limit of the period to 1 %, predicted and measured",
         slow: false,
         check: slow_control,
@@ -33,8 +34,10 @@ pub(super) const SCENES: [Scenario; 5] = [
     Scenario {
         id: "S12",
         name: "held control turns into push",
-        parameters: "2 links without gravity, kp 1000, kd 5 and 2; control period 20 ms of 100 steps of 0.2 ms, Runge-Kutta 4",
-        expected: "unstable in period 20 ms although stable with control in every step of 0.2 ms: the controller, not the integrator",
+        parameters: "2 links without gravity, kp 1000, kd 5 and 2; control period 20 ms of 100 steps of 0.2 ms, \
+                     Runge-Kutta 4",
+        expected: "unstable in period 20 ms although stable with control in every step of 0.2 ms: the controller, not \
+                   the integrator",
         slow: false,
         check: held_push,
     },
@@ -42,15 +45,18 @@ pub(super) const SCENES: [Scenario; 5] = [
         id: "S13",
         name: "control one period late",
         parameters: "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); each effort acts one period late",
-        expected: "measured limit of the period within 1 % of the predicted one, and less than half of that without delay",
+        expected: "measured limit of the period within 1 % of the predicted one, and less than half of that without \
+                   delay",
         slow: false,
         check: late_control,
     },
     Scenario {
         id: "S14",
         name: "windup",
-        parameters: "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a setpoint in reach",
-        expected: "the integral stops at its limit of 50 rad s, while an unlimited one grows with the error; after release the arm comes back",
+        parameters: "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a \
+                     setpoint in reach",
+        expected: "the integral stops at its limit of 50 rad s, while an unlimited one grows with the error; after \
+                   release the arm comes back",
         slow: false,
         check: windup,
     },

@@ -75,9 +75,9 @@ pub(super) fn against_evaluations(data: &[Data]) -> Figure {
     Figure::new(
         "work-precision",
         headline_evaluations(data),
-        "Down and left is better. One mark per timestep, halved from mark to mark; every method takes the same timesteps. \
-         Crosses at the top edge are runs that diverged. The three strokes show orders 1, 2 and 4; the dotted line is one unit in \
-         the last place of 1 rad.",
+        "Down and left is better. One mark per timestep, halved from mark to mark; every method takes the same \
+         timesteps. Crosses at the top edge are runs that diverged. The three strokes show orders 1, 2 and 4; the \
+         dotted line is one unit in the last place of 1 rad.",
         &Key::methods(),
         &plots,
     )
@@ -112,8 +112,8 @@ pub(super) fn against_time(data: &[Data]) -> Figure {
     Figure::new(
         "work-precision-time",
         headline_time(data),
-        "As above, with the clock instead of the count: the minimum of repeats, whiskers from first to third quartile. The scale at \
-         the top is the real-time factor, simulated time over computing time.",
+        "As above, with the clock instead of the count: the minimum of repeats, whiskers from first to third quartile. \
+         The scale at the top is the real-time factor, simulated time over computing time.",
         &Key::methods(),
         &plots,
     )
@@ -148,7 +148,8 @@ pub(super) fn against_timestep(data: &[Data]) -> Figure {
     Figure::new(
         "convergence",
         headline_timestep(data),
-        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep at the setpoint, one per method.",
+        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep \
+         at the setpoint, one per method.",
         &Key::methods(),
         &plots,
     )

@@ -15,9 +15,9 @@ pub(super) fn cheapest(data: &[Data]) -> Table {
     let mut table = Table::new(
         "cheapest",
         "At a glance: the cheapest method for each error",
-        "Fewest evaluations; under it the timestep, and evaluations and computing time for one simulated second; last how \
-         many times more evaluations the next best method needs. Between two measured timesteps the values are interpolated. \
-         The particle's errors are in m.",
+        "Fewest evaluations; under it the timestep, and evaluations and computing time for one simulated second; last \
+         how many times more evaluations the next best method needs. Between two measured timesteps the values are \
+         interpolated. The particle's errors are in m.",
         &head,
     );
     for data in data {
@@ -48,7 +48,8 @@ pub(super) fn orders(data: &[Data]) -> Table {
     let mut table = Table::new(
         "orders",
         "Fitted orders",
-        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the smallest error that any timestep gave.",
+        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the \
+         smallest error that any timestep gave.",
         &["Scene", "euler", "midpoint", "verlet", "rk4"],
     );
     for data in data {
@@ -80,8 +81,9 @@ pub(super) fn real_time(data: &[Data]) -> Table {
     let mut table = Table::new(
         "real-time",
         "Faster than the clock",
-        "Time of one step, the least of all runs of a thousand steps and more; simulated over computing time at three timesteps; and what share of a 1 kHz loop \
-         (1 ms per cycle, one step each) the step itself takes. Stepping only: no messages.",
+        "Time of one step, the least of all runs of a thousand steps and more; simulated over computing time at three \
+         timesteps; and what share of a 1 kHz loop (1 ms per cycle, one step each) the step itself takes. Stepping \
+         only: no messages.",
         &[
             "Scene",
             "Method",

@@ -45,8 +45,9 @@ pub(super) fn period_table(periods: &[Period]) -> Table {
     let mut table = Table::new(
         "period-limits",
         "The limit belongs to the control period",
-        "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the method (2 links, shipped gains). Smaller steps at the \
-         same control period buy nothing; Euler only moves to the limit of the others.",
+        "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the \
+         method (2 links, shipped gains). Smaller steps at the same control period buy nothing; Euler only moves to \
+         the limit of the others.",
         &["Method", "1 step per period", "10 steps", "100 steps"],
     );
     for method in Method::ALL {
@@ -198,14 +199,15 @@ impl Growth {
         Figure::new(
             "control-period",
             format!(
-                "1, 10 and 100 steps per control period give the same growth to {} % from order 2 on; {} measurements lie on their curves to {} %",
+                "1, 10 and 100 steps per control period give the same growth to {} % from order 2 on; {} measurements \
+                 lie on their curves to {} %",
                 number(100.0 * self.apart),
                 self.dots,
                 number(100.0 * self.furthest)
             ),
-            "2 links, shipped gains, effort held over the period. Curves: spectral radius of one control period of the linearised loop. \
-             Dots: how much a nudge of the arm itself grows per period, over 4000 periods. Only Euler with one step per period has a \
-             curve of its own.",
+            "2 links, shipped gains, effort held over the period. Curves: spectral radius of one control period of the \
+             linearised loop. Dots: how much a nudge of the arm itself grows per period, over 4000 periods. Only Euler \
+             with one step per period has a curve of its own.",
             &keys,
             &self.plots,
         )

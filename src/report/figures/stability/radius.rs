@@ -16,9 +16,10 @@ pub(super) fn radius_figure(lines: &[Line]) -> (Figure, Csv) {
     let plots = Sampling::ALL.map(|sampling| panel(lines, sampling, &mut csv));
     let figure = Figure::new(
         "spectral-radius",
-        "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep; only a law in every stage shows the method",
-        "2 links, shipped gains. Lines are predicted: the largest eigenvalue of one step of the linearised loop. Marks are where \
-         the arm itself was measured to stop settling.",
+        "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep; only a law in every stage \
+         shows the method",
+        "2 links, shipped gains. Lines are predicted: the largest eigenvalue of one step of the linearised loop. Marks \
+         are where the arm itself was measured to stop settling.",
         &Key::methods(),
         &plots,
     );

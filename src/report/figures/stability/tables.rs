@@ -12,8 +12,9 @@ pub(super) fn table(lines: &[Line]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
-        "Predicted from the loop linearised where it rests, at (0.4, 0.8), with 3 links (0.4, 0.8, -0.5), measured by nudging the arm itself and watching whether \
-         it settles; the smallest limit of all poses, proven where it can be, and 0.8 times that as advice. Prediction and measurement must agree to 1 %.",
+        "Predicted from the loop linearised where it rests, at (0.4, 0.8), with 3 links (0.4, 0.8, -0.5), measured by \
+         nudging the arm itself and watching whether it settles; the smallest limit of all poses, proven where it can \
+         be, and 0.8 times that as advice. Prediction and measurement must agree to 1 %.",
         &[
             "Links",
             "Gains",
@@ -56,8 +57,8 @@ pub(super) fn edges(lines: &[Line]) -> Table {
     let mut table = Table::new(
         "edges",
         "At a glance: where it goes unstable, and why",
-        "Largest stable timestep with the shipped gains. Held for the step, the limit belongs to the control period: the effort answers a state that is \
-         up to a step old. In every stage it belongs to the method.",
+        "Largest stable timestep with the shipped gains. Held for the step, the limit belongs to the control period: \
+         the effort answers a state that is up to a step old. In every stage it belongs to the method.",
         &[
             "Arm", "Control", "euler", "midpoint", "verlet", "rk4", "Why",
         ],
