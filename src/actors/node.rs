@@ -80,9 +80,9 @@ pub trait Pieces: Send {
 }
 
 /// An answer that needs no writing: it has been given.
-struct Given;
+struct AlreadyGiven;
 
-impl Pieces for Given {
+impl Pieces for AlreadyGiven {
     fn advance(&mut self) -> bool {
         true
     }
@@ -102,7 +102,7 @@ pub trait Asker<T>: Send {
     /// Takes an answer of megabytes, which is written by whoever has it.
     fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
         self.answer(Ok(answer), None);
-        Box::new(Given)
+        Box::new(AlreadyGiven)
     }
 
     /// The client that asked; none if it was a node.
@@ -183,7 +183,7 @@ impl<T> Reply<T> {
     pub fn answer_in_pieces(&mut self, answer: T) -> Box<dyn Pieces> {
         match self.take() {
             Some(asker) => asker.answer_in_pieces(answer),
-            None => Box::new(Given),
+            None => Box::new(AlreadyGiven),
         }
     }
 
@@ -252,14 +252,14 @@ pub struct Interest {
 
 /// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has
 /// not.
-pub enum Frame {
+pub enum FrameOut {
     /// As it goes out.
     Written(Bytes),
     /// Writes it.
     Unwritten(Box<dyn FnOnce() -> Bytes + Send>),
 }
 
-impl Frame {
+impl FrameOut {
     /// A frame that the registry writes.
     #[must_use]
     pub fn unwritten(write: impl FnOnce() -> Bytes + Send + 'static) -> Self {
@@ -276,7 +276,7 @@ impl Frame {
     }
 }
 
-impl From<Bytes> for Frame {
+impl From<Bytes> for FrameOut {
     fn from(frame: Bytes) -> Self {
         Self::Written(frame)
     }
@@ -289,7 +289,7 @@ pub struct Publish {
     /// The topic.
     pub topic: Topic,
     /// The whole `publish` frame, encoded once.
-    pub frame: Frame,
+    pub frame: FrameOut,
 }
 
 /// A frame for one client: an answer or a status. From a node.
@@ -299,7 +299,7 @@ pub struct Respond {
     /// The client.
     pub connection: ConnectionId,
     /// The whole frame.
-    pub frame: Frame,
+    pub frame: FrameOut,
     /// The service that it answers, if it is the runtime's own.
     pub service: Option<Service>,
     /// The level, if it is a status: sent only if the client wants such.

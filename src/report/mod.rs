@@ -26,7 +26,7 @@ use std::time::Instant;
 use figures::SECTIONS;
 use machine::Machine;
 use making::Making;
-use progress::Progress;
+use progress::ProgressBar;
 use section::{Block, Section, Table};
 use serde_json::{Value, json};
 
@@ -90,7 +90,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         .filter(|maker| wanted(maker.name))
         .map(weight)
         .sum();
-    let mut progress = Progress::new(total);
+    let mut progress = ProgressBar::new(total);
     let mut sections = Vec::new();
     for maker in &SECTIONS {
         let file = kept.join(format!("{}.json", maker.name));
@@ -127,7 +127,7 @@ fn make(
     maker: &figures::Maker,
     options: &ReportOptions,
     machine: &Machine,
-    progress: &mut Progress,
+    progress: &mut ProgressBar,
 ) -> Result<Section, ReportError> {
     let started = Instant::now();
     let mut making = Making {

@@ -13,7 +13,7 @@ use tokio::sync::oneshot;
 use tokio::time::Instant;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, Frame, Respond, Unserved};
+use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::budget::{Account, NoRoom, Promise};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages;
@@ -226,7 +226,7 @@ impl Caller {
                 let frame = write(&address);
                 address.counted(frame)
             };
-            self.send(service, Frame::unwritten(write), done);
+            self.send(service, FrameOut::unwritten(write), done);
         }
     }
 
@@ -237,7 +237,7 @@ impl Caller {
         }
     }
 
-    fn send(&self, service: Service, frame: Frame, done: Option<Done>) {
+    fn send(&self, service: Service, frame: FrameOut, done: Option<Done>) {
         self.registry.do_send(Respond {
             connection: self.connection,
             frame,

@@ -1,7 +1,7 @@
 //! Between the registry and the nodes: a client's call is read here and becomes a question, and a node's answer is
 //! written here and becomes the call's one response.
 //!
-//! A question that clients can ask says how it is read and how its answer is written ([`Served`]); the table of routes
+//! A question that clients can ask says how it is read and how its answer is written ([`Callable`]); the table of routes
 //! ([`Nodes`]) says which node is asked. All that goes wrong on the way is in here, once: bad arguments, a question
 //! that was dropped, and how an error is written.
 //!
@@ -15,4 +15,4 @@ mod served;
 
 pub use self::caller::{Address, Caller, ROOM_TIME, SMALL_ANSWER, ServiceCall, TopicMessage};
 pub use self::routes::{Nodes, Route};
-pub use self::served::{Answered, Served, Streamed};
+pub use self::served::{Answered, Callable, Streamed};

@@ -8,7 +8,7 @@ use actix::prelude::*;
 
 use super::caller::{Caller, ServiceCall, TopicMessage};
 use super::follower::ActionRequest;
-use super::served::{Answered, Client, PatientClient, Served, Streamed};
+use super::served::{Answered, Callable, ClientAsker, PatientAsker, Streamed};
 use crate::actors::node::{Asker, Call, Interest, Reply};
 use crate::actors::resources::aside::{Errand, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
@@ -35,7 +35,7 @@ pub struct Nodes {
 impl Nodes {
     /// A row of a node's table: calls of `service` are this question.
     pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
-        self.route(service, node.into(), Client::<A>::new);
+        self.route(service, node.into(), ClientAsker::<A>::new);
     }
 
     /// The same where the answer may be long.
@@ -44,11 +44,11 @@ impl Nodes {
         service: Service,
         node: impl Into<Recipient<Call<A>>>,
     ) {
-        self.route(service, node.into(), PatientClient::<A>::new);
+        self.route(service, node.into(), PatientAsker::<A>::new);
     }
 
     /// Reads what is asked, or says what is wrong with it.
-    fn route<A: Served, C: Asker<A::Answer> + 'static>(
+    fn route<A: Callable, C: Asker<A::Answer> + 'static>(
         &mut self,
         service: Service,
         node: Recipient<Call<A>>,

@@ -15,7 +15,7 @@ use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::Rejections;
 
 /// A question that clients can ask by calling a service.
-pub trait Served: Ask + Sized {
+pub trait Callable: Ask + Sized {
     /// Reads it.
     ///
     /// # Errors
@@ -24,13 +24,13 @@ pub trait Served: Ask + Sized {
 }
 
 /// A question whose answer is short: the registry writes the response.
-pub trait Answered: Served {
+pub trait Answered: Callable {
     /// Writes the response.
     fn write(answer: Self::Answer, to: &Address) -> Bytes;
 }
 
 /// A question whose answer may be long: the thread that has it writes the response, a piece at a time.
-pub trait Streamed: Served {
+pub trait Streamed: Callable {
     /// A response that is being written.
     type Writer: Send + 'static;
 
@@ -42,12 +42,12 @@ pub trait Streamed: Served {
 }
 
 /// A client that has asked `A`.
-pub(super) struct Client<A> {
+pub(super) struct ClientAsker<A> {
     caller: Caller,
     question: PhantomData<fn(A)>,
 }
 
-impl<A> Client<A> {
+impl<A> ClientAsker<A> {
     pub(super) fn new(caller: Caller) -> Self {
         let question = PhantomData;
         Self { caller, question }
@@ -66,9 +66,9 @@ impl<A> Client<A> {
     }
 }
 
-impl<A: Answered> Asker<A::Answer> for Client<A> {
+impl<A: Answered> Asker<A::Answer> for ClientAsker<A> {
     fn answer(self: Box<Self>, answer: Result<A::Answer, Unserved>, done: Option<Done>) {
-        Client::answer(*self, answer, done, A::write);
+        ClientAsker::answer(*self, answer, done, A::write);
     }
 
     fn client(&self) -> Option<ConnectionId> {
@@ -85,15 +85,15 @@ impl<A: Answered> Asker<A::Answer> for Client<A> {
 }
 
 /// The same where the answer may be long.
-pub(super) struct PatientClient<A>(Client<A>);
+pub(super) struct PatientAsker<A>(ClientAsker<A>);
 
-impl<A> PatientClient<A> {
+impl<A> PatientAsker<A> {
     pub(super) fn new(caller: Caller) -> Self {
-        Self(Client::new(caller))
+        Self(ClientAsker::new(caller))
     }
 }
 
-impl<A: Streamed> Asker<A::Answer> for PatientClient<A> {
+impl<A: Streamed> Asker<A::Answer> for PatientAsker<A> {
     fn answer(self: Box<Self>, answer: Result<A::Answer, Unserved>, done: Option<Done>) {
         self.0.answer(answer, done, |answer, to| {
             let mut writer = A::begin(answer, to);

@@ -7,7 +7,7 @@
 //! **Invariant:** every number here is about one stated start; a Lyapunov rate is a property of where the swing goes.
 
 use super::error::energy_scale;
-use super::reference::Reference;
+use super::reference::ReferenceMotion;
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::dynamics::energy;
@@ -33,7 +33,7 @@ pub fn separation<const N: usize>(
     method: Method,
     h: f64,
     every: u64,
-    reference: &Reference<N>,
+    reference: &ReferenceMotion<N>,
 ) -> Vec<f64> {
     let mut simulation = swing(arm, start, method, h);
     (0..reference.len())

@@ -19,7 +19,7 @@ use crate::math::dynamics::{coriolis, forward_dynamics, gravity_load, mass_matri
 
 /// Shape of the sampled poses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Pose {
+pub enum PoseShape {
     /// Any angles.
     Bent,
     /// Outer angles of some 1e-6 rad: nearly a straight line, where eliminating a joint-space matrix loses most.
@@ -41,7 +41,7 @@ pub struct Lost {
 
 /// Digits lost by a 3-link arm of unit lengths whose last link weighs `ratio` times the others, over `count` states.
 #[must_use]
-pub fn digits_lost(ratio: f64, pose: Pose, count: u32) -> Option<Lost> {
+pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
     let arm = Arm::<3>::new([1.0; 3], [1.0, 1.0, ratio], 9.81).ok()?;
     // A fixed seed: the same report from the same program.
     let mut random = fastrand::Rng::with_seed(7);
@@ -49,9 +49,9 @@ pub fn digits_lost(ratio: f64, pose: Pose, count: u32) -> Option<Lost> {
     let (mut recursion, mut dense, mut inherent) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..count {
         let (about, within) = match pose {
-            Pose::Bent => (0.0, PI),
-            Pose::Stretched => (0.0, 1e-6),
-            Pose::Folded => (PI, 1e-6),
+            PoseShape::Bent => (0.0, PI),
+            PoseShape::Stretched => (0.0, 1e-6),
+            PoseShape::Folded => (PI, 1e-6),
         };
         let mut outer = || about + within * any();
         let (second, third) = (outer(), outer());

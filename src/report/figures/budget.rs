@@ -10,7 +10,7 @@ use crate::report::experiments::error::OUTPUTS;
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
 use crate::report::svg::{
-    Axis, Key, Marker, Plot, Point, Series, Unit, number, scientific, seconds,
+    Axis, Curve, Key, Marker, Plot, Point, Unit, number, scientific, seconds,
 };
 
 const DURATION: f64 = 2.0;
@@ -100,9 +100,9 @@ fn plot(panel: &Panel, x: &Axis, y: &Axis) -> Plot {
         .parts
         .iter()
         .map(|parts| (parts.timestep, parts.total));
-    plot.series.push(Series {
+    plot.series.push(Curve {
         dashed: true,
-        ..Series::line("ink", total)
+        ..Curve::line("ink", total)
     });
     for (class, name, marker) in PARTS {
         let points: Vec<Point> = panel
@@ -123,7 +123,7 @@ fn plot(panel: &Panel, x: &Axis, y: &Axis) -> Plot {
             })
             .filter(|point| point.y != 0.0)
             .collect();
-        plot.series.push(Series {
+        plot.series.push(Curve {
             class,
             marker,
             line: true,

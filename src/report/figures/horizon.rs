@@ -7,10 +7,10 @@ use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::chaos::{HORIZON_ERROR, horizon, lyapunov_rate, separation};
-use crate::report::experiments::reference::{Law, Reference};
+use crate::report::experiments::reference::{Law, ReferenceMotion};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Key, Mark, Plot, Series, Unit, number, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Plot, Unit, number, seconds};
 
 /// Time between samples \[s\], a multiple of every timestep.
 const SPACING: f64 = 1.0 / 16.0;
@@ -67,7 +67,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
 
 fn swing<const N: usize>(making: &mut Making<'_>, samples: usize, before: usize) -> Swing {
     let (arm, start) = (Arm::<N>::default(), State::rest());
-    let reference = Reference::of(&arm, &start, &Law::FREE, SPACING, samples);
+    let reference = ReferenceMotion::of(&arm, &start, &Law::FREE, SPACING, samples);
     let known = reference
         .uncertainty()
         .iter()
@@ -160,7 +160,7 @@ fn figure(swings: &[Swing]) -> Figure {
                     .enumerate()
                     .filter(|(_, error)| **error > 0.0 && error.is_finite())
                     .map(|(index, error)| (time(index), *error));
-                plot.series.push(Series::line(method.name(), points));
+                plot.series.push(Curve::line(method.name(), points));
                 if let Some(at) = swing.horizon(*method, SHOWN) {
                     plot.marks.push(Mark::Vertical {
                         x: at,
@@ -174,9 +174,9 @@ fn figure(swings: &[Swing]) -> Figure {
             let to =
                 (from + 9.0 * std::f64::consts::LN_10 / swing.rate[0]).min(swing.known_until());
             let growth = [from, to].map(|t| (t, 1e-15 * (swing.rate[0] * (t - from)).exp()));
-            plot.series.push(Series {
+            plot.series.push(Curve {
                 dashed: true,
-                ..Series::line("soft", growth)
+                ..Curve::line("soft", growth)
             });
             plot
         })

@@ -88,7 +88,7 @@ impl Point {
 
 /// A line, or marks, or both.
 #[derive(Debug, Clone)]
-pub(crate) struct Series {
+pub(crate) struct Curve {
     /// CSS class: a method's name, or one of the style's others.
     pub(crate) class: &'static str,
     pub(crate) marker: Marker,
@@ -97,7 +97,7 @@ pub(crate) struct Series {
     pub(crate) points: Vec<Point>,
 }
 
-impl Series {
+impl Curve {
     /// A method's line with its colour and marker.
     pub(crate) fn of(method: Method, points: Vec<Point>) -> Self {
         Self {

@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use super::{Axis, HEIGHT, Heat, Mark, Marker, Point, Series, Unit, WIDTH, escape, number};
+use super::{Axis, Curve, HEIGHT, Heat, Mark, Marker, Point, Unit, WIDTH, escape, number};
 
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 14.0;
@@ -21,7 +21,7 @@ pub(crate) struct Plot {
     pub(crate) above: Option<(&'static str, f64)>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
-    pub(crate) series: Vec<Series>,
+    pub(crate) series: Vec<Curve>,
 }
 
 impl Plot {
@@ -206,7 +206,7 @@ impl Plot {
         Ok(())
     }
 
-    fn series(&self, out: &mut String, series: &Series) -> std::fmt::Result {
+    fn series(&self, out: &mut String, series: &Curve) -> std::fmt::Result {
         let dashed = if series.dashed { " dashed" } else { "" };
         write!(out, "<g class=\"series {}{dashed}\">", series.class)?;
         if series.line {

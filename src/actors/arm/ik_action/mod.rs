@@ -20,7 +20,7 @@ pub use self::messages::{
 };
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names};
-use crate::actors::node::{Call, Frame, Interest, Publish, Reply, ask};
+use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ask};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Node, Topic};
 use crate::protocol::messages::{self as frames, goal::setpoint_trajectory};
@@ -212,7 +212,7 @@ impl<const N: usize> IkAction<N> {
         };
         let (number, positions) = (goal.number, goal.positions);
         let topic = Topic::JointTrajectory;
-        let frame = Frame::unwritten(move || {
+        let frame = FrameOut::unwritten(move || {
             frames::publish(
                 topic.name(),
                 &setpoint_trajectory(&joint_names::<N>(), &positions),

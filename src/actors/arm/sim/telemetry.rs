@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::node::{ArmSim, PUBLISH_RATE};
 use super::state::telemetry::{Batch, Window, energy};
-use crate::actors::node::{Frame, Publish};
+use crate::actors::node::{FrameOut, Publish};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
 use crate::protocol::catalog::Topic;
@@ -71,7 +71,7 @@ impl<const N: usize> ArmSim<N> {
     }
 
     fn publish_frame(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {
-        let frame = Frame::unwritten(write);
+        let frame = FrameOut::unwritten(write);
         self.publish.do_send(Publish { topic, frame });
     }
 

@@ -15,7 +15,7 @@ use crate::actors::node::{Ask, Call};
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
 use crate::math::particle::{Particle, ParticleError};
-use crate::protocol::op::fields::{Rejection, Rejections};
+use crate::protocol::op::fields::{RejectedField, Rejections};
 
 /// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
@@ -131,7 +131,7 @@ impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
 fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
     let function = ask.function.as_deref().map(Expression::parse);
     let mut rejected = match &function {
-        Some(Err(why)) => Rejection::refused("function:", why).into(),
+        Some(Err(why)) => RejectedField::refused("function:", why).into(),
         _ => Rejections::default(),
     };
     rejected.append(ask.rejected);

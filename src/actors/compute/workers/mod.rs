@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 
 pub use self::computation::{Computation, Progress};
 pub use self::turns::{Owner, RUNTIME};
-use self::turns::{Place, Turns};
+use self::turns::{Ticket, Turns};
 use crate::actors::gateway::limits::MAX_CONNECTIONS;
 use crate::actors::panics::contain;
 use crate::actors::resources::budget::free_elsewhere;
@@ -42,10 +42,10 @@ const TRY_AGAIN: Duration = Duration::from_millis(10);
 /// A handle on the pool; clones share it.
 #[derive(Clone)]
 pub struct WorkerPool {
-    shared: Arc<Shared>,
+    shared: Arc<PoolState>,
 }
 
-struct Shared {
+struct PoolState {
     queue: Mutex<Queue>,
     changed: Condvar,
 }
@@ -56,7 +56,7 @@ type Job = Box<dyn Computation>;
 struct Queue {
     turns: Turns<Job>,
     /// Computations that can't begin yet.
-    waiting: Vec<(Place, Job)>,
+    waiting: Vec<(Ticket, Job)>,
     closed: Option<&'static str>,
 }
 
@@ -99,7 +99,7 @@ impl WorkerPool {
     /// its own.
     #[must_use]
     pub fn without_threads() -> Self {
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(PoolState {
             queue: Mutex::default(),
             changed: Condvar::new(),
         });
@@ -173,7 +173,7 @@ impl WorkerPool {
     }
 }
 
-impl Shared {
+impl PoolState {
     /// The queue. A poisoned lock is taken as it is: the queue is never left half changed.
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
@@ -186,7 +186,7 @@ impl Shared {
     }
 
     /// Gives a computation that was taken its turn.
-    fn advance(&self, place: Place, mut job: Job) {
+    fn advance(&self, place: Ticket, mut job: Job) {
         let began = work_clock::now();
         let progress = contain(|| job.advance(began + SLICE));
         let progress = progress.unwrap_or_else(|panic| {
@@ -199,7 +199,7 @@ impl Shared {
         }
     }
 
-    fn take(&self) -> Option<(Place, Job)> {
+    fn take(&self) -> Option<(Ticket, Job)> {
         let mut queue = self.lock();
         loop {
             if let Some(job) = queue.turns.next() {
@@ -224,7 +224,7 @@ impl Shared {
 
     /// Takes a computation back after its turn; gives it out again, with what it is to be refused for, if it was its
     /// last.
-    fn put_back(&self, place: Place, job: Job, progress: Progress, took: Duration) -> Option<End> {
+    fn put_back(&self, place: Ticket, job: Job, progress: Progress, took: Duration) -> Option<End> {
         let mut queue = self.lock();
         match (progress, queue.closed) {
             (Progress::Finished, _) => return Some(End { job, why: None }),
@@ -242,7 +242,7 @@ impl Shared {
     }
 
     /// Ends a computation whose last turn began then.
-    fn end(&self, place: Place, End { mut job, why }: End, began: Instant) {
+    fn end(&self, place: Ticket, End { mut job, why }: End, began: Instant) {
         // Dropped outside the lock: the end of a computation may free many megabytes.
         let end = contain(move || {
             if let Some(why) = why {
@@ -271,6 +271,7 @@ struct End {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::actors::ConnectionId;
     use std::sync::mpsc;
 
     struct Counting {

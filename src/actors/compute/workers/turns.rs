@@ -23,7 +23,7 @@ pub const RUNTIME: Owner = None;
 /// Pieces of work that take turns.
 pub(super) struct Turns<T> {
     /// Work that waits for its turn; of equal readings the first is next.
-    waiting: VecDeque<(Place, T)>,
+    waiting: VecDeque<(Ticket, T)>,
     /// Pieces of work that have their turn.
     running: u32,
     clock: Duration,
@@ -33,7 +33,7 @@ pub(super) struct Turns<T> {
 
 /// Whose a piece of work is, and its reading.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct Ticket {
     of: Owner,
     reading: Duration,
 }
@@ -54,17 +54,17 @@ impl<T> Turns<T> {
     pub(super) fn enter(&mut self, of: impl Into<Owner>, work: T) {
         let of = of.into();
         let reading = self.ahead.remove(&of).unwrap_or_default();
-        self.wait(Place { of, reading }, work);
+        self.wait(Ticket { of, reading }, work);
     }
 
     /// Puts work back that was kept away, and so claims nothing for that time.
-    pub(super) fn wait(&mut self, mut place: Place, work: T) {
+    pub(super) fn wait(&mut self, mut place: Ticket, work: T) {
         place.reading = place.reading.max(self.clock);
         self.waiting.push_back((place, work));
     }
 
     /// Whose turn it is; to be given back by [`Turns::again`] or [`Turns::leave`].
-    pub(super) fn next(&mut self) -> Option<(Place, T)> {
+    pub(super) fn next(&mut self) -> Option<(Ticket, T)> {
         let readings = self.waiting.iter().enumerate();
         let (least, _) = readings.min_by_key(|(_, (place, _))| place.reading)?;
         let next = self.waiting.remove(least)?;
@@ -73,14 +73,14 @@ impl<T> Turns<T> {
     }
 
     /// The turn is over and took so long; the work wants another.
-    pub(super) fn again(&mut self, mut place: Place, work: T, took: Duration) {
+    pub(super) fn again(&mut self, mut place: Ticket, work: T, took: Duration) {
         place.reading += took;
         self.end(took);
         self.waiting.push_back((place, work));
     }
 
     /// The turn is over and took so long; the work is done, or kept away for a while.
-    pub(super) fn leave(&mut self, mut place: Place, took: Duration) -> Place {
+    pub(super) fn leave(&mut self, mut place: Ticket, took: Duration) -> Ticket {
         place.reading += took;
         self.end(took);
         self.ahead.retain(|_, reading| *reading > self.clock);

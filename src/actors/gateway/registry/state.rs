@@ -260,7 +260,7 @@ impl Registry {
 }
 
 /// Who sent the frame that is being performed, and its `id`.
-pub(super) struct Origin {
+pub(super) struct FrameOrigin {
     pub(super) from: ConnectionId,
     pub(super) id: Option<Payload>,
 }

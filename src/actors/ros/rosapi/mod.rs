@@ -12,8 +12,8 @@ mod wire;
 use actix::prelude::*;
 
 pub use self::messages::{
-    Change, DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted,
-    NotSet, ParameterValue, SetParam, Unknown,
+    DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
+    ParamChange, ParameterValue, SetParam, Unknown,
 };
 use crate::actors::arm::sim::{
     ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
@@ -240,12 +240,12 @@ async fn value<const N: usize>(
 
 /// Has the arm change a parameter; gives what was not taken.
 async fn change_parameter<const N: usize>(
-    change: Change<N>,
+    change: ParamChange<N>,
     arm: ArmParameters<N>,
 ) -> Result<Rejections, Unserved> {
     Ok(match change {
-        Change::Params(params) => ask(&arm.params, params).await?.rejected,
-        Change::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
-        Change::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
+        ParamChange::Params(params) => ask(&arm.params, params).await?.rejected,
+        ParamChange::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
+        ParamChange::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
     })
 }

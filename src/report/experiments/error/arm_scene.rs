@@ -3,7 +3,7 @@
 //! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the
 //! law in every stage).
 
-use super::scene::{OUTPUTS, Outcome, SAMPLES, Scene, Worst};
+use super::scene::{OUTPUTS, RunOutcome, SAMPLES, Scene, Worst};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, forward_dynamics, kinetic_energy, potential_energy};
@@ -11,7 +11,9 @@ use crate::math::integrator::{Method, increment, two_sum};
 use crate::math::kinematics::forward;
 use crate::math::pid::{Gains, Pid, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::report::experiments::reference::{DoubleDouble, Law, Reference, largest_difference};
+use crate::report::experiments::reference::{
+    DoubleDouble, Law, ReferenceMotion, largest_difference,
+};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, largest_timestep};
@@ -36,7 +38,7 @@ pub struct ArmScene<const N: usize> {
     start: State<N>,
     drive: Drive<N>,
     duration: f64,
-    reference: Reference<N>,
+    reference: ReferenceMotion<N>,
     energy_scale: f64,
 }
 
@@ -58,7 +60,7 @@ impl<const N: usize> ArmScene<N> {
             }
         };
         let spacing = duration / in_f64(OUTPUTS);
-        let reference = Reference::of(&arm, &start, &law, spacing, SAMPLES);
+        let reference = ReferenceMotion::of(&arm, &start, &law, spacing, SAMPLES);
         let energy_scale = energy_scale(&arm, &start);
         Self {
             name,
@@ -194,7 +196,7 @@ impl<const N: usize> Scene for ArmScene<N> {
             .fold(0.0, f64::max)
     }
 
-    fn run(&self, method: Method, steps: u64) -> Outcome {
+    fn run(&self, method: Method, steps: u64) -> RunOutcome {
         let start_energy = energy(&self.arm, &self.start);
         let spacing = self.duration / in_f64(OUTPUTS);
         let every = (steps / OUTPUTS).max(1);
@@ -222,7 +224,7 @@ impl<const N: usize> Scene for ArmScene<N> {
             },
         );
         let conserved = matches!(self.drive, Drive::Free) && worst.diverged.is_none();
-        Outcome {
+        RunOutcome {
             steps,
             timestep: self.duration / in_f64(steps),
             evaluations,

@@ -15,7 +15,7 @@ mod scene;
 pub use arm_scene::{ArmScene, Drive, energy_scale};
 pub use particle_scene::ParticleScene;
 pub(super) use scene::SAMPLES;
-pub use scene::{LOST, OUTPUTS, Outcome, Scene};
+pub use scene::{LOST, OUTPUTS, RunOutcome, Scene};
 
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, Setpoint};

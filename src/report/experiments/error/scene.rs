@@ -16,7 +16,7 @@ pub const LOST: f64 = std::f64::consts::TAU;
 
 /// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct RunOutcome {
     /// Steps that were to be taken.
     pub steps: u64,
     /// Length of each \[s\].
@@ -52,7 +52,7 @@ pub trait Scene {
     /// How far the reference itself may be off \[rad\].
     fn uncertainty(&self) -> f64;
     /// Runs `steps` steps, a multiple of [`OUTPUTS`], and compares.
-    fn run(&self, method: Method, steps: u64) -> Outcome;
+    fn run(&self, method: Method, steps: u64) -> RunOutcome;
     /// The same steps without counting or comparing. What comes back only keeps them from being optimised away.
     fn replay(&self, method: Method, steps: u64) -> f64;
     /// The value that [`Scene::replay`] must come back with, taken from the run that is judged.

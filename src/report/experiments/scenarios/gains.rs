@@ -8,7 +8,7 @@
 )]
 
 use super::support::{held, short, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
@@ -90,7 +90,7 @@ fn compare(gains: Gains<2>) -> (f64, [Option<f64>; 2]) {
     (worst, rk4)
 }
 
-fn limits_hold(gains: Gains<2>) -> Verdict {
+fn limits_hold(gains: Gains<2>) -> Observation {
     let (worst, [held, continuous]) = compare(gains);
     verdict(
         worst < 0.01,
@@ -103,7 +103,7 @@ fn limits_hold(gains: Gains<2>) -> Verdict {
     )
 }
 
-fn overdamped() -> Verdict {
+fn overdamped() -> Observation {
     let gains = Gains {
         kp: [200.0; 2],
         ki: [0.0; 2],
@@ -138,7 +138,7 @@ fn chatter(control: &ControlLoop<2>) -> Option<f64> {
     alternates.then_some(before.abs())
 }
 
-fn undamped() -> Verdict {
+fn undamped() -> Observation {
     let gains = Gains {
         kp: [1e4; 2],
         ki: [0.0; 2],

@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::support::{arm, digits_lost, free, held, short, states, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -121,7 +121,7 @@ pub(super) const SCENES: [Scenario; 11] = [
     },
 ];
 
-fn light_outer_link(mass: f64) -> Verdict {
+fn light_outer_link(mass: f64) -> Observation {
     let Some(arm) = arm([1.0, mass], 9.81) else {
         return verdict(false, "no such arm".to_owned());
     };
@@ -156,7 +156,7 @@ fn light_outer_link(mass: f64) -> Verdict {
     )
 }
 
-fn heavy_outer_link(mass: f64) -> Verdict {
+fn heavy_outer_link(mass: f64) -> Observation {
     let digits = arm([1.0, 1.0, mass], 9.81).map(|arm| digits_lost(&arm, &states([0.0; 3], PI)));
     verdict(
         digits.is_some_and(|digits| digits <= DIGITS),
@@ -164,7 +164,7 @@ fn heavy_outer_link(mass: f64) -> Verdict {
     )
 }
 
-fn heavy_tip_stretched() -> Verdict {
+fn heavy_tip_stretched() -> Observation {
     let Some(arm) = arm([1.0, 1.0, 1e9], 9.81) else {
         return verdict(false, "no such arm".to_owned());
     };
@@ -196,7 +196,7 @@ fn heavy_tip_stretched() -> Verdict {
     )
 }
 
-fn length_ratio() -> Verdict {
+fn length_ratio() -> Observation {
     let lost = [1e3, 1e-3].map(|length| {
         Arm::new([1.0, 1.0, length], [1.0; 3], 9.81).map_or(f64::INFINITY, |arm| {
             digits_lost(&arm, &states([0.0; 3], PI))
@@ -211,7 +211,7 @@ fn length_ratio() -> Verdict {
     )
 }
 
-fn in_line(pose: [f64; 3]) -> Verdict {
+fn in_line(pose: [f64; 3]) -> Observation {
     let digits = digits_lost(&Arm::default(), &states(pose, 0.0));
     verdict(
         digits.is_finite() && digits <= DIGITS,
@@ -219,7 +219,7 @@ fn in_line(pose: [f64; 3]) -> Verdict {
     )
 }
 
-fn folded() -> Verdict {
+fn folded() -> Observation {
     let straight = in_line([0.0, PI, -PI]);
     let control = held(Gains::<3>::default(), [0.0; 3]);
     let smallest = limits(&control).minimum_held;
@@ -247,7 +247,7 @@ fn folded() -> Verdict {
     )
 }
 
-fn whirl() -> Verdict {
+fn whirl() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     let mut judge = |limits: [(Method, f64, Option<f64>, Option<f64>); 2]| {

@@ -15,7 +15,7 @@ mod sampling;
 mod scenario;
 mod support;
 
-pub use scenario::{Scenario, Verdict};
+pub use scenario::{Observation, Scenario};
 
 /// All scenes, in order.
 #[must_use]

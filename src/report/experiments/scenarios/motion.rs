@@ -10,7 +10,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::support::{apart, arm, free, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
@@ -72,7 +72,7 @@ pub(super) const SCENES: [Scenario; 6] = [
     },
 ];
 
-fn rest_without_gravity() -> Verdict {
+fn rest_without_gravity() -> Observation {
     let start = State::at_rest([0.3, -1.2, 2.0]);
     let kept = arm([1.0; 3], 0.0).is_some_and(|arm| {
         Method::ALL.into_iter().all(|method| {
@@ -86,7 +86,7 @@ fn rest_without_gravity() -> Verdict {
 }
 
 /// `-π/2` is no double, so the arm hangs 6e-17 rad off and swings by that much.
-fn hanging_at_rest() -> Verdict {
+fn hanging_at_rest() -> Observation {
     let start = State::at_rest([-FRAC_PI_2, 0.0, 0.0]);
     let linear = Linear::at_pose(&ControlLoop::free(Arm::<3>::default()), &start.position);
     let mut holds = true;
@@ -118,7 +118,7 @@ fn hanging_at_rest() -> Verdict {
     verdict(holds, format!("drift {}", observed.join(", ")))
 }
 
-fn upright() -> Verdict {
+fn upright() -> Observation {
     let pose = [FRAC_PI_2, 0.0];
     let h = 0.001;
     let linear = Linear::at_pose(&ControlLoop::free(Arm::default()), &pose);
@@ -157,7 +157,7 @@ fn order(method: Method) -> i32 {
     }
 }
 
-fn regular_swing() -> Verdict {
+fn regular_swing() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     for method in Method::ALL {
@@ -183,7 +183,7 @@ fn regular_swing() -> Verdict {
 }
 
 /// The rate at which two neighbours part, brought back together every tenth of a second.
-fn chaotic<const N: usize>(position: [f64; N], expected: f64) -> Verdict {
+fn chaotic<const N: usize>(position: [f64; N], expected: f64) -> Observation {
     const APART: f64 = 1e-8;
     let start = State::at_rest(position);
     let mut one = free(Arm::default(), start, Method::Rk4, 0.001);

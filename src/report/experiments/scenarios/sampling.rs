@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::support::{held, short, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
@@ -78,7 +78,7 @@ const MODERATE: Gains<2> = Gains {
     kd: [30.0, 12.0],
 };
 
-fn slow_control() -> Verdict {
+fn slow_control() -> Observation {
     let (mut lowest, mut highest) = (f64::INFINITY, 0.0_f64);
     let mut worst: f64 = 0.0;
     for method in [Method::Midpoint, Method::Verlet, Method::Rk4] {
@@ -104,7 +104,7 @@ fn slow_control() -> Verdict {
     )
 }
 
-fn held_push() -> Verdict {
+fn held_push() -> Observation {
     let gains = Gains {
         kp: [1000.0; 2],
         ki: [0.0; 2],
@@ -135,7 +135,7 @@ fn held_push() -> Verdict {
     )
 }
 
-fn late_control() -> Verdict {
+fn late_control() -> Observation {
     let control = held(MODERATE, POSE);
     let linear = Linear::at_setpoint(&control);
     let prompt = largest_period(&linear, Method::Rk4, 1);
@@ -159,7 +159,7 @@ fn late_control() -> Verdict {
 }
 
 /// The shipped law has no cap on the effort; this scene puts one behind it.
-fn windup() -> Verdict {
+fn windup() -> Observation {
     const CAP: f64 = 10.0;
     const H: f64 = 0.001;
     let blocked = held(
@@ -209,7 +209,7 @@ fn windup() -> Verdict {
     )
 }
 
-fn too_much_integral() -> Verdict {
+fn too_much_integral() -> Observation {
     let gains = Gains {
         kp: [100.0; 2],
         ki: [2000.0; 2],

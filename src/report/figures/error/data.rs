@@ -4,7 +4,7 @@
 
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::error::{Outcome, Scene};
+use crate::report::experiments::error::{RunOutcome, Scene};
 use crate::report::figures::slope::slope;
 use crate::report::timing::Timing;
 
@@ -17,7 +17,7 @@ pub(super) struct Data {
 #[derive(Clone, Copy)]
 pub(super) struct Run {
     pub(super) method: Method,
-    pub(super) outcome: Outcome,
+    pub(super) outcome: RunOutcome,
     pub(super) timing: Timing,
 }
 

@@ -6,9 +6,9 @@ use super::data::{Data, Run};
 use super::words::{headline_evaluations, headline_time, headline_timestep};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::error::Outcome;
+use crate::report::experiments::error::RunOutcome;
 use crate::report::section::Figure;
-use crate::report::svg::{Axis, Key, Mark, Plot, Point, Series, Unit, scientific, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Plot, Point, Unit, scientific, seconds};
 
 /// All panels share this, so that scenes can be compared. An exact hit is drawn on the lower edge.
 fn error_axis() -> Axis {
@@ -16,7 +16,7 @@ fn error_axis() -> Axis {
 }
 
 fn tooltip(data: &Data, run: &Run) -> String {
-    let Outcome {
+    let RunOutcome {
         timestep,
         evaluations,
         error,
@@ -48,7 +48,7 @@ fn panels(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
                     let error = run.outcome.error.max(1e-17);
                     Point::new(of(run), error, tooltip(data, run))
                 });
-                plot.series.push(Series::of(method, points.collect()));
+                plot.series.push(Curve::of(method, points.collect()));
             }
             plot
         })

@@ -4,7 +4,7 @@
 
 use super::data::{Data, Run, TARGETS, best};
 use crate::math::integrator::Method;
-use crate::report::csv::{Csv, Field};
+use crate::report::csv::{Csv, CsvField};
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, power, scientific, seconds};
 
@@ -165,7 +165,7 @@ pub(super) fn table_of_runs(data: &[Data]) -> Csv {
                 outcome.end_error.into(),
                 outcome.end_effector_error.into(),
                 outcome.energy_drift.into(),
-                Field::Text(if outcome.diverged.is_some() {
+                CsvField::Text(if outcome.diverged.is_some() {
                     "diverged"
                 } else {
                     "finished"

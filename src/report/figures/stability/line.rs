@@ -13,7 +13,7 @@ use crate::study::stability::Sampling;
 pub(super) const AGREEMENT: f64 = 0.01;
 
 /// One line of the table of limits.
-pub(super) struct Line {
+pub(super) struct LimitRow {
     pub(super) links: usize,
     pub(super) gains: &'static str,
     pub(super) method: Method,
@@ -24,7 +24,7 @@ pub(super) struct Line {
     pub(super) advised: Option<f64>,
 }
 
-impl Line {
+impl LimitRow {
     pub(super) fn ratio(&self) -> Option<f64> {
         Some(self.measured? / self.predicted)
     }
@@ -71,7 +71,7 @@ pub(super) fn stiffened(factor: f64) -> ControlLoop<2> {
 }
 
 /// The line of the 2-link arm with its shipped gains.
-pub(super) fn shipped(lines: &[Line], sampling: Sampling, method: Method) -> Option<&Line> {
+pub(super) fn shipped(lines: &[LimitRow], sampling: Sampling, method: Method) -> Option<&LimitRow> {
     lines.iter().find(|line| {
         line.links == 2
             && line.gains == "shipped"

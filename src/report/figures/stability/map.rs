@@ -9,7 +9,7 @@ use crate::report::csv::Csv;
 use crate::report::experiments::measure::{STEPS, growth};
 use crate::report::making::Making;
 use crate::report::section::Figure;
-use crate::report::svg::{Axis, Heat, Key, Marker, Plot, Point, Series, Unit, seconds};
+use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Plot, Point, Unit, seconds};
 use crate::study::linear::Linear;
 use crate::study::matrix::Matrix;
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
@@ -82,8 +82,8 @@ impl Map {
             y: self.factors.clone(),
             rows,
         });
-        plot.series.push(Series::line("ink", line));
-        plot.series.push(Series {
+        plot.series.push(Curve::line("ink", line));
+        plot.series.push(Curve {
             class: "ink",
             marker: Marker::Circle,
             line: false,
@@ -142,7 +142,7 @@ impl Map {
             ),
             "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power \
              of 3/2: the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows \
-             (orange), the darker the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: not \
+             (orange), the darker the faster. LimitRow: the predicted limit. Dots: cells where the two disagree. Grey: not \
              judged, because by the prediction the slowest mode changes its energy by less than a factor e in the 4000 \
              steps watched; that is asked of every cell alike, before looking at whether it agrees. In the lowest rows \
              the gains are too weak to carry the arm against gravity: no timestep is stable.",

@@ -9,7 +9,7 @@ mod radius;
 mod tables;
 mod words;
 
-use line::{Line, Meter};
+use line::{LimitRow, Meter};
 use map::map;
 use period::{growth, period_table, periods};
 use radius::radius_figure;
@@ -101,7 +101,7 @@ fn gains_three() -> [(&'static str, Gains<3>); 3] {
 fn lines_of<const N: usize>(
     making: &mut Making<'_>,
     meter: &mut Meter,
-    lines: &mut Vec<Line>,
+    lines: &mut Vec<LimitRow>,
     name: &'static str,
     control: &ControlLoop<N>,
 ) {
@@ -117,7 +117,7 @@ fn lines_of<const N: usize>(
             let Some(predicted) = predicted.filter(|limit| *limit > 0.0) else {
                 continue;
             };
-            lines.push(Line {
+            lines.push(LimitRow {
                 links: N,
                 gains: name,
                 method,

@@ -9,7 +9,7 @@ use crate::report::experiments::growth::growth_per_period;
 use crate::report::experiments::measure::measured_period;
 use crate::report::making::Making;
 use crate::report::section::{Cell, Figure, Table};
-use crate::report::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, number, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Marker, Plot, Point, Unit, number, seconds};
 use crate::study::linear::Linear;
 use crate::study::stability::{largest_period, period_matrix};
 
@@ -137,7 +137,7 @@ impl Growth {
                 .map(|index| between(index, 200))
                 .map(|period| (period, predicted(period)))
                 .filter(|(_, growth)| *growth <= GROWTH.1);
-            plot.series.push(Series::line(class, curve));
+            plot.series.push(Curve::line(class, curve));
             let mut points = Vec::new();
             // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
             let turn = turn_of(substeps);
@@ -171,7 +171,7 @@ impl Growth {
                 );
                 points.push(Point::new(period, measured, tooltip));
             }
-            plot.series.push(Series {
+            plot.series.push(Curve {
                 class,
                 marker,
                 line: false,

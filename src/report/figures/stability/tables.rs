@@ -2,13 +2,13 @@
 //!
 //! **Invariant:** prediction and measurement stand beside each other.
 
-use super::line::{AGREEMENT, Line, in_words};
+use super::line::{AGREEMENT, LimitRow, in_words};
 use crate::math::integrator::Method;
 use crate::report::section::{Cell, Table};
 use crate::report::svg::seconds;
 use crate::study::stability::Sampling;
 
-pub(super) fn table(lines: &[Line]) -> Table {
+pub(super) fn table(lines: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "limits",
         "Largest stable timesteps",
@@ -53,7 +53,7 @@ pub(super) fn table(lines: &[Line]) -> Table {
     table
 }
 
-pub(super) fn edges(lines: &[Line]) -> Table {
+pub(super) fn edges(lines: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "edges",
         "At a glance: where it goes unstable, and why",

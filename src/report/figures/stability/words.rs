@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
-use super::line::{AGREEMENT, Line, shipped};
+use super::line::{AGREEMENT, LimitRow, shipped};
 use super::map::Map;
 use super::period::{Growth, Period};
 use crate::math::integrator::Method;
@@ -10,7 +10,7 @@ use crate::report::section::Verdict;
 use crate::report::svg::{number, seconds};
 use crate::study::stability::Sampling;
 
-pub(super) fn findings(lines: &[Line]) -> Vec<String> {
+pub(super) fn findings(lines: &[LimitRow]) -> Vec<String> {
     let mut findings = Vec::new();
     let at = |sampling, method| shipped(lines, sampling, method).map(|line| line.predicted);
     if let (Some(verlet), Some(rk4), Some(continuous)) = (
@@ -36,7 +36,7 @@ pub(super) fn findings(lines: &[Line]) -> Vec<String> {
     findings
 }
 
-fn worst(lines: &[Line]) -> f64 {
+fn worst(lines: &[LimitRow]) -> f64 {
     lines
         .iter()
         .map(|line| {
@@ -47,7 +47,7 @@ fn worst(lines: &[Line]) -> f64 {
 }
 
 pub(super) fn verdicts(
-    lines: &[Line],
+    lines: &[LimitRow],
     map: &Map,
     periods: &[Period],
     growth: &Growth,

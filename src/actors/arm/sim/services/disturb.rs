@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
@@ -66,7 +66,7 @@ impl<const N: usize> Handler<Call<Disturb<N>>> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Served for Disturb<N> {
+impl<const N: usize> Callable for Disturb<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read_or_none(arguments, service);
         Ok(Self {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::echo::Echo;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::math::pid::Gains;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
@@ -80,7 +80,7 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl<const N: usize> Served for SetGains<N> {
+impl<const N: usize> Callable for SetGains<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Ok(Self::request(Fields::read_or_none(arguments, service)))
     }

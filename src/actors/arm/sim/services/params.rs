@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::echo::Echo;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::math::arm::{Arm, ArmError};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
@@ -91,7 +91,7 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl<const N: usize> Served for SetParams<N> {
+impl<const N: usize> Callable for SetParams<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Ok(Self::request(Fields::read_or_none(arguments, service)))
     }

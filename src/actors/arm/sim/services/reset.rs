@@ -10,7 +10,7 @@ use super::echo::Echo;
 use crate::actors::arm::sim::messages::GoalJudged;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call, Reply};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::math::arm::State;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
@@ -79,7 +79,7 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 }
-impl<const N: usize> Served for Reset<N> {
+impl<const N: usize> Callable for Reset<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let rejected = Fields::read_or_none(arguments, service).finish();
         Ok(Self { rejected })

@@ -15,7 +15,7 @@ use crate::actors::arm::sim::messages::RefuseSteps;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::arm::sim::state::steps::{Stepped, Steps, StepsEnd};
 use crate::actors::node::{Ask, Call, Unserved};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
 use crate::protocol::op::Arguments;
@@ -133,7 +133,7 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Served for Step {
+impl Callable for Step {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read_or_none(arguments, service);
         Ok(Self {

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::echo::Echo;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
@@ -74,7 +74,7 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Served for Pause {
+impl Callable for Pause {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let (paused, rejected) = read_switch(service, arguments);
         Ok(Self { paused, rejected })
@@ -124,7 +124,7 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Served for Enable {
+impl Callable for Enable {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let (enabled, rejected) = read_switch(service, arguments);
         Ok(Self { enabled, rejected })
