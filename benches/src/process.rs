@@ -1,4 +1,4 @@
-//! What a server's process has used, from `/proc`.
+//! The time and memory that a server's process has used, from `/proc`.
 //!
 //! **Invariant:** processor time is the sum over all its threads, in nanoseconds as the scheduler counts them.
 
