@@ -1,3 +1,4 @@
+// @ts-check
 // What the page does with all settings at once: applies them, undoes the last change, goes back to the defaults, starts a
 // lesson; and the reset that belongs to it.
 // Invariant: every change can be undone, and what the runtime refused is said.

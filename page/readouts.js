@@ -1,8 +1,9 @@
+// @ts-check
 // Numbers in words and figures: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
 // Invariant: written a few times a second; only what changed touches the page.
 
-import { byId, setText } from "./dom.js";
-import { duration, fixed, methodName, significant } from "./format.js";
+import { byId, setAttribute, setText } from "./dom.js";
+import { duration, fixed, shortName, significant } from "./format.js";
 import { tip } from "./arm_view.js";
 import { growthOf } from "./growth.js";
 import { shown } from "./playback.js";
@@ -44,16 +45,16 @@ export function showReadouts() {
   const { diagnostics } = state;
   setText(byId("sim-time"), fixed(shown.time, 2));
   setText(byId("run-state"), runState());
-  byId("run-state").className = `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`;
+  setAttribute(byId("run-state"), "class", `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`);
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
   byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < LAGS);
-  setText(byId("out-method"), methodName(state.integrator?.method).replace("Runge–Kutta 4", "RK 4"));
+  setText(byId("out-method"), shortName(state.integrator?.method));
   setText(byId("out-timestep"), duration(state.integrator?.timestep ?? NaN));
   setText(byId("out-servo"), state.enabled == null ? "–" : state.enabled ? "on" : "off");
   setText(byId("out-steps"), `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
   setText(byId("out-clients"), fixed(diagnostics?.clients ?? NaN, 0));
-  setText(byId("out-rate"), `${fixed(state.rate, 0)} Hz`);
+  setText(byId("out-rate"), isStill() ? "–" : `${fixed(state.rate, 0)} Hz`);
   byId("out-rate").classList.toggle("warn", state.connection === "open" && !isStill() && state.rate > 0 && state.rate < LOW_RATE);
   setText(byId("out-drops"), fixed(diagnostics?.dropped ?? NaN, 0));
   byId("out-drops").classList.toggle("warn", diagnostics?.dropped > 0);
@@ -69,7 +70,7 @@ function runState() {
 /** The verdict on the timestep: in a word on the arm, in a sentence under it, and beside the timestep as a bar. */
 function showLimit() {
   const said = verdict(state);
-  const { limit, everyPose } = limitInForce(state);
+  const { limit, everyPose, advised: shorter } = limitInForce(state);
   const pill = byId("verdict-pill");
   pill.hidden = said.kind === "offline" || said.kind === "diverged"; // the other pill says so
   pill.className = `state ${said.kind}`;
@@ -94,8 +95,7 @@ function showLimit() {
   const stability = answerInForce(state);
   const advice = [];
   if (stability && !Number.isNaN(limit)) advice.push(limit === 0 ? `No timestep is stable, ${said.where}.` : `Stable up to ${limitText(limit)}, ${said.where}.`);
-  if (stability?.timestep_limit_continuous > 0 && state.enabled) advice.push(`Control in every stage: ${duration(stability.timestep_limit_continuous)}.`);
-  if (stability?.advised_timestep > 0) advice.push(`Advised: ${duration(stability.advised_timestep)}.`);
+  if (shorter > 0 && shorter < Infinity) advice.push(`Advised: ${duration(shorter)}.`);
   setText(byId("limit-text"), advice.join(" "));
 }
 

@@ -1,3 +1,4 @@
+// @ts-check
 // The way of the tip through the last seconds: a smooth curve through the recorded states, fading towards the past.
 // Invariant: between two states the curve has the tip's places and velocities at both, so it is no polygon however fast it goes.
 

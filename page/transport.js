@@ -1,3 +1,4 @@
+// @ts-check
 // Pause, single step and reset, and what is said under the arm: the verdict on the timestep, warnings, divergence.
 // Invariant: a notice offers what can be done about it, and goes when its cause is gone.
 
@@ -70,7 +71,7 @@ function showNotice() {
   box.className = notice ? `notice ${notice.kind}` : "notice";
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
-  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", onclick: act }, text)));
+  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
 function choose() {

@@ -6,7 +6,7 @@ from stage import PageTest
 
 AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PANELS = ("plots", "stability", "error", "compare", "tasks")
-PHONE = {"width": 390, "height": 800, "density": 2, "touch": True}
+PHONE = {"width": 390, "height": 844, "density": 2, "touch": True}
 
 
 class Access:
@@ -60,7 +60,7 @@ class Phone(Access, PageTest):
     view = PHONE
 
     def test_arm_integrator_and_servo_come_first(self):
-        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#lessons', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
+        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#lesson-choice', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
         self.assertEqual(tops, sorted(tops))
         self.assertEqual(self.page.run("document.documentElement.scrollWidth"), 390)
 

@@ -57,6 +57,16 @@ test("a motion that bears less than the pose decides, and is named by its speed"
   assert.equal(said.where, "moving at 12.5 rad/s");
 });
 
+test("who shakes beyond the limit, or has diverged, is fast because of that: the pose decides", () => {
+  const thrashing = { ...VALUES, timestep_limit_motion: 1e-150, motion_speed: 5.6e156, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
+  for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { diagnostics: { state: "diverged" } }]) {
+    const found = limitInForce(arm({ stability: thrashing, ...changed }));
+    assert.deepEqual([found.limit, found.everyPose], [VALUES.timestep_limit_held, VALUES.minimum_over_poses_held]);
+    assert.match(found.where, /^at the setpoint/);
+    assert.equal(found.advised, 0.8 * VALUES.minimum_over_poses_held);
+  }
+});
+
 test("the study is asked again once the motion bears another timestep", () => {
   const changed = (then, now) => motionHasChanged({ stability: { timestep_limit_motion: then }, diagnostics: { timestep_limit_motion: now } });
   assert.ok(changed(0.004, 0.008) && changed(null, 0.004) && changed(0.004, Infinity));
