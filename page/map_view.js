@@ -3,6 +3,7 @@
 // A click goes there; so do the arrow keys.
 // Invariant: the boundary is that of the arm's own settings, drawn as far as it is known; a click sends what it shows.
 
+import { beginAnew } from "./actions.js";
 import { byId, setText } from "./dom.js";
 import { duration, methodName } from "./format.js";
 import { onFrame, wake } from "./frames.js";
@@ -175,11 +176,15 @@ function goTo(left, top) {
   move(timesteps.value(place), factors.value(rise));
 }
 
-function move(timestep, factor) {
+/** An arm that has diverged begins anew there: it could not be seen otherwise whether the place is a better one. */
+async function move(timestep, factor) {
   const short = (value) => Number(value.toPrecision(3));
   const gains = scaled(state.gains, factor);
-  if (Math.abs(Math.log(factor)) > 0.02) setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) });
-  if (timestep !== state.integrator.timestep) setIntegrator({ timestep: short(timestep) });
+  const changes = [];
+  if (Math.abs(Math.log(factor)) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
+  if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
+  await Promise.all(changes);
+  if (state.diagnostics?.state === "diverged") beginAnew();
 }
 
 function arrows(event) {

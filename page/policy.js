@@ -121,6 +121,16 @@ function excess(timestep, limit, where) {
     : `No timestep is stable, ${where}.`;
 }
 
+/** What the present loop bears, here and everywhere, and what to use; empty while that is not known. */
+export function adviceText(/** @type {any} */ state) {
+  const { limit, where, everyPose, advised } = limitInForce(state);
+  if (!answerInForce(state) || Number.isNaN(limit)) return "";
+  if (limit === 0) return `No timestep is stable, ${where}.`;
+  const elsewhere = everyPose < limit ? `; in every pose ${everyPose > 0 ? `up to ${duration(everyPose)}` : "none is"}` : "";
+  const advice = advised > 0 && advised < Infinity ? ` Advised: ${duration(advised)}.` : "";
+  return `Stable up to ${limitText(limit)}, ${where}${elsewhere}.${advice}`;
+}
+
 /** @param {number} limit */
 export function limitText(limit) {
   if (Number.isNaN(limit)) return "…";

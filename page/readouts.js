@@ -7,7 +7,7 @@ import { duration, fixed, shortName, significant } from "./format.js";
 import { tip } from "./arm_view.js";
 import { growthOf } from "./growth.js";
 import { shown } from "./playback.js";
-import { answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
+import { adviceText, answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
 import { isStill } from "./runtime.js";
 import { Median } from "./smooth.js";
 import { state, watch } from "./store.js";
@@ -62,7 +62,7 @@ export function showReadouts() {
 
 function runState() {
   if (state.connection !== "open") return "no connection";
-  if (!shown.live) return shown.playing && shown.speed !== 1 ? `recording, ${significant(1 / shown.speed, 2)} times slower` : "recording";
+  if (!shown.live) return shown.playing && shown.speed !== 1 ? `recording, 1/${fixed(1 / shown.speed, 0)} speed` : "recording";
   if (state.diagnostics?.state === "diverged") return "diverged";
   return state.paused ? "paused" : "running";
 }
@@ -70,7 +70,7 @@ function runState() {
 /** The verdict on the timestep: in a word on the arm, in a sentence under it, and beside the timestep as a bar. */
 function showLimit() {
   const said = verdict(state);
-  const { limit, everyPose, advised: shorter } = limitInForce(state);
+  const { limit, everyPose } = limitInForce(state);
   const pill = byId("verdict-pill");
   pill.hidden = said.kind === "offline" || said.kind === "diverged"; // the other pill says so
   pill.className = `state ${said.kind}`;
@@ -83,7 +83,7 @@ function showLimit() {
   setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("worst-text"), worstText(answer));
-  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found by search");
+  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "by search");
   byId("out-every").classList.toggle("warn", said.kind === "here");
   const known = Number.isFinite(limit) && limit > 0;
   const bar = byId("limit-bar");
@@ -92,11 +92,7 @@ function showLimit() {
   bar.style.setProperty("--used", `${Math.min(100, 100 * used)}%`);
   bar.className = `limit-bar ${used > 1 ? "bad" : said.kind === "here" || used > 0.7 ? "warn" : "good"}`;
   bar.setAttribute("aria-label", `timestep is ${fixed(100 * used, 0)} percent of the stability limit`);
-  const stability = answerInForce(state);
-  const advice = [];
-  if (stability && !Number.isNaN(limit)) advice.push(limit === 0 ? `No timestep is stable, ${said.where}.` : `Stable up to ${limitText(limit)}, ${said.where}.`);
-  if (shorter > 0 && shorter < Infinity) advice.push(`Advised: ${duration(shorter)}.`);
-  setText(byId("limit-text"), advice.join(" "));
+  setText(byId("limit-text"), adviceText(state));
 }
 
 /** The arm in a sentence, for those who can't see it; read when the view has the focus. */

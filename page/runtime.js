@@ -190,7 +190,9 @@ function diagnostics(msg) {
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
   if (motionHasChanged(state) && question(state)) askNow(question(state));
-  if (before !== report.state && report.state === "diverged") warn(`The simulation has ${report.message}`);
+  if (before === report.state) return;
+  poll(); // another client may have done what led here
+  if (report.state === "diverged") warn(`The simulation has ${report.message}`);
 }
 
 function feedback(msg) {

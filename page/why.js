@@ -41,9 +41,13 @@ export function whyText(/** @type {any} */ state, /** @type {Limits | null} */ l
 function whyFree(modes, method, limit) {
   const frequency = Math.max(...modes.map(({ im }) => im)) / (2 * Math.PI);
   if (!(frequency > 0)) return "";
-  if (limit === 0) return `Why: left to itself the arm is damped by nothing, and every step of ${methodName(method)} adds a little to each swing, however short it is. The servo, once on, damps more than that.`;
+  if (limit === 0) {
+    return `Why: left to itself the arm is damped by nothing, and every step of ${methodName(method)} adds a little to each swing, `
+      + "however short it is. The servo, once on, damps more than that.";
+  }
   const keeps = method === "verlet" ? "keeps the energy of" : "takes hardly anything from";
-  return `Why: left to itself the arm’s fastest small swing has ${significant(frequency, 3)} Hz. ${methodName(method)} ${keeps} it up to ${duration(limit)}, ${significant(limit * frequency, 2)} of a swing; wide and fast swings bear less.`;
+  return `Why: left to itself the arm’s fastest small swing has ${significant(frequency, 3)} Hz. ${methodName(method)} ${keeps} it `
+    + `up to ${duration(limit)}, ${significant(limit * frequency, 2)} of a swing; wide and fast swings bear less.`;
 }
 
 /** @param {Complex[]} modes @param {Loop} loop @param {Limits} limits @param {string} method */
@@ -52,8 +56,10 @@ function whyServo(modes, loop, limits, method) {
   if (limit === 0) {
     const growth = Math.max(...modes.map(({ re }) => re));
     return growth > 0
-      ? `Why: these gains don’t hold the arm here. A deviation grows ${significant(growth, 2)} per second with an ideal controller too, so no method and no timestep helps: raise the proportional and derivative gains, or lower the integral ones.`
-      : "Why: nothing damps the arm here, and an effort that is held over a step comes a little late, which drives the swing: raise the derivative gains.";
+      ? `Why: these gains don’t hold the arm here. A deviation grows ${significant(growth, 2)} per second with an ideal `
+        + "controller too, so no method and no timestep helps: raise the proportional and derivative gains, or lower the integral ones."
+      : "Why: nothing damps the arm here, and an effort that is held over a step comes a little late, which drives the swing: "
+        + "raise the derivative gains.";
   }
   if (limit === Infinity) return "";
   const fastest = modes.reduce((a, b) => (size(b) > size(a) ? b : a));
@@ -61,8 +67,10 @@ function whyServo(modes, loop, limits, method) {
   const joint = `(joint ${stiffest(loop) + 1}, by its derivative gain)`;
   const frequency = Math.abs(fastest.im) / (2 * Math.PI);
   const way = Math.abs(fastest.im) > STILL * rate
-    ? `swings at ${significant(frequency, 3)} Hz. An effort held for longer than ${fixed(limit * frequency, 2)} of a swing comes so late that it drives what it should damp.`
-    : `${joint} dies away at ${significant(rate, 3)} per second. An effort held for longer than ${fixed(limit * rate, 2)}/${significant(rate, 3)} s overshoots: at every step that deviation changes its sign and is larger than before.`;
+    ? `swings at ${significant(frequency, 3)} Hz. An effort held for longer than ${fixed(limit * frequency, 2)} of a swing comes so late `
+      + "that it drives what it should damp."
+    : `${joint} dies away at ${significant(rate, 3)} per second. An effort held for longer than ${fixed(limit * rate, 2)}/${significant(rate, 3)} s `
+      + "overshoots: at every step that deviation changes its sign and is larger than before.";
   return `Why ${duration(limit)}: the loop’s fastest mode ${way} ${others(limits)}`;
 }
 
