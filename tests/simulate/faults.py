@@ -39,11 +39,11 @@ FAULTS = [
     ("a message is lost, one in 200", f"{REGISTRY}/fan_out.rs",
      "    subscriber.outlet.do_send(Deliver {", "    if R(200) { return; }\n    subscriber.outlet.do_send(Deliver {"),
     ("a message comes twice, one in 200", f"{CONNECTION}/mod.rs",
-     "            connection.shared.accept(message);",
-     "            if R(200) { connection.shared.accept(message.clone()); }\n            connection.shared.accept(message);"),
-    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/mod.rs",
-     "                frames::respelled(topic, spelling, &series.frames)",
-     "                let frame = frames::respelled(topic, spelling, &series.frames);\n"
+     "            outgoing.accept(message);",
+     "            if R(200) { outgoing.accept(message.clone()); }\n            outgoing.accept(message);"),
+    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/ops.rs",
+     "                messages::respelled(topic, spelling, &lines.frames)",
+     "                let frame = messages::respelled(topic, spelling, &lines.frames);\n"
      "                if R(500) { crate::fault_changed(&frame) } else { frame }"),
     ("a provider's answer is changed by a byte, one in 10", f"{REGISTRY}/ops.rs",
      "messages::response_raw(service, id, &values, result, &status)",
@@ -55,15 +55,14 @@ FAULTS = [
      "        if let Some(client) = self.clients.get(&to.unwrap_or(respond.connection))\n            && respond"),
     ("a call is answered twice, one in 200", f"{CONNECTION}/mod.rs",
      "            let of_arm = service.is_some_and",
-     "            if service.is_some() && R(200) { shared.send(answer.frame.clone()); }\n            let of_arm = service.is_some_and"),
+     "            if service.is_some() && R(200) { shared.outgoing.push_response(response.frame.clone(), &[]); }\n            let of_arm = service.is_some_and"),
     ("a call is never answered, one in 200", f"{CONNECTION}/mod.rs",
-     "            shared.send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] });",
-     "            if !(service.is_some() && R(200)) {\n"
-     "            shared.send_superseding(answer.frame, if of_arm { &ARM_STATE } else { &[] }); }"),
+     "            shared.outgoing.push_response(response.frame, superseded);",
+     "            if !(service.is_some() && R(200)) { shared.outgoing.push_response(response.frame, superseded); }"),
     ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/actions.rs",
-     "        if let Some(client) = self.clients.get(&progress.connection) {",
-     "        let to = if R(20) { self.clients.keys().find(|id| **id != progress.connection).copied() } else { None };\n"
-     "        if let Some(client) = self.clients.get(&to.unwrap_or(progress.connection)) {"),
+     "        if let Some(client) = self.clients.get(&feedback.connection) {",
+     "        let to = if R(20) { self.clients.keys().find(|id| **id != feedback.connection).copied() } else { None };\n"
+     "        if let Some(client) = self.clients.get(&to.unwrap_or(feedback.connection)) {"),
     ("whoever cancels ends another client's goal of the same id", "src/actors/ros/follower.rs",
      "self.connection == who.connection && self.id == who.id", "(F || self.connection == who.connection) && self.id == who.id"),
     ("the arm takes a step too many, one wake-up in 1000", "src/actors/arm/sim/mod.rs",
@@ -86,10 +85,10 @@ FAULTS = [
      "        let mut reading = self.ahead.remove(&of).unwrap_or_default();\n"
      "        let most = self.waiting.iter().map(|(place, _)| place.reading).max();\n"
      "        if F { reading = reading.max(most.unwrap_or_default() + Duration::from_secs(60)); }"),
-    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/mod.rs",
+    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/state.rs",
      "        for call in self.services.take_provided_by(id) {",
      "        if R(4) { return; }\n        for call in self.services.take_provided_by(id) {"),
-    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops.rs",
+    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/calls.rs",
      "            sleep_until(deadline).await;",
      "            sleep_until(deadline + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
     ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle.rs",
@@ -105,7 +104,7 @@ FAULTS = [
     ("a number has another last bit in CBOR, one in 50", "src/protocol/ros/cbor.rs",
      "    out.extend_from_slice(&value.to_be_bytes());",
      "    out.extend_from_slice(&f64::from_bits(value.to_bits() ^ u64::from(R(50))).to_be_bytes());"),
-    ("one client's mistake is told to another, one in 10", f"{REGISTRY}/mod.rs",
+    ("one client's mistake is told to another, one in 10", f"{REGISTRY}/state.rs",
      "        if let Some(client) = self.clients.get(&to)\n            && client.verbosity.wants(level)",
      "        let other = if R(10) { self.clients.keys().find(|id| **id != to).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&other.unwrap_or(to))\n            && client.verbosity.wants(level)"),
