@@ -53,7 +53,7 @@ simulate-faults: ## Put faults into a copy of the sources and see at which seed 
 	@echo "make simulate-faults: up to $(or $(SEEDS),1000) seeds each, after a build of some minutes"
 	@SEEDS="$(SEEDS)" FROM="$(FROM)" python3 tests/simulate/faults.py $(ARGS)
 
-fuzz: ## Search with every fuzz target for TIME=60 seconds (needs cargo-fuzz), or repeat RUNS=2000 fixed ones; ARGS="frame op" picks some
+fuzz: ## Search with every fuzz target for TIME=60 seconds (needs cargo-fuzz), or repeat RUNS=1000 times its share; ARGS="frame op" picks some
 	@echo "make fuzz: $(if $(RUNS),the same executions everywhere,$(or $(TIME),60) s each), after a build of some minutes"
 	@CARGO="$(CARGO)" TIME="$(TIME)" RUNS="$(RUNS)" bash scripts/fuzz.sh $(ARGS)
 
