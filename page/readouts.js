@@ -52,7 +52,7 @@ export function showReadouts() {
   setText(byId("out-method"), shortName(state.integrator?.method));
   setText(byId("out-timestep"), duration(state.integrator?.timestep ?? NaN));
   setText(byId("out-servo"), state.enabled == null ? "–" : state.enabled ? "on" : "off");
-  setText(byId("out-steps"), `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
+  setText(byId("out-steps"), state.paused ? "–" : `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
   setText(byId("out-clients"), fixed(diagnostics?.clients ?? NaN, 0));
   setText(byId("out-rate"), isStill() ? "–" : `${fixed(state.rate, 0)} Hz`);
   byId("out-rate").classList.toggle("warn", state.connection === "open" && !isStill() && state.rate > 0 && state.rate < LOW_RATE);

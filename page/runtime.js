@@ -16,8 +16,10 @@ const MISSING_POLLS = 15;
 const TRAJECTORY_MS = 400;
 /** So long after our own reset the clock's jump is taken to be its. */
 const OWN_RESET_MS = 2000;
-/** A picture that stands still, or that nobody sees, needs few joint states [ms between two]. */
+/** A picture that stands still needs few joint states [ms between two]. */
 const STILL_MS = 1000;
+/** One that nobody sees needs more: they are recorded, and a swing must be known by them when somebody looks again. */
+const HIDDEN_MS = 100;
 /** But what was done to a paused arm here is seen at once: so long all of them come [ms]. */
 const TOUCHED_MS = 300;
 /** What is reckoned or searched may take its time. */
@@ -67,14 +69,18 @@ export function start(whenReset, whenChanging) {
   document.addEventListener("visibilitychange", pace);
 }
 
-/** As many joint states as are drawn: all of a moving arm in sight, a few of one that is paused or hidden. */
+/** As many joint states as are drawn or recorded: all of a moving arm in sight, a few of one that is paused or hidden. */
 function pace() {
-  const ms = isStill() ? STILL_MS : 0;
-  for (const topic of ["/joint_states", "/arm_sim/error_estimate"]) bridge.throttle(topic, ms);
+  bridge.throttle("/joint_states", rests() ? STILL_MS : document.hidden ? HIDDEN_MS : 0);
+  bridge.throttle("/arm_sim/error_estimate", isStill() ? STILL_MS : 0);
 }
 
 export function isStill() {
-  return document.hidden || (state.paused === true && performance.now() - touched >= TOUCHED_MS);
+  return document.hidden || rests();
+}
+
+function rests() {
+  return state.paused === true && performance.now() - touched >= TOUCHED_MS;
 }
 
 /** A paused arm is in another pose by what was asked of it here. */

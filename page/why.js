@@ -5,7 +5,7 @@
 import { eigenvalues } from "./eigen.js";
 import { METHODS, duration, fixed, methodName, significant } from "./format.js";
 import { loopInForce } from "./growth.js";
-import { flow, limitOf } from "./loop.js";
+import { flow, limitOf, multipliers } from "./loop.js";
 
 /** @typedef {import("./eigen.js").Complex} Complex */
 /** @typedef {import("./loop.js").Loop} Loop */
@@ -13,8 +13,10 @@ import { flow, limitOf } from "./loop.js";
 
 /** Limits within this factor are said to be alike. */
 const ALIKE = 1.15;
-/** Parts of a mode's rate below which it does not swing. */
-const STILL = 1e-6;
+/** A step so much longer than the limit shows what grows first. */
+const BEYOND = 1.02;
+/** Parts of a half turn beyond which a mode changes its sign at every step. */
+const NEARLY = 0.999;
 
 /** Control held over each step, as it acts on the live arm; null while the loop is not known. @returns {Limits | null} */
 export function methodLimits(/** @type {any} */ state) {
@@ -62,16 +64,29 @@ function whyServo(modes, loop, limits, method) {
         + "raise the derivative gains.";
   }
   if (limit === Infinity) return "";
-  const fastest = modes.reduce((a, b) => (size(b) > size(a) ? b : a));
-  const rate = size(fastest);
-  const joint = `(joint ${stiffest(loop) + 1}, by its derivative gain)`;
-  const frequency = Math.abs(fastest.im) / (2 * Math.PI);
-  const way = Math.abs(fastest.im) > STILL * rate
-    ? `swings at ${significant(frequency, 3)} Hz. An effort held for longer than ${fixed(limit * frequency, 2)} of a swing comes so late `
-      + "that it drives what it should damp."
-    : `${joint} dies away at ${significant(rate, 3)} per second. An effort held for longer than ${fixed(limit * rate, 2)}/${significant(rate, 3)} s `
-      + "overshoots: at every step that deviation changes its sign and is larger than before.";
-  return `Why ${duration(limit)}: the loop’s fastest mode ${way} ${others(limits)}`;
+  return `Why ${duration(limit)}: ${cause(modes, loop, method, limit)} ${others(limits)}`;
+}
+
+/** What grows first when the step is a little too long. @param {Complex[]} modes @param {Loop} loop @param {string} method @param {number} limit */
+function cause(modes, loop, method, limit) {
+  const step = BEYOND * limit;
+  const first = largest(multipliers(loop, method, step) ?? []);
+  const angle = first ? Math.abs(Math.atan2(first.im, first.re)) : 0;
+  if (angle > NEARLY * Math.PI) {
+    const rate = size(largest(modes) ?? { re: 0, im: 0 });
+    return `the loop’s fastest mode (joint ${stiffest(loop) + 1}, by its derivative gain) dies away at ${significant(rate, 3)} per second. `
+      + `An effort held for longer than ${fixed(limit * rate, 2)}/${significant(rate, 3)} s overshoots: at every step that deviation changes its sign and is larger than before.`;
+  }
+  if (angle > 0) {
+    return `the loop has a swing of ${significant(angle / (2 * Math.PI * step), 3)} Hz. An effort held for longer than ${fixed(angle / (2 * Math.PI), 2)} of it comes `
+      + "so late that it drives what it should damp; a higher derivative gain damps it more.";
+  }
+  return "beyond it a deviation grows without swinging.";
+}
+
+/** @param {Complex[]} values */
+function largest(values) {
+  return values.reduce((/** @type {Complex | null} */ a, b) => (a && size(a) >= size(b) ? a : b), null);
 }
 
 /** @param {Limits} limits */

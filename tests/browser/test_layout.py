@@ -21,6 +21,20 @@ class Access:
         self.keep(f"layout-{type(self).__name__}", whole=True)
 
 
+class Free:
+    """Where the view is small nothing is in its corners."""
+
+    def test_nothing_lies_over_the_arm(self):
+        self.page.click("#lesson-limit")
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
+        over = self.page.run("""(() => { const arm = document.querySelector('#arm').getBoundingClientRect();
+            return [...document.querySelectorAll('.clock, .view-tools, #notice')].filter((one) => {
+                const b = one.getBoundingClientRect();
+                return b.bottom > arm.top + 1 && b.top < arm.bottom - 1;
+            }).map((one) => one.id || one.className); })()""")
+        self.assertEqual(over, [])
+
+
 class Desktop(Access, PageTest):
     def box(self, selector):
         return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
@@ -67,7 +81,16 @@ class ThreeLinks(Access, PageTest):
         self.assertTrue(captions)
 
 
-class Phone(Access, PageTest):
+class Laptop(Free, PageTest):
+    view = {"width": 1280, "height": 720}
+
+    def test_captions_are_whole(self):
+        self.page.until("document.querySelector('#legend-drift').textContent.length > 3")
+        clipped = self.page.run("[...document.querySelectorAll('#plots figcaption')].filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent)")
+        self.assertEqual(clipped, [])
+
+
+class Phone(Free, Access, PageTest):
     view = PHONE
 
     def test_arm_integrator_and_servo_come_first(self):
@@ -80,16 +103,6 @@ class Phone(Access, PageTest):
         self.page.until("document.querySelector('#lesson-text').textContent.startsWith('The servo steps')")
         top, bottom = self.page.run("[document.querySelector('#lesson-text').getBoundingClientRect().top, document.querySelector('#arm').getBoundingClientRect().bottom]")
         self.assertTrue(0 <= top < bottom <= 844, (top, bottom))
-
-    def test_nothing_lies_over_the_arm(self):
-        self.page.click("#lesson-limit")
-        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
-        over = self.page.run("""(() => { const arm = document.querySelector('#arm').getBoundingClientRect();
-            return [...document.querySelectorAll('.clock, .view-tools, #notice')].filter((one) => {
-                const b = one.getBoundingClientRect();
-                return b.bottom > arm.top + 1 && b.top < arm.bottom - 1;
-            }).map((one) => one.id || one.className); })()""")
-        self.assertEqual(over, [])
 
     def test_what_is_touched_is_44_pixels_high(self):
         small = self.page.run("[...document.querySelectorAll('button, select, input:not([type=checkbox], [type=radio]), summary, .segment')]"

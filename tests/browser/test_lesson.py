@@ -198,6 +198,8 @@ class BlowUp(Lesson):
 
     def test_a_click_in_the_map_brings_an_arm_that_has_diverged_back(self):
         self.page.click("#lesson-stiff")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.02)
         self.page.until("document.querySelector('#run-state').textContent === 'diverged'", 20)
         begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Begin anew')"
         self.page.until(begin_anew)
