@@ -6,6 +6,7 @@ use std::io::Write;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::arm::ticks;
 use crate::common::{Client, PATIENCE, Runtime};
 use serde_json::{Value, json};
 
@@ -66,9 +67,7 @@ fn a_signal_ends_a_program_with_clients_that_watch_flood_or_never_read() {
         while std::io::Write::write_all(&mut &flood, &frame).is_ok() {}
     });
     // The flood is under way: the arm has made some ticks beside it.
-    for _ in 0..6 {
-        watchers[0].message("/joint_states");
-    }
+    ticks(&mut watchers[0], 6);
     ends_on(&mut runtime, "TERM");
     flooding.join().unwrap();
     for client in &mut watchers {
