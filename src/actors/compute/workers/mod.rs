@@ -12,23 +12,17 @@
 //! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
 
 mod computation;
+mod queue;
 mod turns;
 
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
 
-pub use self::computation::{Computation, Progress};
+pub use self::computation::{Computation, Progress, SLICE};
+use self::queue::{Job, PoolState};
 pub use self::turns::{Owner, RUNTIME};
-use self::turns::{Ticket, Turns};
 use crate::actors::gateway::limits::MAX_CONNECTIONS;
-use crate::actors::panics::contain;
 use crate::actors::resources::budget::free_elsewhere;
-use crate::actors::resources::work_clock;
-
-/// How long one computation may keep a worker before the next one has its turn: short beside the 5 ms that a client
-/// may be delayed, long beside the cost of changing over.
-pub const SLICE: Duration = Duration::from_millis(1);
 
 /// Computations that may be here at once, waiting or running: one of each connection.
 pub const MAX_ADMITTED: usize = MAX_CONNECTIONS;
@@ -36,47 +30,10 @@ pub const MAX_ADMITTED: usize = MAX_CONNECTIONS;
 pub const BUSY: &str =
     "busy: as many computations of all clients wait as may wait; try again later";
 
-/// How often those that can't begin try again while nothing else is computed.
-const TRY_AGAIN: Duration = Duration::from_millis(10);
-
 /// A handle on the pool; clones share it.
 #[derive(Clone)]
 pub struct WorkerPool {
     shared: Arc<PoolState>,
-}
-
-struct PoolState {
-    queue: Mutex<Queue>,
-    changed: Condvar,
-}
-
-type Job = Box<dyn Computation>;
-
-#[derive(Default)]
-struct Queue {
-    turns: Turns<Job>,
-    /// Computations that can't begin yet.
-    waiting: Vec<(Ticket, Job)>,
-    closed: Option<&'static str>,
-}
-
-impl Queue {
-    /// Takes out those for whose answers nobody waits.
-    fn take_abandoned(&mut self) -> Vec<Job> {
-        self.retry();
-        self.turns.take_waiting_if(|job| job.is_abandoned())
-    }
-
-    /// Has those that could not begin try again.
-    fn retry(&mut self) {
-        for (place, job) in self.waiting.drain(..) {
-            self.turns.wait(place, job);
-        }
-    }
-
-    fn admitted(&self) -> usize {
-        self.turns.len() + self.waiting.len()
-    }
 }
 
 impl WorkerPool {
@@ -99,10 +56,7 @@ impl WorkerPool {
     /// its own.
     #[must_use]
     pub fn without_threads() -> Self {
-        let shared = Arc::new(PoolState {
-            queue: Mutex::default(),
-            changed: Condvar::new(),
-        });
+        let shared = Arc::default();
         Self { shared }
     }
 
@@ -173,108 +127,13 @@ impl WorkerPool {
     }
 }
 
-impl PoolState {
-    /// The queue. A poisoned lock is taken as it is: the queue is never left half changed.
-    fn lock(&self) -> MutexGuard<'_, Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    fn work(&self) {
-        while let Some((place, job)) = self.take() {
-            self.advance(place, job);
-        }
-    }
-
-    /// Gives a computation that was taken its turn.
-    fn advance(&self, place: Ticket, mut job: Job) {
-        let began = work_clock::spent();
-        let progress = contain(|| job.advance(work_clock::now() + SLICE));
-        let progress = progress.unwrap_or_else(|panic| {
-            tracing::error!(%panic, "a computation ended; its caller has an answer");
-            Progress::Finished
-        });
-        let took = work_clock::spent().saturating_sub(began);
-        if let Some(end) = self.put_back(place, job, progress, took) {
-            self.end(place, end, began);
-        }
-    }
-
-    fn take(&self) -> Option<(Ticket, Job)> {
-        let mut queue = self.lock();
-        loop {
-            if let Some(job) = queue.turns.next() {
-                return Some(job);
-            }
-            if queue.closed.is_some() {
-                return None;
-            }
-            if queue.waiting.is_empty() {
-                let waited = self.changed.wait(queue);
-                queue = waited.unwrap_or_else(PoisonError::into_inner);
-                continue;
-            }
-            let waited = self.changed.wait_timeout(queue, TRY_AGAIN);
-            let end;
-            (queue, end) = waited.unwrap_or_else(PoisonError::into_inner);
-            if end.timed_out() {
-                queue.retry();
-            }
-        }
-    }
-
-    /// Takes a computation back after its turn; gives it out again, with what it is to be refused for, if it was its
-    /// last.
-    fn put_back(&self, place: Ticket, job: Job, progress: Progress, took: Duration) -> Option<End> {
-        let mut queue = self.lock();
-        match (progress, queue.closed) {
-            (Progress::Finished, _) => return Some(End { job, why: None }),
-            (_, Some(why)) => {
-                let why = Some(why);
-                return Some(End { job, why });
-            }
-            (Progress::Unfinished, None) => queue.turns.again(place, job, took),
-            (Progress::Waiting, None) => {
-                let place = queue.turns.leave(place, took);
-                queue.waiting.push((place, job));
-            }
-        }
-        None
-    }
-
-    /// Ends a computation whose last turn began when this thread had had so much of a processor.
-    fn end(&self, place: Ticket, End { mut job, why }: End, began: Duration) {
-        // Dropped outside the lock: the end of a computation may free many megabytes.
-        let end = contain(move || {
-            if let Some(why) = why {
-                job.refuse(why);
-            }
-        });
-        if let Err(panic) = end {
-            tracing::error!(%panic, "the end of a computation failed");
-        }
-        let mut queue = self.lock();
-        queue
-            .turns
-            .leave(place, work_clock::spent().saturating_sub(began));
-        queue.retry();
-        if queue.turns.waiting() > 0 {
-            self.changed.notify_all();
-        }
-    }
-}
-
-/// A computation that has had its last turn.
-struct End {
-    job: Job,
-    /// The reason of its refusal, if it has not ended by itself.
-    why: Option<&'static str>,
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::actors::ConnectionId;
+    use crate::actors::resources::work_clock;
     use std::sync::mpsc;
+    use std::time::{Duration, Instant};
 
     struct Counting {
         name: &'static str,
