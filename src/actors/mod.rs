@@ -12,7 +12,7 @@
 //! `ik`, `ik_action`, `ik_trial`, `rosapi` and `rosout`, and `integration` and `study`, whose work the pool of workers
 //! does.
 //!
-//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read by the `wire` beside the node,
+//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read as the question's file says,
 //! or from another node; the [`node::Reply`] knows the way back.
 //!
 //! To the registry, from a connection:

@@ -1,6 +1,6 @@
 //! The clocks on which the cost of work is measured: the slices of computations, the arm's wake-ups. How long work may
-//! take is elapsed time; whoever has it done is charged the processor time of the thread that did it: a machine that
-//! does something else is nobody's debt.
+//! take is elapsed time; what somebody is charged for it is the processor time of the thread that did it: a machine
+//! that does something else is nobody's debt.
 //!
 //! It is the machine's own, unless a simulation counts instead: there each look costs the same, so that the work done
 //! between two looks, and all that follows from it, is the same in every run.
@@ -15,20 +15,20 @@ use rustix::time::{ClockId, clock_gettime};
 
 thread_local! {
     /// How looks are counted on this thread; none where the machine's clocks count.
-    static COUNTED: Cell<Option<Looks>> = const { Cell::new(None) };
+    static COUNTED: Cell<Option<Counted>> = const { Cell::new(None) };
 }
 
 /// Time that passes with looks at it alone.
 #[derive(Clone, Copy)]
-struct Looks {
+struct Counted {
     began: Instant,
-    /// The cost of a look.
+    /// What a look costs.
     cost: Duration,
-    /// The cost of all of them so far.
+    /// What all of them have cost so far.
     spent: Duration,
 }
 
-impl Looks {
+impl Counted {
     /// Looks once more.
     fn look(mut self) -> Self {
         self.spent += self.cost;
@@ -61,7 +61,7 @@ pub fn spent() -> Duration {
 /// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time
 /// pass.
 pub fn count(cost: Duration) {
-    COUNTED.set(Some(Looks {
+    COUNTED.set(Some(Counted {
         began: Instant::now(),
         cost,
         spent: Duration::ZERO,

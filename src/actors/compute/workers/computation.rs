@@ -2,7 +2,11 @@
 //!
 //! **Invariant:** a computation answers once, at its end or when it is refused.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
+
+/// How long one computation may keep a worker before the next one has its turn: short beside the 5 ms that a client
+/// may be delayed, long beside the cost of changing over.
+pub const SLICE: Duration = Duration::from_millis(1);
 
 /// Whether a computation wants another turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

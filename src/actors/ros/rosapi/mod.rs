@@ -6,12 +6,11 @@
 //! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the
 //! arm.
 
-mod messages;
-mod wire;
+mod services;
 
 use actix::prelude::*;
 
-pub use self::messages::{
+pub use self::services::{
     DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
     ParamChange, ParameterValue, SetParam, Unknown,
 };
@@ -21,7 +20,8 @@ use crate::actors::arm::sim::{
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
 use crate::actors::resources::aside::{Errand, aside};
-use crate::protocol::catalog::Node;
+use crate::actors::wire::Nodes;
+use crate::protocol::catalog::{self, Node, Service};
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;
 use crate::protocol::ros::urdf;
@@ -68,6 +68,23 @@ impl<const N: usize> Rosapi<N> {
     #[must_use]
     pub fn new(registry: Recipient<TakeCensus>, arm: ArmParameters<N>) -> Self {
         Self { registry, arm }
+    }
+
+    /// Enters this node's services into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        for question in catalog::Rosapi::ALL {
+            let service = Service::Rosapi(question);
+            let node = address.clone();
+            match question {
+                catalog::Rosapi::GetTime => nodes.serve::<GetTime>(service, node),
+                catalog::Rosapi::GetParam => nodes.serve::<GetParam<N>>(service, node),
+                catalog::Rosapi::SetParam => nodes.serve::<SetParam<N>>(service, node),
+                catalog::Rosapi::HasParam => nodes.serve::<HasParam>(service, node),
+                catalog::Rosapi::DeleteParam => nodes.serve::<DeleteParam>(service, node),
+                catalog::Rosapi::GetParamNames => nodes.serve::<GetParamNames>(service, node),
+                _ => nodes.serve_long::<Look>(service, node),
+            }
+        }
     }
 }
 

@@ -1,29 +1,54 @@
-//! The question in JSON, and the response, which is written a slice at a time.
+//! The question to `integration`: what it is, how it is read, and how its answer is written, a slice at a time.
 //!
 //! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's
 //! thread.
 
-use actix::prelude::*;
 use bytes::Bytes;
 
-use super::{Integration, IntegrationStep, NotIntegrated};
-use crate::actors::wire::{Address, Callable, Nodes, Streamed};
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Callable, Streamed};
 use crate::math::integrator::Method;
-use crate::math::particle::{MAX_STEPS, Particle};
+use crate::math::particle::{MAX_STEPS, Particle, ParticleError};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::streamed::StreamedResponse;
+/// Integrates a particle of one degree of freedom. All or nothing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct IntegrationStep {
+    /// Its acceleration as a formula \[m/s²\], of t in s.
+    pub function: Option<String>,
+    /// Where it starts \[m\].
+    pub x0: Option<f64>,
+    /// How fast \[m/s\]; 0 if it is not said.
+    pub xdot0: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub dt: Option<f64>,
+    /// How many.
+    pub steps: Option<u64>,
+    /// The method that takes them.
+    pub method: Option<Method>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for IntegrationStep {
+    type Answer = Result<Box<Particle>, NotIntegrated>;
+}
+
+/// Why nothing was integrated.
+#[derive(Debug, thiserror::Error)]
+pub enum NotIntegrated {
+    /// Fields were not valid.
+    #[error("{0}")]
+    Rejected(Rejections),
+    /// They do not go together.
+    #[error(transparent)]
+    Particle(#[from] ParticleError),
+}
 
 /// Numbers encoded between two looks at the clock: some tens of microseconds.
 const NUMBERS_PER_LOOK: usize = 1024;
-
-impl Integration {
-    /// Enters this node's service into the registry's table.
-    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve_long::<IntegrationStep>(Service::IntegrationStep, address.clone());
-    }
-}
 
 impl Callable for IntegrationStep {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {

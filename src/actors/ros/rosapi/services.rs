@@ -1,49 +1,172 @@
-//! The questions to `rosapi` in JSON, and the responses.
+//! The questions to `rosapi`: what each is, how it is read, and how its answer is written.
 //!
-//! **Invariant:** a parameter's value is read as the arm's own service reads it.
+//! **Invariant:** a parameter's value is read as the arm's own service reads it; a question about one that does not
+//! exist gets as far as the node, which says so.
 
 use std::borrow::Cow;
 
-use actix::prelude::*;
 use bytes::Bytes;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
-use super::{
-    DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
-    ParamChange, ParameterValue, Rosapi, SetParam, Unknown,
-};
 use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams};
-use crate::actors::wire::{Address, Answered, Callable, Nodes, Streamed};
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Answered, Callable, Streamed};
 use crate::protocol::catalog::{self, Service};
 use crate::protocol::messages::Stamp;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 use crate::protocol::ros::parameters::Parameter;
 use crate::protocol::ros::rosapi;
+use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::json;
+
+const NO_SUCH: &str = "name must be that of a parameter; get_param_names lists them";
+
+/// A question about what there is: topics, services, nodes and types.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Look {
+    /// The question.
+    pub question: catalog::Rosapi,
+    /// The name that it is about, if it is about one.
+    pub name: String,
+}
+
+/// A question and the registrations of clients: its answer is made of these and of the catalog.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listing {
+    /// The question.
+    pub look: Look,
+    /// Topics and services of clients.
+    pub census: Census,
+}
+
+impl Ask for Look {
+    type Answer = Listing;
+}
+
+/// Asks for simulation time \[s\].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GetTime;
+
+impl Ask for GetTime {
+    type Answer = f64;
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GetParam<const N: usize> {
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+    /// The value, as JSON text, that is wanted where there is none.
+    pub default: String,
+}
+
+impl<const N: usize> Ask for GetParam<N> {
+    type Answer = Result<ParameterValue<N>, Unknown>;
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterValue<const N: usize> {
+    /// A number.
+    Number(f64),
+    /// One per joint.
+    Numbers([f64; N]),
+    /// A name or a description.
+    Text(String),
+}
+
+/// There is no parameter of that name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{NO_SUCH}")]
+pub struct Unknown {
+    /// The value that was wanted in that case.
+    pub default: String,
+}
+
+/// Sets a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetParam<const N: usize> {
+    /// The change, or why there can be none.
+    pub change: Result<ParamChange<N>, NotSet>,
+}
+
+impl<const N: usize> Ask for SetParam<N> {
+    type Answer = Result<(), NotSet>;
+}
+
+/// A change of one parameter, as a question to the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParamChange<const N: usize> {
+    /// Gravity, masses or lengths.
+    Params(SetParams<N>),
+    /// Gains.
+    Gains(SetGains<N>),
+    /// Method or timestep.
+    Integrator(SetIntegrator),
+}
+
+/// Why a parameter was not set.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotSet {
+    /// There is none of that name.
+    #[error("{NO_SUCH}")]
+    Unknown,
+    /// It has no value of its own.
+    #[error("name: robot_description is made from lengths and masses")]
+    Derived,
+    /// The value can't be read.
+    #[error("value must be JSON text")]
+    NotJson,
+    /// The arm does not take it.
+    #[error("{0}")]
+    Rejected(Rejections),
+}
+
+/// Whether there is a parameter of that name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HasParam {
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+}
+
+impl Ask for HasParam {
+    type Answer = bool;
+}
+
+/// Deletes a parameter, which can't be done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeleteParam {
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+}
+
+impl Ask for DeleteParam {
+    type Answer = NotDeleted;
+}
+
+/// Why a parameter was not deleted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotDeleted {
+    /// There is none of that name.
+    #[error("{NO_SUCH}")]
+    Unknown,
+    /// The arm needs it.
+    #[error("name: the parameters of the arm can't be deleted")]
+    Fixed,
+}
+
+/// The names of all parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GetParamNames;
+
+impl Ask for GetParamNames {
+    type Answer = Vec<String>;
+}
 
 /// The value of a parameter that does not exist, as JSON text: clients parse it, so it has to be some.
 const NO_VALUE: &str = "\"\"";
-
-impl<const N: usize> Rosapi<N> {
-    /// Enters this node's services into the registry's table.
-    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        for question in catalog::Rosapi::ALL {
-            let service = Service::Rosapi(question);
-            let node = address.clone();
-            match question {
-                catalog::Rosapi::GetTime => nodes.serve::<GetTime>(service, node),
-                catalog::Rosapi::GetParam => nodes.serve::<GetParam<N>>(service, node),
-                catalog::Rosapi::SetParam => nodes.serve::<SetParam<N>>(service, node),
-                catalog::Rosapi::HasParam => nodes.serve::<HasParam>(service, node),
-                catalog::Rosapi::DeleteParam => nodes.serve::<DeleteParam>(service, node),
-                catalog::Rosapi::GetParamNames => nodes.serve::<GetParamNames>(service, node),
-                _ => nodes.serve_long::<Look>(service, node),
-            }
-        }
-    }
-}
 
 // ---- what there is --------------------------------------------------------------------------------------------------
 

@@ -1,28 +1,66 @@
-//! The questions to `ik_trial` in JSON, and the responses.
+//! The questions to `ik_trial`: what each is, how it is read, and how its answer is written.
 //!
-//! **Invariant:** a start that is refused still echoes the settings in force.
+//! **Invariant:** settings change only with a start that has no bad field; one that is refused still echoes those in
+//! force.
 
-use actix::prelude::*;
 use bytes::Bytes;
 
-use super::{IkTrial, SkipTarget, StartTrial, StopTrial, Terms};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Answered, Callable};
 use crate::math::trial::{Changes, Rejection, Settings};
-use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
 use crate::protocol::messages::goal::TrialValues;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
-impl<const N: usize> IkTrial<N> {
-    /// Enters this node's services and its topic into the registry's table.
-    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
-        nodes.serve::<StartTrial>(Service::TrialStart, address.clone());
-        nodes.serve::<SkipTarget>(Service::TrialSkip, address.clone());
-        nodes.serve::<StopTrial>(Service::TrialStop, address.clone());
-        let node = address.clone().recipient();
-        nodes.publishers.insert(Topic::TrialStatus, node);
-    }
+/// Starts a trial afresh, unless something was rejected.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StartTrial {
+    /// Settings that are to be others from now on.
+    pub changes: Changes,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for StartTrial {
+    type Answer = Terms;
+}
+
+/// The terms of trials, and whether one has been started.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Terms {
+    /// The settings in force.
+    pub settings: Settings,
+    /// Whether a trial has been started.
+    pub outcome: Result<(), NotStarted>,
+}
+
+/// Why no trial was started.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotStarted {
+    /// Fields were not valid.
+    #[error("{0}")]
+    Rejected(Rejections),
+    /// The trial's own reason.
+    #[error(transparent)]
+    Refused(#[from] Rejection),
+}
+
+/// Abandons the present target for a new one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkipTarget;
+
+impl Ask for SkipTarget {
+    type Answer = Result<(), Rejection>;
+}
+
+/// Ends the trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StopTrial;
+
+impl Ask for StopTrial {
+    type Answer = Result<(), Rejection>;
 }
 
 impl Callable for StartTrial {
