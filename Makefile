@@ -53,9 +53,9 @@ simulate-faults: ## Put faults into a copy of the sources and see at which seed 
 	@echo "make simulate-faults: up to $(or $(SEEDS),1000) seeds each, after a build of some minutes"
 	@SEEDS="$(SEEDS)" FROM="$(FROM)" python3 tests/simulate/faults.py $(ARGS)
 
-fuzz: ## Run every fuzz target for TIME=60 seconds; ARGS="frame op" picks some; needs cargo-fuzz
-	@echo "make fuzz: $(or $(TIME),60) s each, after a build of some minutes"
-	@CARGO="$(CARGO)" TIME="$(TIME)" bash scripts/fuzz.sh $(ARGS)
+fuzz: ## Search with every fuzz target for TIME=60 seconds (needs cargo-fuzz), or repeat RUNS=1000 times its share; ARGS="frame op" picks some
+	@echo "make fuzz: $(if $(RUNS),the same executions everywhere,$(or $(TIME),60) s each), after a build of some minutes"
+	@CARGO="$(CARGO)" TIME="$(TIME)" RUNS="$(RUNS)" bash scripts/fuzz.sh $(ARGS)
 
 fuzz-faults: ## Put faults into a copy of the sources and see each found by its fuzz target; ARGS="3 7" picks some; needs cargo-fuzz
 	@echo "make fuzz-faults: up to $(or $(TIME),60) s each, after a build of some minutes"
