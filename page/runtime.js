@@ -58,7 +58,7 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   bridge.subscribe("/arm_sim/error_estimate", (msg) => set("estimate", msg));
   pace();
-  setInterval(poll, POLL_MS);
+  setInterval(tick, POLL_MS);
   for (const key of ["integrator", "gains", "params", "enabled", "setpoint", "links"]) {
     watch(key, () => { if (!state.stabilityMissing) askStability(); });
   }
@@ -224,12 +224,16 @@ function goalResult(msg) {
 
 // Settings: each call asks or changes, and stores what is now in force.
 
-function poll() {
+function tick() {
   const now = performance.now();
   const rate = (arrived * 1000) / Math.max(1, now - counted);
   set("rate", state.rate > 0 && arrived > 0 ? (state.rate + rate) / 2 : rate); // timers come and go by some milliseconds
   arrived = 0;
   counted = now;
+  poll();
+}
+
+function poll() {
   if (!bridge.open || document.hidden) return;
   setParams({});
   setIntegrator({});
