@@ -37,6 +37,7 @@
 //! | [`arm_sim::TrackGoal`](arm::sim::TrackGoal) / [`arm_sim::CommandGoal`](arm::sim::CommandGoal) / [`arm_sim::EndGoal`](arm::sim::EndGoal) | `ik_action` | `arm_sim` | a goal; its setpoint, from which on it is judged at every step; its end |
 //! | [`arm_sim::GoalJudged`](arm::sim::GoalJudged) | `arm_sim` | `ik_action` | how a goal goes, or how it ended |
 //! | [`ik_action::GoalNews`](arm::ik_action::GoalNews) | `ik_action` | `ik_trial` | the same, for the node that sent it |
+//! | [`arm_sim::Tell`](arm::sim::Tell), [`Overhear`](gateway::messages::Overhear) | recorder | `arm_sim`, registry | who hears of all that passes, while it is recorded |
 //! | [`TakeCensus`](gateway::messages::TakeCensus) | rosapi | registry | which topics and services clients have |
 //! | [`arm_sim::SimulationTime`](arm::sim::SimulationTime) | rosapi, rosout | `arm_sim` | the time |
 //! | [`Deliver`](gateway::messages::Deliver) / [`Response`](gateway::messages::Response) / [`Finish`](gateway::messages::Finish) | registry | connection | bytes to send; the end |
@@ -49,6 +50,8 @@ pub mod compute;
 pub mod gateway;
 pub mod node;
 pub mod panics;
+#[cfg(feature = "record")]
+pub mod recorder;
 pub mod ros;
 pub mod runtime;
 pub mod signals;

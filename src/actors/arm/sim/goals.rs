@@ -16,7 +16,7 @@ use super::ArmSim;
 use crate::math::goal::{Cadence, Criteria, Goal, Outcome};
 use crate::math::kinematics::{forward, nearest_turn};
 use crate::math::pid::Setpoint;
-use crate::math::simulation::Simulation;
+use crate::math::simulation::{ArmInput, Simulation};
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -170,10 +170,7 @@ impl<const N: usize> Handler<CommandGoal<N>> for ArmSim<N> {
             let (target, criteria) = (tracked.goal.target(), tracked.goal.criteria());
             tracked.goal = Goal::new(target, criteria, time);
             tracked.commanded = true;
-            self.simulation.set_setpoint(Setpoint {
-                position: command.positions,
-                velocity: [0.0; N],
-            });
+            self.change(ArmInput::Setpoint(Setpoint::at(command.positions)));
         }
     }
 }

@@ -11,11 +11,13 @@
 //! **Invariant:** nothing here decides physics; the live arm does what `Simulation` does offline, bit for bit.
 
 mod goals;
+mod journal;
 mod limit;
 mod scene;
 mod services;
 mod steps;
 mod telemetry;
+mod tell;
 mod turn;
 mod wire;
 
@@ -28,6 +30,8 @@ use tokio::time::Instant;
 
 use self::goals::Goals;
 pub use self::goals::{ArmPose, CommandGoal, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
+use self::journal::Journal;
+pub use self::journal::{ArmEvent, ArmListener, ArmNews, Tell};
 use self::limit::LimitWatch;
 pub use self::limit::{ArmSettings, Consult, HeldLimit, LEAST_PAUSE, Present};
 pub use self::services::{
@@ -87,6 +91,8 @@ pub struct ArmSim<const N: usize> {
     /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next turn is on its
     /// way.
     steps: VecDeque<Steps>,
+    /// Who hears of everything that the steps depend on, if anybody does.
+    journal: Option<Journal<N>>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -112,6 +118,7 @@ impl<const N: usize> ArmSim<N> {
             limit: LimitWatch::default(),
             turn: Turn::new(),
             steps: VecDeque::new(),
+            journal: None,
         }
     }
 }
@@ -188,6 +195,7 @@ impl<const N: usize> ArmSim<N> {
             arm.advance_to_now(ctx);
             arm.watch_limit(ctx);
             arm.publish_state();
+            arm.tell_state();
             arm.schedule_tick(ctx);
         });
     }
@@ -247,6 +255,7 @@ impl<const N: usize> ArmSim<N> {
 
     /// Tells of a divergence that has just happened.
     fn note_divergence(&mut self) {
+        self.tell_divergence();
         self.telemetry.owes(0, 0.0);
         if let Some(divergence) = self.simulation.divergence() {
             tracing::warn!(

@@ -13,6 +13,7 @@ use crate::actors::node::{Ask, Call, Done, Reply};
 use crate::math::arm::{Arm, ArmError, State};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::ArmInput;
 use crate::protocol::op::fields::Rejections;
 
 // ---- messages -------------------------------------------------------------------------------------------------------
@@ -245,7 +246,7 @@ impl<const N: usize> Handler<SetSetpoint<N>> for ArmSim<N> {
 
     fn handle(&mut self, message: SetSetpoint<N>, ctx: &mut Context<Self>) {
         self.attend(ctx);
-        self.simulation.set_setpoint(message.setpoint);
+        self.change(ArmInput::Setpoint(message.setpoint));
     }
 }
 
@@ -260,13 +261,13 @@ impl<const N: usize> ArmSim<N> {
 
     fn set_integrator(&mut self, ask: SetIntegrator) -> Echo<Integrator> {
         if let Some(method) = ask.method {
-            self.simulation.set_method(method);
+            self.change(ArmInput::Method(method));
         }
         // Setting the timestep that is in force already must not cost the unfinished fraction of a step.
         if let Some(timestep) = ask.timestep
             && timestep.to_bits() != self.simulation.timestep().to_bits()
         {
-            self.simulation.set_timestep(timestep);
+            self.change(ArmInput::Timestep(timestep));
             self.restart_pacer();
         }
         Echo {
@@ -284,7 +285,7 @@ impl<const N: usize> ArmSim<N> {
         let mut rejected = ask.rejected;
         match changed {
             Ok(changed) if changed != *arm => {
-                self.simulation.set_arm(changed);
+                self.change(ArmInput::Arm(changed));
                 self.restart_energy_drift();
                 self.publish_description();
             }
@@ -298,7 +299,9 @@ impl<const N: usize> ArmSim<N> {
 
     fn set_gains(&mut self, ask: SetGains<N>) -> Echo<Gains<N>> {
         let gains = ask.applied_to(self.simulation.pid().gains());
-        self.simulation.set_gains(gains);
+        if [ask.kp, ask.ki, ask.kd].iter().any(Option::is_some) {
+            self.change(ArmInput::Gains(gains));
+        }
         Echo {
             values: *self.simulation.pid().gains(),
             rejected: ask.rejected,
@@ -323,7 +326,7 @@ impl<const N: usize> ArmSim<N> {
         if let Some(on) = ask.enabled
             && on != self.simulation.pid().is_enabled()
         {
-            self.simulation.enable(on);
+            self.change(ArmInput::Enabled(on));
             self.restart_energy_drift();
         }
         Echo {
@@ -336,7 +339,7 @@ impl<const N: usize> ArmSim<N> {
     fn reset(&mut self) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
         let ended = self.end_goal_for_reset();
         let diverged = self.simulation.divergence().is_some();
-        self.simulation.reset();
+        self.change(ArmInput::Reset);
         self.restart_pacer();
         self.restart_energy_drift();
         if diverged {

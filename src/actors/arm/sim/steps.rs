@@ -10,6 +10,7 @@ use actix::prelude::*;
 
 use super::ArmSim;
 use crate::actors::node::{Ask, Call, Reply, Unserved};
+use crate::math::simulation::ArmInput;
 use crate::protocol::op::fields::Rejections;
 
 /// Steps in one request: what one wake-up's budget is worth, and ten seconds of the default timestep.
@@ -142,7 +143,7 @@ impl<const N: usize> Handler<Call<Disturb<N>>> for ArmSim<N> {
         }
         match (ask.effort, ask.duration) {
             (Some(effort), Some(duration)) if rejected.is_empty() => {
-                self.simulation.disturb(effort, duration);
+                self.change(ArmInput::Disturbance { effort, duration });
                 reply.conclude(Ok(Push { effort, duration }));
             }
             _ => reply.conclude(Err(rejected)),
