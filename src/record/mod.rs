@@ -4,7 +4,7 @@
 //! Pure: entries in, bytes out, and back. Who makes the entries, and where the bytes go, is the
 //! [recorder](crate::actors::recorder)'s.
 //!
-//! **Invariant:** a file that was cut anywhere is readable up to there.
+//! **Invariant:** a file that was cut anywhere is readable up to its last whole chunk.
 
 mod journal;
 mod reader;

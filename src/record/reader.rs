@@ -1,6 +1,7 @@
 //! Reads a record back, message by message, as far as the file goes.
 //!
-//! **Invariant:** a message is read by the definition that is ours; one that was recorded by another is left out.
+//! **Invariant:** of a chunk that was damaged nothing is read; a message is read by the definition that is ours, one that
+//! was recorded by another is left out.
 
 use std::collections::HashMap;
 use std::io::Read;
@@ -14,8 +15,8 @@ use super::schema::{CALL, INPUT, STATE};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::cdr_reader::{self, CdrError};
 
-/// Longest message that is read: longer ones are never written.
-const MAX_MESSAGE: usize = 16 * 1024 * 1024;
+/// Longest chunk that is read: longer ones are never written.
+const MAX_CHUNK: usize = 16 * 1024 * 1024;
 
 /// A message of the record.
 #[derive(Debug, Clone, PartialEq)]
@@ -67,8 +68,8 @@ impl<R: Read> Recording<R> {
     /// Begins to read.
     pub fn new(file: R) -> Self {
         let options = LinearReaderOptions::default()
-            .with_validate_chunk_crcs(true)
-            .with_record_length_limit(MAX_MESSAGE);
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(MAX_CHUNK);
         Self {
             reader: MessageReader::new_with_options(file, options),
             known: HashMap::new(),

@@ -5,19 +5,21 @@
 use bytes::Bytes;
 
 use super::MAX_FRAME;
-use super::tape::Tape;
 use crate::actors::arm::sim::{ArmEvent, ArmListener, ArmNews};
 use crate::actors::gateway::messages::{Eavesdropper, Overheard};
 use crate::record::{Content, Note, write_note};
 
-/// Records the arm's inputs and states.
-pub(super) fn arm<const N: usize>(tape: Tape) -> ArmListener<N> {
+/// The arm's inputs and states; `put` answers whether it has taken an entry.
+#[must_use]
+pub fn arm<const N: usize>(
+    mut put: impl FnMut(Content) -> bool + Send + 'static,
+) -> ArmListener<N> {
     Box::new(move |ArmNews { step, event }| {
         let input = |note: Note<N>| Content::Input {
             step,
             note: write_note(&note),
         };
-        tape.put(match event {
+        put(match event {
             ArmEvent::Began(checkpoint) => input(Note::Begin(checkpoint)),
             ArmEvent::Changed(change) => input(Note::Input(change)),
             ArmEvent::Diverged => input(Note::Diverged),
@@ -31,8 +33,9 @@ pub(super) fn arm<const N: usize>(tape: Tape) -> ArmListener<N> {
     })
 }
 
-/// Records topics, calls and answers.
-pub(super) fn registry(tape: Tape) -> Eavesdropper {
+/// Topics, calls and answers; none for one that is longer than [`MAX_FRAME`].
+#[must_use]
+pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesdropper {
     Box::new(move |what| {
         let length = match &what {
             Overheard::Published(_, frame) | Overheard::Answered { frame, .. } => frame.len(),
@@ -40,9 +43,9 @@ pub(super) fn registry(tape: Tape) -> Eavesdropper {
             Overheard::Called { args, .. } => args.line().len(),
         };
         if length > MAX_FRAME {
-            return tape.leave_out();
+            return put(None);
         }
-        tape.put(match what {
+        put(Some(match what {
             Overheard::Published(topic, frame) => Content::Published {
                 topic,
                 frame: copied(frame),
@@ -67,7 +70,7 @@ pub(super) fn registry(tape: Tape) -> Eavesdropper {
                 service,
                 frame: copied(frame),
             },
-        });
+        }));
     })
 }
 

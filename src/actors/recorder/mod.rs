@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** there is one record at a time; arm and registry tell nothing without one.
 
-mod listeners;
+pub mod listeners;
 mod messages;
 mod tape;
 mod wire;
@@ -31,9 +31,9 @@ pub const MAX_FRAME: usize = 1024 * 1024;
 /// What a killed program may cost of a record.
 pub const FLUSH_PERIOD: Duration = Duration::from_secs(1);
 /// Length of a record that a client has started; it ends there. Some nine hours of an arm that is left alone.
-pub const MAX_FILE: u64 = 1024 * 1024 * 1024;
+pub const MAX_RECORD_BYTES: u64 = 1024 * 1024 * 1024;
 /// Records in the folder beyond which no client starts another.
-pub const MAX_FILES: usize = 100;
+pub const MAX_RECORDS: usize = 100;
 /// Longest name of a record.
 pub const MAX_FILE_NAME: usize = 64;
 
@@ -110,7 +110,7 @@ impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
         }
         let target = Target {
             path: folder.join(&name),
-            limit: Some(MAX_FILE),
+            limit: Some(MAX_RECORD_BYTES),
         };
         let begun = self.begin(target, ctx);
         ctx.wait(begun.map(move |begun, _, _| reply.answer(begun.map(|()| name))));
@@ -122,6 +122,9 @@ impl<const N: usize> Handler<Call<StopRecording>> for Recorder<N> {
 
     fn handle(&mut self, call: Call<StopRecording>, ctx: &mut Context<Self>) {
         let mut reply = call.reply;
+        if self.folder.is_none() {
+            return reply.answer(Err(NotRecorded::NoFolder));
+        }
         let ended = self.end();
         ctx.wait(ended.map(move |ended, _, _| reply.answer(ended.ok_or(NotRecorded::Nothing))));
     }
@@ -188,8 +191,13 @@ impl<const N: usize> Recorder<N> {
             };
             let Begun { tape, end } = begun.await.map_err(no_thread)??;
             // Either is there as long as the program.
-            let _ = arm.send(Tell(Some(listeners::arm(tape.clone())))).await;
-            let eavesdropper = listeners::registry(tape);
+            let of_arm = tape.clone();
+            let listener = listeners::arm(move |content| of_arm.put(content));
+            let _ = arm.send(Tell(Some(listener))).await;
+            let eavesdropper = listeners::registry(move |content| {
+                // Without any one of these the run can be repeated all the same.
+                let _ = tape.put_or_count(content);
+            });
             let _ = registry.send(Overhear(Some(eavesdropper))).await;
             Ok(end)
         };

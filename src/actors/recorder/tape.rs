@@ -15,7 +15,7 @@ use std::time::{Duration, Instant, SystemTime};
 use tokio::sync::oneshot;
 
 use super::messages::{NotRecorded, Recorded};
-use super::{FLUSH_PERIOD, MAX_FILES, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
+use super::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
 use crate::record::{Content, Entry, RecordError, Scribe, Settings};
 
 /// The end of a record's file name.
@@ -112,8 +112,8 @@ fn open(target: &Target) -> Result<File, NotRecorded> {
             .map_err(refused)?
             .filter_map(Result::ok)
             .filter(|entry| entry.path().extension().is_some_and(|end| end == EXTENSION));
-        if records.take(MAX_FILES).count() == MAX_FILES {
-            return Err(NotRecorded::Full(MAX_FILES));
+        if records.take(MAX_RECORDS).count() == MAX_RECORDS {
+            return Err(NotRecorded::Full(MAX_RECORDS));
         }
     }
     File::create_new(&target.path).map_err(refused)
@@ -155,9 +155,12 @@ impl Tape {
         false
     }
 
-    /// Counts something that is too long to be recorded.
-    pub(super) fn leave_out(&self) {
-        self.counts.dropped.fetch_add(1, Ordering::Relaxed);
+    /// The same; something that was too long to be made an entry is dropped.
+    pub(super) fn put_or_count(&self, content: Option<Content>) -> bool {
+        if content.is_none() {
+            self.counts.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        content.is_some_and(|content| self.put(content))
     }
 }
 
@@ -267,5 +270,127 @@ fn take_entries(
         if target.limit.is_some_and(|limit| scribe.bytes() >= limit) {
             return Ok(false);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::catalog::Topic;
+
+    /// A tape whose queue nobody empties.
+    fn stuck() -> (Tape, Receiver<Entry>) {
+        let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
+        let tape = Tape {
+            entries,
+            counts: Arc::default(),
+            clock: Clock::start(),
+        };
+        (tape, queue)
+    }
+
+    fn message(bytes: usize) -> Content {
+        Content::Heard {
+            topic: Topic::JointTrajectory,
+            msg: "x".repeat(bytes).into(),
+        }
+    }
+
+    fn input() -> Content {
+        Content::Input {
+            step: 0,
+            note: String::new(),
+        }
+    }
+
+    fn dropped(tape: &Tape) -> u64 {
+        tape.counts.dropped.load(Ordering::Relaxed)
+    }
+
+    #[test]
+    fn topics_leave_half_of_the_queue_to_inputs() {
+        let (tape, queue) = stuck();
+        for _ in 0..MAX_WAITING_ENTRIES / 2 {
+            assert!(tape.put(message(1)));
+        }
+        assert!(!tape.put(message(1)));
+        for _ in MAX_WAITING_ENTRIES / 2..MAX_WAITING_ENTRIES {
+            assert!(tape.put(input()));
+        }
+        assert!(!tape.put(input()));
+        assert_eq!(dropped(&tape), 2);
+        let taken = queue.recv().unwrap();
+        tape.counts.written(taken.content.allocated());
+        assert!(tape.put(input()));
+    }
+
+    #[test]
+    fn the_bytes_that_wait_are_bounded() {
+        let (tape, _queue) = stuck();
+        let long = 1024 * 1024;
+        let taken = (0..).take_while(|_| tape.put(message(long))).count();
+        assert_eq!(
+            taken,
+            MAX_WAITING_BYTES / 2 / long - 1,
+            "each with a little beside its text"
+        );
+        assert!(tape.put(input()));
+        assert_eq!(dropped(&tape), 1);
+        assert!(!tape.put_or_count(None));
+        assert_eq!(dropped(&tape), 2);
+    }
+
+    #[test]
+    fn a_record_ends_at_its_limit_and_its_tapes_are_told() {
+        let folder = std::env::temp_dir().join(format!("pendularm-tape-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("short.mcap");
+        let _ = fs::remove_file(&path);
+        let (tell, told) = std::sync::mpsc::channel();
+        let settings = Settings { links: 2, seed: 0 };
+        let target = Target {
+            path: path.clone(),
+            limit: Some(1000),
+        };
+        let begun = begin(target, settings, move || tell.send(()).unwrap());
+        let Begun { tape, end } = begun.blocking_recv().unwrap().unwrap();
+        while tape.put(input()) {}
+        told.recv().unwrap();
+        let recorded = end.blocking_recv().unwrap();
+        assert!(
+            recorded.bytes >= 1000 && recorded.bytes < 1100,
+            "{recorded:?}"
+        );
+        let mut recording = crate::record::Recording::new(File::open(&path).unwrap());
+        let mut read = 0;
+        while recording.next_passage().unwrap().is_some() {
+            read += 1;
+        }
+        assert_eq!(read, recorded.messages);
+        assert_eq!(recording.ending(), Some(crate::record::Ending::Whole));
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_holds_so_many_records_and_no_more() {
+        let folder = std::env::temp_dir().join(format!("pendularm-tapes-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let target = |name: &str| Target {
+            path: folder.join(name),
+            limit: Some(1),
+        };
+        for number in 1..MAX_RECORDS {
+            File::create(folder.join(format!("{number}.mcap"))).unwrap();
+        }
+        assert!(open(&target("last.mcap")).is_ok());
+        let full = open(&target("more.mcap")).err();
+        assert_eq!(full, Some(NotRecorded::Full(MAX_RECORDS)));
+        let own = Target {
+            limit: None,
+            ..target("own.mcap")
+        };
+        assert!(open(&own).is_ok(), "the operator's own is not counted");
+        assert!(open(&own).is_err(), "and overwrites nothing");
+        fs::remove_dir_all(&folder).unwrap();
     }
 }
