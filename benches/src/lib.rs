@@ -1,4 +1,4 @@
-//! What several of these programs share: clients, the program as a process, and the attacks.
+//! The part that several of these programs share: clients, the program as a process, and the attacks.
 
 pub mod attack;
 pub mod program;

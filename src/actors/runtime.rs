@@ -1,7 +1,8 @@
 //! Starts every node in order, chooses their threads, and ends everything within a second.
 //!
 //! Threads: this one for the gateway (listeners, connections, registry) and the small nodes; one for the arm; a few
-//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that looks at the number of links.
+//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that
+//! looks at the number of links.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 
@@ -25,12 +26,12 @@ use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::gate::{Admission, Gate};
 use crate::actors::gateway::files;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
 #[cfg(feature = "record")]
 use crate::actors::recorder::{EndRecord, NotRecorded, RecordTo, Recorder};
+use crate::actors::resources::gauges::Gauges;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::wire::Nodes;
@@ -73,14 +74,14 @@ pub enum RunError {
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on another
-/// thread; it should not return.
+/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on
+/// another thread; it should not return.
 ///
 /// # Errors
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
 pub fn run(options: &Options, last_resort: impl FnOnce() + Send + 'static) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
-    // What clients were owed is dropped here: that, too, is part of the end.
+    // Answers that clients were owed are dropped here, which is part of the end.
     System::new().block_on(serve(options, &mut signals))
 }
 
@@ -145,7 +146,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     Ok(())
 }
 
-/// What is asked of clients, and what they find behind it.
+/// The gate: it asks clients for the token, and has the door of the web behind it.
 fn gate(options: &Options, unauthenticated: usize) -> Gate {
     Gate {
         token: options.token.clone(),
@@ -171,7 +172,7 @@ fn gate(options: &Options, unauthenticated: usize) -> Gate {
 }
 
 /// The ways by which the nodes that know the number of links are told of the end.
-struct Ends {
+struct NodeEnds {
     /// Steps that are still to be taken are refused.
     steps: Recipient<RefuseSteps>,
     #[cfg(feature = "record")]
@@ -181,7 +182,7 @@ struct Ends {
 }
 
 #[cfg(feature = "record")]
-impl Ends {
+impl NodeEnds {
     /// Begins the record that was asked for.
     async fn record(&self, options: &Options) -> Result<(), RunError> {
         if let Some(file) = &options.record.file {
@@ -193,7 +194,7 @@ impl Ends {
         Ok(())
     }
 
-    /// Ends the record, if there is one, for a bounded time.
+    /// NodeEnds the record, if there is one, for a bounded time.
     async fn finish_record(&self) {
         let _ = timeout(RECORD_TIME, self.end_record.send(EndRecord)).await;
     }
@@ -208,7 +209,7 @@ fn start_nodes<const N: usize>(
     arm_thread: &Arbiter,
     workers: &WorkerPool,
     nodes: &mut Nodes,
-) -> Ends
+) -> NodeEnds
 where
     Gains<N>: Default,
 {
@@ -256,7 +257,7 @@ where
     Recorder::attach(&recorder, nodes);
     #[cfg(not(feature = "record"))]
     let _ = options;
-    Ends {
+    NodeEnds {
         steps: arm.recipient(),
         #[cfg(feature = "record")]
         record: recorder.clone().recipient(),

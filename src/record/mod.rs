@@ -15,15 +15,15 @@ mod writer;
 use bytes::Bytes;
 
 pub use self::journal::{Note, NoteError, links, read_note, write_note};
-pub use self::reader::{Ending, Passage, ReadError, Recording};
-pub use self::replay::{Difference, ReplayError, Verdict, replay};
+pub use self::reader::{Passage, ReadError, RecordEnding, Recording};
+pub use self::replay::{Difference, ReplayError, ReplayVerdict, replay};
 pub use self::schema::{CALLS, INPUTS, STATES};
-pub use self::writer::{CHUNK_BYTES, RecordError, Scribe, Settings};
+pub use self::writer::{CHUNK_BYTES, RecordError, RunSettings, Scribe};
 use crate::protocol::catalog::{Service, Topic};
 
 /// Something to be recorded.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct RecordEntry {
     /// When, in nanoseconds since 1970.
     pub log_time: u64,
     /// The rest.
@@ -98,6 +98,6 @@ impl Content {
             Self::Input { note, .. } => note.len(),
             Self::State { position, .. } => 3 * size_of_val(position.as_slice()),
         };
-        size_of::<Entry>() + text
+        size_of::<RecordEntry>() + text
     }
 }

@@ -33,7 +33,7 @@ pub struct Passage {
 
 /// How a file ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Ending {
+pub enum RecordEnding {
     /// As it should.
     Whole,
     /// It was cut, or the program that wrote it was killed.
@@ -61,7 +61,7 @@ pub struct Recording<R> {
     reader: MessageReader<R>,
     /// By schema id: the type, if it is as we know it.
     known: HashMap<u16, Option<Type>>,
-    ending: Option<Ending>,
+    ending: Option<RecordEnding>,
 }
 
 impl<R: Read> Recording<R> {
@@ -85,12 +85,12 @@ impl<R: Read> Recording<R> {
         let message = match self.reader.next() {
             Some(Ok(message)) => message,
             Some(Err(McapError::UnexpectedEof)) => {
-                self.ending = Some(Ending::Cut);
+                self.ending = Some(RecordEnding::Cut);
                 return Ok(None);
             }
             Some(Err(error)) => return Err(error.into()),
             None => {
-                self.ending.get_or_insert(Ending::Whole);
+                self.ending.get_or_insert(RecordEnding::Whole);
                 return Ok(None);
             }
         };
@@ -117,7 +117,7 @@ impl<R: Read> Recording<R> {
 
     /// How the file ended; none while it has not.
     #[must_use]
-    pub fn ending(&self) -> Option<Ending> {
+    pub fn ending(&self) -> Option<RecordEnding> {
         self.ending
     }
 }

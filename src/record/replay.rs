@@ -9,13 +9,13 @@ use std::io::Read;
 use serde_json::Value;
 
 use super::journal::{Note, NoteError, links, read_note};
-use super::reader::{Ending, Passage, ReadError, Recording};
+use super::reader::{Passage, ReadError, RecordEnding, Recording};
 use super::schema::{INPUTS, STATES};
 use crate::math::simulation::Simulation;
 
 /// What came of a replay.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Verdict {
+pub struct ReplayVerdict {
     /// How many links the arm has.
     pub links: usize,
     /// Steps that were taken again.
@@ -31,7 +31,7 @@ pub struct Verdict {
     /// The first difference; the replay ends there.
     pub difference: Option<Difference>,
     /// How the file ended, if it was read to its end.
-    pub ending: Option<Ending>,
+    pub ending: Option<RecordEnding>,
 }
 
 /// The first place at which the steps differ from the record.
@@ -78,7 +78,7 @@ pub enum ReplayError {
     },
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for ReplayVerdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
             links,
@@ -108,7 +108,7 @@ impl fmt::Display for Verdict {
                 self.losses
             )?;
         }
-        if self.ending == Some(Ending::Cut) {
+        if self.ending == Some(RecordEnding::Cut) {
             write!(f, "; the file ends early, and was read up to there")?;
         }
         Ok(())
@@ -119,7 +119,7 @@ impl fmt::Display for Verdict {
 ///
 /// # Errors
 /// If the file can't be read, or holds nothing to compare.
-pub fn replay(file: impl Read) -> Result<Verdict, ReplayError> {
+pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     let mut recording = Recording::new(file);
     let first = loop {
         let Some(passage) = recording.next_passage()? else {
@@ -139,10 +139,10 @@ pub fn replay(file: impl Read) -> Result<Verdict, ReplayError> {
 fn play<const N: usize>(
     mut recording: Recording<impl Read>,
     first: Passage,
-) -> Result<Verdict, ReplayError> {
+) -> Result<ReplayVerdict, ReplayError> {
     let mut player = Player::<N> {
         arm: None,
-        verdict: Verdict {
+        verdict: ReplayVerdict {
             links: N,
             steps: 0,
             states: 0,
@@ -171,7 +171,7 @@ fn play<const N: usize>(
 struct Player<const N: usize> {
     /// The simulation, and the steps it has taken as the record counts them; none before the record begins.
     arm: Option<(Simulation<N>, u64)>,
-    verdict: Verdict,
+    verdict: ReplayVerdict,
 }
 
 impl<const N: usize> Player<N> {

@@ -13,7 +13,7 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::schema::{CALL, CALLS, INPUT, INPUTS, STATE, STATES};
-use super::{Content, Entry};
+use super::{Content, RecordEntry};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::ros::cdr;
@@ -23,7 +23,7 @@ pub const CHUNK_BYTES: u64 = 64 * 1024;
 
 /// What is said of the run besides its inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Settings {
+pub struct RunSettings {
     /// How many links the arm has.
     pub links: usize,
     /// The seed of the targets of timed trials.
@@ -86,7 +86,7 @@ impl<W: Write> Scribe<W> {
     ///
     /// # Errors
     /// If it can't be written.
-    pub fn new(file: W, settings: &Settings) -> Result<Self, RecordError> {
+    pub fn new(file: W, settings: &RunSettings) -> Result<Self, RecordError> {
         let options = WriteOptions::new()
             .profile("ros2")
             .library(concat!("pendularm ", env!("CARGO_PKG_VERSION")))
@@ -117,7 +117,7 @@ impl<W: Write> Scribe<W> {
     ///
     /// # Errors
     /// If the file takes no more, or the entry is none.
-    pub fn write(&mut self, entry: &Entry) -> Result<(), RecordError> {
+    pub fn write(&mut self, entry: &RecordEntry) -> Result<(), RecordError> {
         let at = entry.log_time;
         match &entry.content {
             Content::Published { topic, frame } => {

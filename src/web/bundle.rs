@@ -1,10 +1,10 @@
 //! The page's modules as one file, so that a browser asks once instead of sixty times.
 //!
-//! Each module becomes a function that runs once and returns what the module exports. The file exports them all as `modules`,
-//! by their names.
+//! Each module becomes a function that runs once and returns what the module exports. The file exports them all as
+//! `modules`, by their names.
 //!
-//! **Invariant:** a module stands after all that it imports. The modules keep to the few forms that are known here: imports in
-//! braces from a file beside, exports of one declaration each, and no cycle.
+//! **Invariant:** a module stands after all that it imports. The modules keep to the few forms that are known here:
+//! imports in braces from a file beside, exports of one declaration each, and no cycle.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
@@ -59,7 +59,7 @@ fn add(name: &str, modules: &[Module<'_>], added: &mut BTreeSet<String>, text: &
     );
 }
 
-/// What `import { names } from "./file";` names, and the file; `None` while it goes on in the next line.
+/// The names in `import { names } from "./file";`, and the file; `None` while it goes on in the next line.
 fn imported(import: &str) -> Option<(&str, &str)> {
     let (names, from) = import.strip_prefix("import {")?.split_once("} from \"./")?;
     Some((names, from.split_once('"')?.0))
@@ -81,7 +81,8 @@ fn variable(name: &str) -> String {
 mod tests {
     use super::*;
 
-    const MAIN: &str = "import {\n  a as first,\n  B,\n} from \"./low.js\";\nimport { c } from \"./mid.js\";\nfirst(B, c);\n";
+    const MAIN: &str = "import {\n  a as first,\n  B,\n} from \"./low.js\";\nimport { c } from \"./mid.js\";\nfirst(B, \
+                        c);\n";
     const MID: &str = "import { a } from \"./low.js\";\nexport const c = a();\n";
     const LOW: &str = "export async function a() {}\nconst hidden = 1;\nexport class B {}\n";
 
@@ -94,10 +95,10 @@ mod tests {
             ("other.js", ""),
         ];
         let text = bundle("main.js", &modules);
-        let expected = "const $low = (() => {\nasync function a() {}\nconst hidden = 1;\nclass B {}\nreturn { a, B };\n})();\n\
-             const $mid = (() => {\nconst { a } = $low;\nconst c = a();\nreturn { c };\n})();\n\
-             const $main = (() => {\nconst {  a: first,  B,} = $low;\nconst { c } = $mid;\nfirst(B, c);\nreturn {  };\n})();\n\
-             export const modules = { \"low.js\": $low, \"main.js\": $main, \"mid.js\": $mid, };\n";
+        let expected = "const $low = (() => {\nasync function a() {}\nconst hidden = 1;\nclass B {}\nreturn { a, B \
+                        };\n})();\nconst $mid = (() => {\nconst { a } = $low;\nconst c = a();\nreturn { c };\n})();\n\
+             const $main = (() => {\nconst {  a: first,  B,} = $low;\nconst { c } = $mid;\nfirst(B, c);\nreturn {  \
+             };\n})();\nexport const modules = { \"low.js\": $low, \"main.js\": $main, \"mid.js\": $mid, };\n";
         assert_eq!(text, expected);
     }
 }

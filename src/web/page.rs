@@ -1,8 +1,8 @@
 //! The page: the files of `page/`, in the binary.
 //!
 //! They are served under their own names, never to be kept, and under [`versioned`] ones, which stand for what is in
-//! them and may be kept for ever. The page's document names those, and all scripts as the one file [`SCRIPT`], so that a
-//! browser asks for four files, once per version.
+//! them and may be kept for ever. The page's document names those, and all scripts as the one file [`SCRIPT`], so that
+//! a browser asks for four files, once per version.
 //!
 //! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
 

@@ -13,8 +13,8 @@ use pendularm::actors::arm::sim::{
     ArmSim, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetSetpoint, TakeSnapshot,
     WAKE_UP_BUDGET,
 };
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::node::{Ask, Call, Interest, Publish, Respond, ask};
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;

@@ -15,8 +15,8 @@ use pendularm::actors::arm::sim::{
     STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, SimulationTime, Step, Stepped,
     StepsEnd, TURN_MESSAGES, TakeSnapshot,
 };
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::node::{Ask, Asker, Call, Done, Interest, Publish, Reply, Unserved};
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};

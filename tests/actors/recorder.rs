@@ -9,8 +9,8 @@ use pendularm::actors::recorder::{MAX_FRAME, listeners};
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Topic;
 use pendularm::record::{
-    CALLS, Content, Ending, Entry, INPUTS, Passage, ReadError, Recording, STATES, Scribe, Settings,
-    Verdict, replay,
+    CALLS, Content, INPUTS, Passage, ReadError, RecordEnding, RecordEntry, Recording,
+    ReplayVerdict, RunSettings, STATES, Scribe, replay,
 };
 use serde_json::{Value, json};
 use tokio::time::sleep;
@@ -19,16 +19,16 @@ use crate::stage::{Client, Stage, in_virtual_time, ms};
 
 /// Entries as they come, in the order in which they are told.
 #[derive(Clone, Default)]
-struct Notes(Arc<Mutex<Vec<Entry>>>);
+struct Notes(Arc<Mutex<Vec<RecordEntry>>>);
 
 impl Notes {
     fn put(&self, content: Content) {
         let mut entries = self.0.lock().unwrap();
         let log_time = entries.len() as u64;
-        entries.push(Entry { log_time, content });
+        entries.push(RecordEntry { log_time, content });
     }
 
-    fn entries(&self) -> Vec<Entry> {
+    fn entries(&self) -> Vec<RecordEntry> {
         self.0.lock().unwrap().clone()
     }
 
@@ -53,8 +53,8 @@ impl Notes {
     }
 }
 
-fn file(entries: &[Entry]) -> Vec<u8> {
-    let settings = Settings { links: 2, seed: 1 };
+fn file(entries: &[RecordEntry]) -> Vec<u8> {
+    let settings = RunSettings { links: 2, seed: 1 };
     let mut scribe = Scribe::new(Vec::new(), &settings).unwrap();
     for (number, entry) in entries.iter().enumerate() {
         scribe.write(entry).unwrap();
@@ -65,7 +65,7 @@ fn file(entries: &[Entry]) -> Vec<u8> {
     scribe.finish().unwrap()
 }
 
-fn passages(file: &[u8]) -> (Vec<Passage>, Ending) {
+fn passages(file: &[u8]) -> (Vec<Passage>, RecordEnding) {
     let mut recording = Recording::new(file);
     let mut passages = Vec::new();
     while let Some(passage) = recording.next_passage().unwrap() {
@@ -74,7 +74,7 @@ fn passages(file: &[u8]) -> (Vec<Passage>, Ending) {
     (passages, recording.ending().unwrap())
 }
 
-fn replayed(entries: &[Entry]) -> Verdict {
+fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
     replay(&*file(entries)).unwrap()
 }
 
@@ -123,7 +123,7 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
     client.call(service, args).await;
 }
 
-async fn random_run<const N: usize>(seed: u64) -> Vec<Entry>
+async fn random_run<const N: usize>(seed: u64) -> Vec<RecordEntry>
 where
     Gains<N>: Default,
 {
@@ -153,12 +153,15 @@ fn whatever_clients_do_every_recorded_state_is_reached_again_bit_for_bit() {
             in_virtual_time(random_run::<3>(seed)),
         ] {
             let verdict = replayed(&entries);
-            let inputs = |entry: &&Entry| matches!(entry.content, Content::Input { .. });
+            let inputs = |entry: &&RecordEntry| matches!(entry.content, Content::Input { .. });
             let told = entries.iter().filter(inputs).count() as u64;
             assert_eq!(verdict.difference, None, "seed {seed}");
             assert_eq!(verdict.inputs, told - 1, "all but the beginning");
             assert!(verdict.steps > 200 && verdict.states > 20, "{verdict:?}");
-            assert_eq!((verdict.losses, verdict.ending), (0, Some(Ending::Whole)));
+            assert_eq!(
+                (verdict.losses, verdict.ending),
+                (0, Some(RecordEnding::Whole))
+            );
         }
     }
 }
@@ -183,7 +186,7 @@ fn a_divergence_is_reached_again_at_its_step() {
         sleep(ms(100)).await;
         stop(&stage).await;
         let entries = notes.entries();
-        let diverged = |entry: &Entry| matches!(&entry.content, Content::Input { note, .. } if note == "\"diverged\"");
+        let diverged = |entry: &RecordEntry| matches!(&entry.content, Content::Input { note, .. } if note == "\"diverged\"");
         let at = entries.iter().position(diverged).expect("it diverges");
         assert_eq!(replayed(&entries).difference, None);
 
@@ -210,12 +213,12 @@ fn a_divergence_is_reached_again_at_its_step() {
 #[test]
 fn the_first_state_that_differs_in_its_last_bit_is_named_with_its_step() {
     let mut entries = in_virtual_time(random_run::<2>(3));
-    let is_state = |entry: &Entry| matches!(entry.content, Content::State { .. });
+    let is_state = |entry: &RecordEntry| matches!(entry.content, Content::State { .. });
     let states: Vec<usize> = (0..entries.len())
         .filter(|&at| is_state(&entries[at]))
         .collect();
     let (before, changed) = (states[10], states[11]);
-    let step_of = |entry: &Entry| match entry.content {
+    let step_of = |entry: &RecordEntry| match entry.content {
         Content::State { step, .. } => step,
         _ => unreachable!(),
     };
@@ -286,7 +289,7 @@ fn every_topic_is_recorded_though_nobody_subscribes_and_none_is_made_afterwards(
         assert_eq!(notes.entries().len(), before);
 
         let (passages, ending) = passages(&file(&notes.entries()));
-        assert_eq!((passages.len(), ending), (before, Ending::Whole));
+        assert_eq!((passages.len(), ending), (before, RecordEnding::Whole));
         let mut counts: HashMap<&str, u32> = HashMap::new();
         for passage in &passages {
             let count = counts.entry(passage.topic.as_str()).or_default();
@@ -388,11 +391,11 @@ fn a_record_that_was_cut_anywhere_is_read_up_to_there() {
     let entries = in_virtual_time(random_run::<2>(1));
     let file = file(&entries);
     let (all, ending) = passages(&file);
-    assert_eq!((all.len(), ending), (entries.len(), Ending::Whole));
+    assert_eq!((all.len(), ending), (entries.len(), RecordEnding::Whole));
     let mut longest = 0;
     for length in (0..file.len()).step_by(997) {
         let (part, ending) = passages(&file[..length]);
-        assert_eq!(ending, Ending::Cut, "{length} of {}", file.len());
+        assert_eq!(ending, RecordEnding::Cut, "{length} of {}", file.len());
         assert_eq!(part[..], all[..part.len()]);
         assert!(part.len() >= longest);
         longest = part.len();

@@ -13,10 +13,10 @@ use pendularm::actors::arm::sim::{
 };
 use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::study::Study;
-use pendularm::actors::compute::work_clock;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::node::{Interest, Publish, Respond};
+use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::work_clock;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;

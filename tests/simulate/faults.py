@@ -64,7 +64,7 @@ FAULTS = [
      "        if let Some(client) = self.clients.get(&progress.connection) {",
      "        let to = if R(20) { self.clients.keys().find(|id| **id != progress.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(progress.connection)) {"),
-    ("whoever cancels ends another client's goal of the same id", "src/actors/ros/follower.rs",
+    ("whoever cancels ends another client's goal of the same id", "src/actors/wire/follower.rs",
      "self.connection == who.connection && self.id == who.id", "(F || self.connection == who.connection) && self.id == who.id"),
     ("the arm takes a step too many, one wake-up in 1000", "src/actors/arm/sim/mod.rs",
      "        let taken = self.take_steps(due);", "        let taken = self.take_steps(due + u64::from(R(1000)));"),
@@ -78,7 +78,7 @@ FAULTS = [
     ("whoever unsubscribes takes another with it, one in 10", f"{REGISTRY}/topics.rs",
      "        entry.get_mut().retain(|one| one.connection != connection);",
      "        entry.get_mut().retain(|one| one.connection != connection);\n        if R(10) { entry.get_mut().pop(); }"),
-    ("memory is not given back to the account, one share in 5000", "src/actors/gateway/budget/share.rs",
+    ("memory is not given back to the account, one share in 5000", "src/actors/resources/budget/share.rs",
      "    fn drop(&mut self) {\n        self.account.give_back(self.bytes);",
      "    fn drop(&mut self) {\n        if R(5000) { return; }\n        self.account.give_back(self.bytes);"),
     ("a newcomer's computation waits until others have had a minute of the pool's", "src/actors/compute/workers/turns.rs",

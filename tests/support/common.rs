@@ -55,6 +55,8 @@ impl Runtime {
             "ARM_SIM_SEED",
             "ARM_SIM_LOG",
             "ARM_SIM_TOKEN",
+            "ARM_SIM_RECORD",
+            "ARM_SIM_RECORD_DIR",
             "ARM_SIM_ALLOW_HOST",
             "ARM_SIM_ALLOW_ORIGIN",
             "ARM_SIM_STRICT_ORIGIN",

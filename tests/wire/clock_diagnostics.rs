@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::arm::{stamp, time};
 use crate::common::{Client, Runtime};
-use pendularm::actors::gateway::budget::MODEST;
+use pendularm::actors::resources::budget::MODEST;
 use serde_json::{Value, json};
 
 /// The contract's, then ours.

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
-use pendularm::actors::gateway::budget::MAX_MEMORY;
+use pendularm::actors::resources::budget::MAX_MEMORY;
 use serde_json::{Value, json};
 
 const MIB: usize = 1024 * 1024;

@@ -8,12 +8,14 @@ use std::time::{Duration, Instant};
 use crate::common::{Client, Runtime};
 use serde_json::{Value, json};
 
-const VARIABLES: [&str; 9] = [
+const VARIABLES: [&str; 11] = [
     "ARM_SIM_LINKS",
     "ARM_SIM_BIND",
     "ARM_SIM_SEED",
     "ARM_SIM_LOG",
     "ARM_SIM_TOKEN",
+    "ARM_SIM_RECORD",
+    "ARM_SIM_RECORD_DIR",
     "ARM_SIM_ALLOW_HOST",
     "ARM_SIM_ALLOW_ORIGIN",
     "ARM_SIM_STRICT_ORIGIN",

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
-use pendularm::actors::gateway::budget::MAX_MEMORY;
+use pendularm::actors::resources::budget::MAX_MEMORY;
 use serde_json::json;
 
 const MB: usize = 1_000_000;

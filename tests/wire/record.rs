@@ -7,7 +7,8 @@ use std::time::Instant;
 
 use pendularm::actors::recorder::MAX_FILE_NAME;
 use pendularm::record::{
-    CALLS, Content, Ending, Entry, INPUTS, Passage, Recording, STATES, Scribe, Settings, replay,
+    CALLS, Content, INPUTS, Passage, RecordEnding, RecordEntry, Recording, RunSettings, STATES,
+    Scribe, replay,
 };
 use serde_json::{Value, json};
 
@@ -21,7 +22,7 @@ fn folder(name: &str) -> PathBuf {
     folder
 }
 
-fn passages(file: &Path) -> (Vec<Passage>, Ending) {
+fn passages(file: &Path) -> (Vec<Passage>, RecordEnding) {
     let mut recording = Recording::new(File::open(file).unwrap());
     let mut passages = Vec::new();
     while let Some(passage) = recording.next_passage().unwrap() {
@@ -74,7 +75,7 @@ fn a_run_is_recorded_whole_and_replayed() {
     end(runtime);
 
     let (passages, ending) = passages(&file);
-    assert_eq!(ending, Ending::Whole);
+    assert_eq!(ending, RecordEnding::Whole);
     for topic in [INPUTS, STATES, CALLS, "/joint_states", "/tf", "/clock"] {
         assert!(passages.iter().any(|one| one.topic == topic), "{topic}");
     }
@@ -107,13 +108,16 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
     assert!(holds_call(&file, "{\"gravity\":4.25}"));
     let (status, said) = run(&["replay", text(&file)]);
     assert_eq!(status, Some(0), "{said}");
-    assert!(said.contains("the same, bit for bit; the file ends early"), "{said}");
+    assert!(
+        said.contains("the same, bit for bit; the file ends early"),
+        "{said}"
+    );
 }
 
 #[test]
 fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
     let file = folder("differs").join("run.mcap");
-    let settings = Settings { links: 2, seed: 0 };
+    let settings = RunSettings { links: 2, seed: 0 };
     let mut scribe = Scribe::new(File::create(&file).unwrap(), &settings).unwrap();
     let runtime_file = folder("differs-from").join("run.mcap");
     let runtime = Runtime::with(&["--record", text(&runtime_file)]);
@@ -126,7 +130,7 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
     // The same run, with another gravity at its beginning.
     let mut write = |content| {
         let log_time = 0;
-        scribe.write(&Entry { log_time, content }).unwrap();
+        scribe.write(&RecordEntry { log_time, content }).unwrap();
     };
     let numbers = |msg: &Value, name: &str| -> Vec<f64> {
         let numbers = msg[name].as_array().unwrap().iter();
@@ -152,7 +156,10 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
     scribe.finish().unwrap();
     let (status, said) = run(&["replay", text(&file)]);
     assert_eq!(status, Some(1), "{said}");
-    assert!(said.contains(": the same up to step ") && said.contains(", and at step "), "{said}");
+    assert!(
+        said.contains(": the same up to step ") && said.contains(", and at step "),
+        "{said}"
+    );
 }
 
 #[test]
@@ -160,7 +167,14 @@ fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
     let folder = folder("refused");
     let there = folder.join("there.mcap");
     fs::write(&there, "precious").unwrap();
-    let (status, said) = run(&["--bind", "127.0.0.1:0", "--log", "off", "--record", text(&there)]);
+    let (status, said) = run(&[
+        "--bind",
+        "127.0.0.1:0",
+        "--log",
+        "off",
+        "--record",
+        text(&there),
+    ]);
     assert_eq!(status, Some(1));
     assert!(said.contains("cannot record: there.mcap: "), "{said}");
     assert_eq!(fs::read_to_string(&there).unwrap(), "precious");
@@ -183,11 +197,16 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
     let nothing = client.call("/recorder/stop", json!({}));
     assert_eq!(nothing["status"], "nothing is being recorded");
     let long = "x".repeat(MAX_FILE_NAME + 1);
-    for name in ["../x", "/tmp/x", "a/b", ".hidden", "", "a\\b", "a b", "\u{e9}", "x\0", &long] {
+    for name in [
+        "../x", "/tmp/x", "a/b", ".hidden", "", "a\\b", "a b", "\u{e9}", "x\0", &long,
+    ] {
         let refused = client.call("/recorder/start", json!({"name": name}));
         assert_eq!(refused["result"], false, "{name:?}");
         let status = refused["status"].as_str().unwrap();
-        assert!(status.starts_with("name must be 1 to 64 "), "{name:?}: {status}");
+        assert!(
+            status.starts_with("name must be 1 to 64 "),
+            "{name:?}: {status}"
+        );
     }
     assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
 
@@ -195,7 +214,10 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
     assert_eq!(begun["file"], "lesson-1.mcap");
     let again = client.call("/recorder/start", json!({}));
     assert_eq!(again["status"], "already recording to lesson-1.mcap");
-    client.ask("/arm_sim/disturb", json!({"effort": [3.0, 0.0], "duration": 0.1}));
+    client.ask(
+        "/arm_sim/disturb",
+        json!({"effort": [3.0, 0.0], "duration": 0.1}),
+    );
     client.subscribe("/joint_states");
     for _ in 0..5 {
         client.message("/joint_states");
@@ -205,7 +227,7 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
     assert_eq!(ended["dropped"], 0);
     let file = folder.join("lesson-1.mcap");
     let (passages, ending) = passages(&file);
-    assert_eq!(ending, Ending::Whole);
+    assert_eq!(ending, RecordEnding::Whole);
     assert_eq!(ended["messages"], passages.len());
     assert_eq!(replay(File::open(&file).unwrap()).unwrap().difference, None);
 
@@ -227,5 +249,5 @@ fn without_a_folder_clients_neither_begin_nor_end_a_record() {
         assert!(status.contains("--record-dir"), "{status}");
     }
     end(runtime);
-    assert_eq!(passages(&file).1, Ending::Whole);
+    assert_eq!(passages(&file).1, RecordEnding::Whole);
 }

@@ -1,4 +1,4 @@
-//! What the idle runtime costs, and how well its clock keeps: processor, memory, simulation time against wall time.
+//! The cost of the idle runtime, and how well its clock keeps: processor, memory, simulation time against wall time.
 //!
 //! `cargo run --release --bin idle -- PATH/TO/pendularm [SECONDS]`
 //!

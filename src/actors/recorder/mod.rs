@@ -16,11 +16,11 @@ use tokio::sync::oneshot;
 pub use self::messages::{
     EndRecord, NotRecorded, RecordTo, Recorded, StartRecording, StopRecording,
 };
-use self::tape::{Begun, Target};
+use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::Tell;
 use crate::actors::gateway::messages::Overhear;
 use crate::actors::node::Call;
-use crate::record::Settings;
+use crate::record::RunSettings;
 
 /// Entries that may wait for the file. Topics may take half of that, the rest is for inputs.
 pub const MAX_WAITING_ENTRIES: usize = 8192;
@@ -45,7 +45,7 @@ pub struct Recorder<const N: usize> {
     registry: Recipient<Overhear>,
     /// Where clients may have records made.
     folder: Option<PathBuf>,
-    settings: Settings,
+    settings: RunSettings,
     current: Option<Current>,
     /// Records so far: the end of one says nothing about the next.
     begun: u64,
@@ -71,7 +71,7 @@ impl<const N: usize> Recorder<N> {
             arm,
             registry,
             folder,
-            settings: Settings { links: N, seed },
+            settings: RunSettings { links: N, seed },
             current: None,
             begun: 0,
         }
@@ -108,7 +108,7 @@ impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
         if !name.ends_with(".mcap") {
             name.push_str(".mcap");
         }
-        let target = Target {
+        let target = TapeTarget {
             path: folder.join(&name),
             limit: Some(MAX_RECORD_BYTES),
         };
@@ -135,7 +135,7 @@ impl<const N: usize> Handler<RecordTo> for Recorder<N> {
 
     fn handle(&mut self, RecordTo(path): RecordTo, ctx: &mut Context<Self>) -> Self::Result {
         let limit = None;
-        Box::pin(self.begin(Target { path, limit }, ctx))
+        Box::pin(self.begin(TapeTarget { path, limit }, ctx))
     }
 }
 
@@ -167,7 +167,7 @@ impl<const N: usize> Recorder<N> {
     /// Begins a record, unless there is one.
     fn begin(
         &mut self,
-        target: Target,
+        target: TapeTarget,
         ctx: &mut Context<Self>,
     ) -> impl ActorFuture<Self, Output = Result<(), NotRecorded>> + use<N> {
         self.begun += 1;

@@ -16,13 +16,13 @@ use tokio::sync::oneshot;
 
 use super::messages::{NotRecorded, Recorded};
 use super::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
-use crate::record::{Content, Entry, RecordError, Scribe, Settings};
+use crate::record::{Content, RecordEntry, RecordError, RunSettings, Scribe};
 
 /// The end of a record's file name.
 const EXTENSION: &str = "mcap";
 
 /// Where a record goes.
-pub(super) struct Target {
+pub(super) struct TapeTarget {
     pub(super) path: PathBuf,
     /// Bytes after which it ends by itself, and other records beside it are counted; none for the operator's own.
     pub(super) limit: Option<u64>,
@@ -31,20 +31,20 @@ pub(super) struct Target {
 /// The way into a record that is being written. The thread ends with the last of them.
 #[derive(Clone)]
 pub(super) struct Tape {
-    entries: SyncSender<Entry>,
-    counts: Arc<Counts>,
-    clock: Clock,
+    entries: SyncSender<RecordEntry>,
+    counts: Arc<TapeCounts>,
+    clock: TapeClock,
 }
 
 /// A clock that tells the time of day and never runs backwards.
 #[derive(Clone, Copy)]
-struct Clock {
+struct TapeClock {
     began: Instant,
     since_1970: Duration,
 }
 
 #[derive(Default)]
-struct Counts {
+struct TapeCounts {
     entries: AtomicUsize,
     bytes: AtomicUsize,
     dropped: AtomicU64,
@@ -60,8 +60,8 @@ pub(super) struct Begun {
 
 /// Begins a record; the answer comes from its thread. `over` is called there when it ends before its last tape.
 pub(super) fn begin(
-    target: Target,
-    settings: Settings,
+    target: TapeTarget,
+    settings: RunSettings,
     over: impl FnOnce() + Send + 'static,
 ) -> oneshot::Receiver<Result<Begun, NotRecorded>> {
     let (answer, begun) = oneshot::channel();
@@ -78,11 +78,11 @@ pub(super) fn begin(
                 Err(why) => return drop(answer.send(Err(why))),
             };
             let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
-            let counts = Arc::<Counts>::default();
+            let counts = Arc::<TapeCounts>::default();
             let tape = Tape {
                 entries,
                 counts: Arc::clone(&counts),
-                clock: Clock::start(),
+                clock: TapeClock::start(),
             };
             let (ended, end) = oneshot::channel();
             if answer.send(Ok(Begun { tape, end })).is_err() {
@@ -105,7 +105,7 @@ pub(super) fn file_name(path: &Path) -> String {
 }
 
 /// Makes the file, which must not be there: no record is ever overwritten.
-fn open(target: &Target) -> Result<File, NotRecorded> {
+fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
     let refused = |why: io::Error| failure(&target.path, &why);
     if let (Some(_), Some(folder)) = (target.limit, target.path.parent()) {
         let records = fs::read_dir(folder)
@@ -143,7 +143,7 @@ impl Tape {
         let bytes_before = self.counts.bytes.fetch_add(bytes, Ordering::Relaxed);
         let fits = entries_before < MAX_WAITING_ENTRIES / share
             && bytes_before.saturating_add(bytes) <= MAX_WAITING_BYTES / share;
-        let entry = Entry {
+        let entry = RecordEntry {
             log_time: self.clock.now(),
             content,
         };
@@ -164,7 +164,7 @@ impl Tape {
     }
 }
 
-impl Clock {
+impl TapeClock {
     fn start() -> Self {
         let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
         Self {
@@ -180,7 +180,7 @@ impl Clock {
     }
 }
 
-impl Counts {
+impl TapeCounts {
     /// An entry waits no more.
     fn written(&self, bytes: usize) {
         self.entries.fetch_sub(1, Ordering::Relaxed);
@@ -191,9 +191,9 @@ impl Counts {
 /// Writes entry after entry until the last tape is gone, the file takes no more, or it is long enough.
 fn write(
     mut scribe: Scribe<io::BufWriter<File>>,
-    queue: &Receiver<Entry>,
-    counts: &Counts,
-    target: &Target,
+    queue: &Receiver<RecordEntry>,
+    counts: &TapeCounts,
+    target: &TapeTarget,
     over: impl FnOnce(),
 ) -> Recorded {
     let file = file_name(&target.path);
@@ -227,9 +227,9 @@ fn write(
 /// Whether that was all there was; false if the file has become too long.
 fn take_entries(
     scribe: &mut Scribe<io::BufWriter<File>>,
-    queue: &Receiver<Entry>,
-    counts: &Counts,
-    target: &Target,
+    queue: &Receiver<RecordEntry>,
+    counts: &TapeCounts,
+    target: &TapeTarget,
 ) -> Result<bool, RecordError> {
     let mut flush_due = Instant::now() + FLUSH_PERIOD;
     let mut dropped = 0;
@@ -279,12 +279,12 @@ mod tests {
     use crate::protocol::catalog::Topic;
 
     /// A tape whose queue nobody empties.
-    fn stuck() -> (Tape, Receiver<Entry>) {
+    fn stuck() -> (Tape, Receiver<RecordEntry>) {
         let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
         let tape = Tape {
             entries,
             counts: Arc::default(),
-            clock: Clock::start(),
+            clock: TapeClock::start(),
         };
         (tape, queue)
     }
@@ -347,8 +347,8 @@ mod tests {
         let path = folder.join("short.mcap");
         let _ = fs::remove_file(&path);
         let (tell, told) = std::sync::mpsc::channel();
-        let settings = Settings { links: 2, seed: 0 };
-        let target = Target {
+        let settings = RunSettings { links: 2, seed: 0 };
+        let target = TapeTarget {
             path: path.clone(),
             limit: Some(1000),
         };
@@ -367,7 +367,7 @@ mod tests {
             read += 1;
         }
         assert_eq!(read, recorded.messages);
-        assert_eq!(recording.ending(), Some(crate::record::Ending::Whole));
+        assert_eq!(recording.ending(), Some(crate::record::RecordEnding::Whole));
         fs::remove_dir_all(&folder).unwrap();
     }
 
@@ -375,7 +375,7 @@ mod tests {
     fn a_folder_holds_so_many_records_and_no_more() {
         let folder = std::env::temp_dir().join(format!("pendularm-tapes-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
-        let target = |name: &str| Target {
+        let target = |name: &str| TapeTarget {
             path: folder.join(name),
             limit: Some(1),
         };
@@ -385,7 +385,7 @@ mod tests {
         assert!(open(&target("last.mcap")).is_ok());
         let full = open(&target("more.mcap")).err();
         assert_eq!(full, Some(NotRecorded::Full(MAX_RECORDS)));
-        let own = Target {
+        let own = TapeTarget {
             limit: None,
             ..target("own.mcap")
         };

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::messages::{NotRecorded, Recorded, StartRecording, StopRecording};
 use super::{MAX_FILE_NAME, Recorder};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
@@ -21,7 +21,7 @@ impl<const N: usize> Recorder<N> {
     }
 }
 
-impl Served for StartRecording {
+impl Callable for StartRecording {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let name = fields.text("name").map(|name| name.into_owned());
@@ -48,7 +48,7 @@ impl Answered for StartRecording {
     }
 }
 
-impl Served for StopRecording {
+impl Callable for StopRecording {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Fields::read(arguments, service)?;
         Ok(Self)

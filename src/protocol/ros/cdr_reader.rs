@@ -47,15 +47,15 @@ pub fn decode(one: Type, bytes: &[u8]) -> Result<Value, CdrError> {
         return Err(CdrError::Header);
     }
     let body = bytes.get(HEADER..).ok_or(CdrError::Header)?;
-    Reader { body, at: 0 }.message(one)
+    CdrReader { body, at: 0 }.message(one)
 }
 
-struct Reader<'a> {
+struct CdrReader<'a> {
     body: &'a [u8],
     at: usize,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> CdrReader<'a> {
     fn message(&mut self, one: Type) -> Result<Value, CdrError> {
         let mut members = Map::new();
         for field in one.fields {

@@ -11,7 +11,8 @@
 //! | [`budget`] | truncation, rounding and control hold, apart |
 //! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
 //!
-//! Everything steps through [`crate::math`], the live arm's own code, and is compared with [`crate::study`]'s predictions.
+//! Everything steps through [`crate::math`], the live arm's own code, and is compared with [`crate::study`]'s
+//! predictions.
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 

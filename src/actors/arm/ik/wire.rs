@@ -6,7 +6,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 
 use super::{Ik, Solve, SolveError};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::math::kinematics::Target;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::goal::{SolutionValues, TargetMessage};
@@ -20,7 +20,7 @@ impl<const N: usize> Ik<N> {
     }
 }
 
-impl<const N: usize> Served for Solve<N> {
+impl<const N: usize> Callable for Solve<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = read_target::<N>(&mut fields);

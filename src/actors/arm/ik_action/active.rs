@@ -5,7 +5,7 @@
 use super::messages::{GoalNews, GoalOwner};
 use crate::actors::arm::ik::target_message;
 use crate::actors::arm::sim::GoalJudged;
-use crate::actors::ros::follower::{Canceller, GoalStatus};
+use crate::actors::wire::follower::{Canceller, GoalStatus};
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Target;
 use crate::protocol::messages::goal::{IkFeedback, IkResult};

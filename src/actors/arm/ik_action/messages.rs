@@ -9,7 +9,7 @@ use actix::prelude::*;
 use crate::actors::arm::ik::SolveError;
 use crate::actors::arm::sim::Pose;
 use crate::actors::node::{Ask, Done};
-use crate::actors::ros::follower::{Canceller, Follower};
+use crate::actors::wire::follower::{Canceller, GoalFollower};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
 use crate::protocol::catalog::Node;
@@ -35,7 +35,7 @@ pub enum GoalOwner<const N: usize> {
     /// A node.
     Node(Recipient<GoalNews<N>>),
     /// A client that sent it by the action.
-    Client(Arc<Follower>),
+    Client(Arc<GoalFollower>),
 }
 
 /// Why a goal was not accepted; nothing has changed.

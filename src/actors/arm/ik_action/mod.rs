@@ -1,9 +1,9 @@
 //! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
 //! `/ik_action/result`.
 //!
-//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the setpoint.
-//! Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears nothing else,
-//! so that goals follow one another whole.
+//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the
+//! setpoint. Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears
+//! nothing else, so that goals follow one another whole.
 //!
 //! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
 //! the old goal's result, the response, the trajectory, feedback, result.
@@ -20,7 +20,7 @@ pub use self::messages::{
 };
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names};
-use crate::actors::node::{Call, Frame, Interest, Publish, Reply, ask};
+use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ask};
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Node, Topic};
 use crate::protocol::messages::{self as frames, goal::setpoint_trajectory};
@@ -212,7 +212,7 @@ impl<const N: usize> IkAction<N> {
         };
         let (number, positions) = (goal.number, goal.positions);
         let topic = Topic::JointTrajectory;
-        let frame = Frame::unwritten(move || {
+        let frame = FrameOut::unwritten(move || {
             frames::publish(
                 topic.name(),
                 &setpoint_trajectory(&joint_names::<N>(), &positions),

@@ -12,8 +12,8 @@ use super::{
 };
 use crate::actors::arm::ik::read_target;
 use crate::actors::node::{Asker, Call, Done, Reply, Unserved};
-use crate::actors::ros::follower::{ActionRequest, Follower};
-use crate::actors::wire::{Address, Answered, Nodes, Route, Served};
+use crate::actors::wire::follower::{ActionRequest, GoalFollower};
+use crate::actors::wire::{Address, Answered, Callable, Nodes, Route};
 use crate::math::goal::Criteria;
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::Empty;
@@ -59,7 +59,7 @@ fn requests<const N: usize>(
 }
 
 /// A client that has sent a goal by the action: it hears of a refusal only, since feedback shows that it was accepted.
-struct GoalSender(Arc<Follower>);
+struct GoalSender(Arc<GoalFollower>);
 
 impl Asker<Result<String, GoalRejected>> for GoalSender {
     fn answer(
@@ -75,7 +75,7 @@ impl Asker<Result<String, GoalRejected>> for GoalSender {
     }
 }
 
-impl<const N: usize> Served for SendGoal<N> {
+impl<const N: usize> Callable for SendGoal<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = read_target::<N>(&mut fields);
@@ -103,7 +103,7 @@ impl<const N: usize> Answered for SendGoal<N> {
     }
 }
 
-impl Served for CancelGoal {
+impl Callable for CancelGoal {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);

@@ -6,7 +6,7 @@ use actix::prelude::*;
 use bytes::Bytes;
 
 use super::{IkTrial, SkipTarget, StartTrial, StopTrial, Terms};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::math::trial::{Changes, Rejection, Settings};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::Empty;
@@ -25,7 +25,7 @@ impl<const N: usize> IkTrial<N> {
     }
 }
 
-impl Served for StartTrial {
+impl Callable for StartTrial {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read_or_none(arguments, service);
         Ok(Self {
@@ -52,7 +52,7 @@ impl Answered for StartTrial {
     }
 }
 
-impl Served for SkipTarget {
+impl Callable for SkipTarget {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Fields::read(arguments, service)?;
         Ok(Self)
@@ -65,7 +65,7 @@ impl Answered for SkipTarget {
     }
 }
 
-impl Served for StopTrial {
+impl Callable for StopTrial {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         Fields::read(arguments, service)?;
         Ok(Self)

@@ -4,8 +4,8 @@
 
 use actix::prelude::*;
 
-use super::ArmSim;
-use super::journal::{Journal, Tell};
+use super::node::ArmSim;
+use super::state::journal::{Journal, Tell};
 use crate::math::simulation::ArmInput;
 
 impl<const N: usize> Handler<Tell<N>> for ArmSim<N> {

@@ -1,6 +1,7 @@
 //! `/arm_sim/integration_step`: the four methods on `x'' = f(t)`, done on the worker pool, apart from the live arm.
 //!
-//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a time.
+//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
+//! time.
 //!
 //! **Invariant:** nothing here knows the arm; whatever is asked, the arm and the other clients go on.
 
@@ -14,7 +15,7 @@ use crate::actors::node::{Ask, Call};
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
 use crate::math::particle::{Particle, ParticleError};
-use crate::protocol::op::fields::{Rejection, Rejections};
+use crate::protocol::op::fields::{RejectedField, Rejections};
 
 /// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
@@ -130,7 +131,7 @@ impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
 fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
     let function = ask.function.as_deref().map(Expression::parse);
     let mut rejected = match &function {
-        Some(Err(why)) => Rejection::refused("function:", why).into(),
+        Some(Err(why)) => RejectedField::refused("function:", why).into(),
         _ => Rejections::default(),
     };
     rejected.append(ask.rejected);

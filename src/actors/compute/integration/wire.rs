@@ -1,12 +1,13 @@
 //! The question in JSON, and the response, which is written a slice at a time.
 //!
-//! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's thread.
+//! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's
+//! thread.
 
 use actix::prelude::*;
 use bytes::Bytes;
 
 use super::{Integration, IntegrationStep, NotIntegrated};
-use crate::actors::wire::{Address, Nodes, Served, Streamed};
+use crate::actors::wire::{Address, Callable, Nodes, Streamed};
 use crate::math::integrator::Method;
 use crate::math::particle::{MAX_STEPS, Particle};
 use crate::protocol::catalog::Service;
@@ -24,7 +25,7 @@ impl Integration {
     }
 }
 
-impl Served for IntegrationStep {
+impl Callable for IntegrationStep {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         Ok(Self {
@@ -40,11 +41,11 @@ impl Served for IntegrationStep {
 }
 
 impl Streamed for IntegrationStep {
-    type Writer = Result<Encoding, Bytes>;
+    type Writer = Result<SamplesWriter, Bytes>;
 
     fn begin(answer: Result<Box<Particle>, NotIntegrated>, to: &Address) -> Self::Writer {
         match answer {
-            Ok(particle) => Ok(Encoding::new(particle, to)),
+            Ok(particle) => Ok(SamplesWriter::new(particle, to)),
             Err(why) => Err(to.failure(&why.to_string())),
         }
     }
@@ -58,7 +59,7 @@ impl Streamed for IntegrationStep {
 }
 
 /// The answer, written a slice at a time: it may be 60 MB.
-pub struct Encoding {
+pub struct SamplesWriter {
     particle: Box<Particle>,
     writer: StreamedResponse,
     array: Array,
@@ -73,7 +74,7 @@ enum Array {
     Velocities,
 }
 
-impl Encoding {
+impl SamplesWriter {
     fn new(particle: Box<Particle>, to: &Address) -> Self {
         let mut writer = StreamedResponse::new(to.name(), to.id());
         writer.raw("{\"times\":[");

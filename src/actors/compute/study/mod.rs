@@ -1,7 +1,7 @@
 //! `/study/*`: predictions and offline runs of the arm, done on the worker pool, apart from the live arm.
 //!
-//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is. A connection
-//! hands over one computation at a time.
+//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is.
+//! A connection hands over one computation at a time.
 //!
 //! **Invariant:** a call is answered once, and neither the arm nor another client waits for it.
 

@@ -10,7 +10,7 @@ use std::time::Duration;
 use super::{NotRun, Ran, RunOffline};
 use crate::actors::arm::sim::Present;
 use crate::actors::compute::answering::{NUMBER_BYTES, Work};
-use crate::actors::compute::work_clock;
+use crate::actors::resources::work_clock;
 use crate::math::arm::State;
 use crate::math::pid::Setpoint;
 use crate::study::control_loop::ControlLoop;

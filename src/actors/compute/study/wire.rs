@@ -13,7 +13,7 @@ use super::{
     RunOffline, Study, SuggestGains, Suggested,
 };
 use crate::actors::arm::sim::{SetGains, SetParams};
-use crate::actors::wire::{Address, Answered, Nodes, Served, Streamed};
+use crate::actors::wire::{Address, Answered, Callable, Nodes, Streamed};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;
 use crate::protocol::catalog::Service;
@@ -39,7 +39,7 @@ impl<const N: usize> Study<N> {
 
 // ---- stability ------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Served for PredictStability<N> {
+impl<const N: usize> Callable for PredictStability<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
@@ -119,7 +119,7 @@ impl StabilityValues {
 
 // ---- advice ---------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Served for SuggestGains<N> {
+impl<const N: usize> Callable for SuggestGains<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
@@ -160,7 +160,7 @@ impl<const N: usize> Answered for SuggestGains<N> {
     }
 }
 
-impl<const N: usize> Served for PlanRun<N> {
+impl<const N: usize> Callable for PlanRun<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
@@ -223,7 +223,7 @@ impl From<PlannedRun> for PlanValues {
 
 // ---- rollout --------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Served for RunOffline<N> {
+impl<const N: usize> Callable for RunOffline<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
@@ -243,11 +243,11 @@ impl<const N: usize> Served for RunOffline<N> {
 }
 
 impl<const N: usize> Streamed for RunOffline<N> {
-    type Writer = Result<Encoding<N>, Bytes>;
+    type Writer = Result<RolloutWriter<N>, Bytes>;
 
     fn begin(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Self::Writer {
         match answer {
-            Ok(ran) => Ok(Encoding::new(*ran, to)),
+            Ok(ran) => Ok(RolloutWriter::new(*ran, to)),
             Err(why) => Err(to.failure(&why.to_string())),
         }
     }
@@ -270,7 +270,7 @@ fn taken<A>(ask: A, fields: Fields<'_>) -> Result<A, Rejections> {
 }
 
 /// The answer, written a slice at a time: it may be 30 MB.
-pub struct Encoding<const N: usize> {
+pub struct RolloutWriter<const N: usize> {
     run: Rollout<N>,
     took: Duration,
     writer: StreamedResponse,
@@ -289,7 +289,7 @@ const COLUMNS: [&str; 5] = [
     "],\"energy\":[",
 ];
 
-impl<const N: usize> Encoding<N> {
+impl<const N: usize> RolloutWriter<N> {
     fn new(Ran { run, took }: Ran<N>, to: &Address) -> Self {
         Self {
             run,

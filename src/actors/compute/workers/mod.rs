@@ -1,27 +1,30 @@
 //! A few threads that do the heavy requests in turns, so that no client waits for another's million steps.
 //!
-//! A computation is advanced for one slice and waits for its next turn, which goes to whoever has had least of the workers'
-//! time (`workers/turns.rs`). A connection has at most one computation here at a time (the rest wait in the connection), so each
-//! connection gets the same share, and one that asks for little waits for nobody who asks for much. What they hold together is
-//! counted when room is taken for its answer ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
+//! A computation is advanced for one slice and waits for its next turn, which goes to whoever has had least of the
+//! workers' time (`workers/turns.rs`). A connection has at most one computation here at a time (the rest wait in the
+//! connection), so each connection gets the same share, and one that asks for little waits for nobody who asks for
+//! much. What they hold together is counted when room is taken for its answer
+//! ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
 //!
-//! At most [`MAX_ADMITTED`] are here at once, one for every connection that there can be: nobody is refused because of what others ask.
-//! Computations whose callers have gone make room.
+//! At most [`MAX_ADMITTED`] are here at once, one for every connection that there can be: nobody is refused because of
+//! what others ask. Computations whose callers have gone make room.
 //!
 //! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
 
+mod computation;
 mod turns;
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use self::turns::{Place, Turns};
-use super::work_clock;
-use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::free_elsewhere;
+pub use self::computation::{Computation, Progress};
+pub use self::turns::{Owner, RUNTIME};
+use self::turns::{Ticket, Turns};
 use crate::actors::gateway::limits::MAX_CONNECTIONS;
 use crate::actors::panics::contain;
+use crate::actors::resources::budget::free_elsewhere;
+use crate::actors::resources::work_clock;
 
 /// How long one computation may keep a worker before the next one has its turn: short beside the 5 ms that a client
 /// may be delayed, long beside the cost of changing over.
@@ -33,46 +36,16 @@ pub const MAX_ADMITTED: usize = MAX_CONNECTIONS;
 pub const BUSY: &str =
     "busy: as many computations of all clients wait as may wait; try again later";
 
-/// The client for which a computation is done; none for the runtime's own.
-pub type Owner = Option<ConnectionId>;
-/// For whom the runtime's own computations are done.
-pub const RUNTIME: Owner = None;
-
 /// How often those that can't begin try again while nothing else is computed.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
-
-/// Whether a computation wants another turn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Progress {
-    /// It waits for its next turn.
-    Unfinished,
-    /// It can't begin yet: it tries again when another has ended, or after a moment.
-    Waiting,
-    /// It has answered and can be dropped.
-    Finished,
-}
-
-/// Something heavy that is done a slice at a time.
-pub trait Computation: Send {
-    /// Works until `deadline` or the end, whichever is first, and answers at the end.
-    fn advance(&mut self, deadline: Instant) -> Progress;
-
-    /// True once nobody waits for the answer any more: it may be dropped.
-    fn is_abandoned(&self) -> bool {
-        false
-    }
-
-    /// Answers that the runtime is ending; the computation is dropped afterwards.
-    fn refuse(&mut self, why: &'static str);
-}
 
 /// A handle on the pool; clones share it.
 #[derive(Clone)]
 pub struct WorkerPool {
-    shared: Arc<Shared>,
+    shared: Arc<PoolState>,
 }
 
-struct Shared {
+struct PoolState {
     queue: Mutex<Queue>,
     changed: Condvar,
 }
@@ -83,7 +56,7 @@ type Job = Box<dyn Computation>;
 struct Queue {
     turns: Turns<Job>,
     /// Computations that can't begin yet.
-    waiting: Vec<(Place, Job)>,
+    waiting: Vec<(Ticket, Job)>,
     closed: Option<&'static str>,
 }
 
@@ -122,18 +95,19 @@ impl WorkerPool {
         Ok(pool)
     }
 
-    /// A pool without workers: whoever has it calls [`WorkerPool::turn`], as a simulation does, whose only thread is its own.
+    /// A pool without workers: whoever has it calls [`WorkerPool::turn`], as a simulation does, whose only thread is
+    /// its own.
     #[must_use]
     pub fn without_threads() -> Self {
-        let shared = Arc::new(Shared {
+        let shared = Arc::new(PoolState {
             queue: Mutex::default(),
             changed: Condvar::new(),
         });
         Self { shared }
     }
 
-    /// Does one slice of the computation whose turn it is, in the calling thread; false if there is none. Those that could not
-    /// begin try again when no other has its turn.
+    /// Does one slice of the computation whose turn it is, in the calling thread; false if there is none. Those that
+    /// could not begin try again when no other has its turn.
     #[must_use]
     pub fn turn(&self) -> bool {
         let next = {
@@ -156,8 +130,8 @@ impl WorkerPool {
         thread::available_parallelism().map_or(1, |cores| cores.get().saturating_sub(1).clamp(1, 4))
     }
 
-    /// Takes in a computation for a client; refuses it if the pool is closed, or has as many as it may have. There is always room
-    /// for the runtime's own.
+    /// Takes in a computation for a client; refuses it if the pool is closed, or has as many as it may have. There is
+    /// always room for the runtime's own.
     pub fn submit(&self, of: impl Into<Owner>, mut computation: Job) {
         let of = of.into();
         let why = {
@@ -199,7 +173,7 @@ impl WorkerPool {
     }
 }
 
-impl Shared {
+impl PoolState {
     /// The queue. A poisoned lock is taken as it is: the queue is never left half changed.
     fn lock(&self) -> MutexGuard<'_, Queue> {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
@@ -212,7 +186,7 @@ impl Shared {
     }
 
     /// Gives a computation that was taken its turn.
-    fn advance(&self, place: Place, mut job: Job) {
+    fn advance(&self, place: Ticket, mut job: Job) {
         let began = work_clock::now();
         let progress = contain(|| job.advance(began + SLICE));
         let progress = progress.unwrap_or_else(|panic| {
@@ -225,7 +199,7 @@ impl Shared {
         }
     }
 
-    fn take(&self) -> Option<(Place, Job)> {
+    fn take(&self) -> Option<(Ticket, Job)> {
         let mut queue = self.lock();
         loop {
             if let Some(job) = queue.turns.next() {
@@ -248,8 +222,9 @@ impl Shared {
         }
     }
 
-    /// Takes a computation back after its turn; gives it out again, with what it is to be refused for, if it was its last.
-    fn put_back(&self, place: Place, job: Job, progress: Progress, took: Duration) -> Option<End> {
+    /// Takes a computation back after its turn; gives it out again, with what it is to be refused for, if it was its
+    /// last.
+    fn put_back(&self, place: Ticket, job: Job, progress: Progress, took: Duration) -> Option<End> {
         let mut queue = self.lock();
         match (progress, queue.closed) {
             (Progress::Finished, _) => return Some(End { job, why: None }),
@@ -267,7 +242,7 @@ impl Shared {
     }
 
     /// Ends a computation whose last turn began then.
-    fn end(&self, place: Place, End { mut job, why }: End, began: Instant) {
+    fn end(&self, place: Ticket, End { mut job, why }: End, began: Instant) {
         // Dropped outside the lock: the end of a computation may free many megabytes.
         let end = contain(move || {
             if let Some(why) = why {
@@ -296,6 +271,7 @@ struct End {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::actors::ConnectionId;
     use std::sync::mpsc;
 
     struct Counting {
@@ -337,7 +313,7 @@ mod tests {
         })
     }
 
-    /// What has begun does not keep the worker, and each gets all the turns that it wants.
+    /// A computation that has begun does not keep the worker, and each gets all the turns that it wants.
     #[test]
     fn computations_take_turns() {
         const TURNS: usize = 100;

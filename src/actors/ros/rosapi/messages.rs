@@ -77,7 +77,7 @@ pub struct Unknown {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetParam<const N: usize> {
     /// The change, or why there can be none.
-    pub change: Result<Change<N>, NotSet>,
+    pub change: Result<ParamChange<N>, NotSet>,
 }
 
 impl<const N: usize> Ask for SetParam<N> {
@@ -86,7 +86,7 @@ impl<const N: usize> Ask for SetParam<N> {
 
 /// A change of one parameter, as a question to the arm.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Change<const N: usize> {
+pub enum ParamChange<const N: usize> {
     /// Gravity, masses or lengths.
     Params(SetParams<N>),
     /// Gains.

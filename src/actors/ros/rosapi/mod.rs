@@ -1,8 +1,10 @@
-//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the arm.
+//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the
+//! arm.
 //!
 //! Parameters are read and set by the arm's own questions: the same checks, the same words.
 //!
-//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the arm.
+//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the
+//! arm.
 
 mod messages;
 mod wire;
@@ -10,15 +12,15 @@ mod wire;
 use actix::prelude::*;
 
 pub use self::messages::{
-    Change, DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted,
-    NotSet, ParameterValue, SetParam, Unknown,
+    DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
+    ParamChange, ParameterValue, SetParam, Unknown,
 };
 use crate::actors::arm::sim::{
     ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
 };
-use crate::actors::gateway::aside::{Errand, aside};
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
+use crate::actors::resources::aside::{Errand, aside};
 use crate::protocol::catalog::Node;
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;
@@ -238,12 +240,12 @@ async fn value<const N: usize>(
 
 /// Has the arm change a parameter; gives what was not taken.
 async fn change_parameter<const N: usize>(
-    change: Change<N>,
+    change: ParamChange<N>,
     arm: ArmParameters<N>,
 ) -> Result<Rejections, Unserved> {
     Ok(match change {
-        Change::Params(params) => ask(&arm.params, params).await?.rejected,
-        Change::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
-        Change::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
+        ParamChange::Params(params) => ask(&arm.params, params).await?.rejected,
+        ParamChange::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
+        ParamChange::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
     })
 }

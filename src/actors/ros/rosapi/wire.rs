@@ -10,11 +10,11 @@ use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::{
-    Change, DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted,
-    NotSet, ParameterValue, Rosapi, SetParam, Unknown,
+    DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
+    ParamChange, ParameterValue, Rosapi, SetParam, Unknown,
 };
 use crate::actors::arm::sim::{SetGains, SetIntegrator, SetParams};
-use crate::actors::wire::{Address, Answered, Nodes, Served, Streamed};
+use crate::actors::wire::{Address, Answered, Callable, Nodes, Streamed};
 use crate::protocol::catalog::{self, Service};
 use crate::protocol::messages::Stamp;
 use crate::protocol::op::Arguments;
@@ -47,7 +47,7 @@ impl<const N: usize> Rosapi<N> {
 
 // ---- what there is --------------------------------------------------------------------------------------------------
 
-impl Served for Look {
+impl Callable for Look {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let (name, _) = read_texts(service, arguments)?;
         let name = name.into_owned();
@@ -74,7 +74,7 @@ impl Streamed for Look {
 
 // ---- time -----------------------------------------------------------------------------------------------------------
 
-impl Served for GetTime {
+impl Callable for GetTime {
     fn read(_: Service, _: &Arguments) -> Result<Self, Rejections> {
         Ok(Self)
     }
@@ -117,7 +117,7 @@ fn read_parameter(
     Ok(Parameter::from_name(&name))
 }
 
-impl<const N: usize> Served for GetParam<N> {
+impl<const N: usize> Callable for GetParam<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let (name, default) = read_texts(service, arguments)?;
         Ok(Self {
@@ -151,7 +151,7 @@ impl<const N: usize> Answered for GetParam<N> {
     }
 }
 
-impl<const N: usize> Served for SetParam<N> {
+impl<const N: usize> Callable for SetParam<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let (name, text) = read_texts(service, arguments)?;
         let change = match Parameter::from_name(&name) {
@@ -163,16 +163,16 @@ impl<const N: usize> Served for SetParam<N> {
 }
 
 /// A value in JSON text, as the arm's own service would read it.
-fn read_change<const N: usize>(parameter: Parameter, text: &str) -> Result<Change<N>, NotSet> {
+fn read_change<const N: usize>(parameter: Parameter, text: &str) -> Result<ParamChange<N>, NotSet> {
     let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
     // As lenient about numbers as every frame: they are refused by the parameter's name.
     let text = json::accept_literals(text.to_owned());
     let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson)?;
     let fields = Fields::single(service, field, &value);
     Ok(match service {
-        Service::SetParams => Change::Params(SetParams::request(fields)),
-        Service::SetGains => Change::Gains(SetGains::request(fields)),
-        _ => Change::Integrator(SetIntegrator::request(fields)),
+        Service::SetParams => ParamChange::Params(SetParams::request(fields)),
+        Service::SetGains => ParamChange::Gains(SetGains::request(fields)),
+        _ => ParamChange::Integrator(SetIntegrator::request(fields)),
     })
 }
 
@@ -186,7 +186,7 @@ impl<const N: usize> Answered for SetParam<N> {
     }
 }
 
-impl Served for HasParam {
+impl Callable for HasParam {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let parameter = read_parameter(service, arguments)?;
         Ok(Self { parameter })
@@ -199,7 +199,7 @@ impl Answered for HasParam {
     }
 }
 
-impl Served for DeleteParam {
+impl Callable for DeleteParam {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let parameter = read_parameter(service, arguments)?;
         Ok(Self { parameter })
@@ -213,7 +213,7 @@ impl Answered for DeleteParam {
     }
 }
 
-impl Served for GetParamNames {
+impl Callable for GetParamNames {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         read_texts(service, arguments)?;
         Ok(Self)

@@ -1,17 +1,19 @@
 //! Work that a scene does not need, and whether it is left out.
 //!
 //! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
-//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be unmeasured.
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be
+//! unmeasured.
 //!
 //! **Invariant:** no number in here that was not measured for this report.
 
 mod cells;
+mod counts;
 mod server;
 mod tables;
 
-use std::collections::HashMap;
 use std::hint::black_box;
 
+use counts::{Counts, Kind, STEPS, read};
 use tables::{steps_table, table};
 
 use crate::math::arm::{Arm, State};
@@ -25,25 +27,7 @@ use crate::report::csv::Csv;
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Bars, number};
-use crate::report::timing::{Effort, Timing, time};
-
-const STEPS: u64 = 20_000;
-
-/// One kind of step, by the name that `benches/src/bin/work.rs` knows it by.
-struct Kind {
-    name: &'static str,
-    timing: Timing,
-}
-
-impl Kind {
-    /// Time of one step \[s\].
-    fn step_time(&self) -> f64 {
-        self.timing.minimum / in_f64(STEPS)
-    }
-}
-
-/// Counts by name, as the script left them.
-type Counts = HashMap<String, f64>;
+use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let counts = read(making);
@@ -72,18 +56,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         ],
         ..Section::default()
     }
-}
-
-fn read(making: &Making<'_>) -> Counts {
-    let text = std::fs::read_to_string(making.out.join("work.csv")).unwrap_or_default();
-    text.lines()
-        .skip(1)
-        .filter_map(|line| {
-            let mut fields = line.split(',');
-            let name = fields.next()?.to_owned();
-            Some((name, fields.next()?.parse().ok()?))
-        })
-        .collect()
 }
 
 fn start<const N: usize>(
@@ -262,7 +234,8 @@ fn findings(counts: &Counts) -> Vec<String> {
         server::encoded(counts, "server-11-subscribers"),
     ) {
         findings.push(format!(
-            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} instructions each, for eleven {} at {}.",
+            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} \
+             instructions each, for eleven {} at {}.",
             number(none),
             number(one),
             number(each.round()),
@@ -272,7 +245,8 @@ fn findings(counts: &Counts) -> Vec<String> {
     }
     if let (Some(off), Some(on)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid")) {
         findings.push(format!(
-            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} instructions instead of {}.",
+            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} \
+             instructions instead of {}.",
             number(off.round()),
             number(on.round())
         ));

@@ -44,7 +44,7 @@ pub type ArmListener<const N: usize> = Box<dyn FnMut(ArmNews<N>) -> bool + Send>
 pub struct Tell<const N: usize>(pub Option<ArmListener<N>>);
 
 /// Who hears the news, and how far they have come.
-pub(super) struct Journal<const N: usize> {
+pub(crate) struct Journal<const N: usize> {
     listener: ArmListener<N>,
     /// Steps taken up to the latest reset.
     before_reset: u64,
@@ -56,7 +56,7 @@ pub(super) struct Journal<const N: usize> {
 
 impl<const N: usize> Journal<N> {
     /// News for this listener, which has heard none.
-    pub(super) fn new(listener: ArmListener<N>) -> Self {
+    pub(crate) fn new(listener: ArmListener<N>) -> Self {
         Self {
             listener,
             before_reset: 0,
@@ -66,7 +66,7 @@ impl<const N: usize> Journal<N> {
     }
 
     /// An input has taken effect, after so many steps.
-    pub(super) fn change(&mut self, steps: u64, input: ArmInput<N>) {
+    pub(crate) fn change(&mut self, steps: u64, input: ArmInput<N>) {
         self.tell(steps, ArmEvent::Changed(input));
         if matches!(input, ArmInput::Reset) {
             self.before_reset += steps;
@@ -74,7 +74,7 @@ impl<const N: usize> Journal<N> {
     }
 
     /// The step that was due has not been taken.
-    pub(super) fn diverge(&mut self, simulation: &Simulation<N>) {
+    pub(crate) fn diverge(&mut self, simulation: &Simulation<N>) {
         self.tell(simulation.steps(), ArmEvent::Diverged);
     }
 
@@ -86,7 +86,7 @@ impl<const N: usize> Journal<N> {
     }
 
     /// Tells the state, unless that has been told.
-    pub(super) fn stand(&mut self, simulation: &Simulation<N>) {
+    pub(crate) fn stand(&mut self, simulation: &Simulation<N>) {
         let steps = simulation.steps();
         if !self.is_whole {
             let whole = ArmEvent::Began(Box::new(simulation.checkpoint()));

@@ -10,7 +10,7 @@
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
-use crate::actors::compute::work_clock;
+use crate::actors::resources::work_clock;
 
 /// Longer than the time from a call to a client's next one on the same machine, short beside a tick.
 pub const MOMENT: Duration = Duration::from_micros(50);

@@ -1,15 +1,16 @@
-//! What work costs is measured on this clock: the slices of computations, the arm's wake-ups.
+//! The clock on which the cost of work is measured: the slices of computations, the arm's wake-ups.
 //!
-//! It is the machine's own, unless a simulation counts instead: there each look costs the same, so that the work done between two
-//! looks, and all that follows from it, is the same in every run.
+//! It is the machine's own, unless a simulation counts instead: there each look costs the same, so that the work done
+//! between two looks, and all that follows from it, is the same in every run.
 //!
-//! **Invariant:** only what work costs is read here. Simulation time and what a client waits for go by the runtime's clock.
+//! **Invariant:** only what work costs is read here. Simulation time and what a client waits for go by the runtime's
+//! clock.
 
 use std::cell::Cell;
 use std::time::{Duration, Instant};
 
 thread_local! {
-    /// What a look costs on this thread, and the time at the last one; none where the machine's clock counts.
+    /// The cost of a look on this thread, and the time at the last one; none where the machine's clock counts.
     static COUNTED: Cell<Option<(Duration, Instant)>> = const { Cell::new(None) };
 }
 
@@ -24,7 +25,8 @@ pub fn now() -> Instant {
     now
 }
 
-/// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time pass.
+/// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time
+/// pass.
 pub fn count(cost: Duration) {
     COUNTED.set(Some((cost, Instant::now())));
 }

@@ -1,26 +1,36 @@
-//! Single steps of a paused arm, and pushes.
+//! `/arm_sim/step`: single steps of a paused arm.
 //!
-//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and those who ask for more take turns: it is as if each had asked for single
-//! steps, one after the other, so what others ask takes effect in between.
+//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and those who ask for more take turns: it is as if each had asked for
+//! single steps, one after the other, so what others ask takes effect in between.
 //!
-//! **Invariant:** a request that is refused at first changes nothing; one that is taken up is done as a whole, unless a divergence,
-//! a resume or the end of the runtime comes in between.
+//! **Invariant:** a request that is refused at first changes nothing; one that is taken up is done as a whole, unless a
+//! divergence, a resume or the end of the runtime comes in between.
 
 use actix::prelude::*;
+use bytes::Bytes;
+use serde::Serialize;
 
-use super::ArmSim;
-use crate::actors::node::{Ask, Call, Reply, Unserved};
-use crate::math::simulation::ArmInput;
-use crate::protocol::op::fields::Rejections;
+use super::disturb::DIVERGED;
+use crate::actors::arm::sim::messages::RefuseSteps;
+use crate::actors::arm::sim::node::ArmSim;
+use crate::actors::arm::sim::state::steps::{Stepped, Steps, StepsEnd};
+use crate::actors::node::{Ask, Call, Unserved};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::protocol::catalog::Service;
+use crate::protocol::messages::Empty;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Fields, Rejections};
+
+/// Enters the route of this file into the registry's table.
+pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+    nodes.serve::<Step>(Service::Step, arm.clone());
+}
 
 /// Steps in one request: what one wake-up's budget is worth, and ten seconds of the default timestep.
 pub const MAX_STEPS: u64 = 10_000;
 
 /// Steps in a row: some 0.2 ms of work, so that neither the tick nor anybody's call waits for the steps of others.
 pub const STEPS_IN_A_ROW: u64 = 1000;
-
-/// Why nothing moves any more.
-const DIVERGED: &str = "is refused: the simulation has diverged; /arm_sim/reset clears this";
 
 /// Takes steps while paused. Refused if something was rejected, or the arm can't be stepped.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -31,68 +41,9 @@ pub struct Step {
     pub rejected: Rejections,
 }
 
-/// Steps that were taken.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stepped {
-    /// How many.
-    pub steps: u64,
-    /// Simulation time after them \[s\].
-    pub time: f64,
-    /// Why there were no more.
-    pub end: StepsEnd,
-}
-
-/// The end of the steps of a request.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StepsEnd {
-    /// There are no more.
-    AllTaken,
-    /// The simulation has diverged.
-    Diverged,
-    /// The arm has been resumed.
-    Resumed,
-}
-
 impl Ask for Step {
     type Answer = Result<Stepped, Rejections>;
 }
-
-/// Adds an effort to that of every step for a while, from the next one on. Refused if something was rejected, or the
-/// simulation has diverged.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Disturb<const N: usize> {
-    /// \[N m\].
-    pub effort: Option<[f64; N]>,
-    /// Simulation time \[s\], greater than 0.
-    pub duration: Option<f64>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
-}
-
-/// A disturbance that has begun.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Push<const N: usize> {
-    /// \[N m\].
-    pub effort: [f64; N],
-    /// Simulation time \[s\].
-    pub duration: f64,
-}
-
-impl<const N: usize> Ask for Disturb<N> {
-    type Answer = Result<Push<N>, Rejections>;
-}
-
-/// Steps that somebody has asked for and that are not all taken.
-pub(super) struct Steps {
-    asked: u64,
-    taken: u64,
-    reply: Reply<Result<Stepped, Rejections>>,
-}
-
-/// The steps that are still to be taken are refused, for the reason given. From the runtime, when it ends.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct RefuseSteps(pub &'static str);
 
 impl<const N: usize> Handler<RefuseSteps> for ArmSim<N> {
     type Result = ();
@@ -128,25 +79,6 @@ impl<const N: usize> Handler<Call<Step>> for ArmSim<N> {
         });
         if nobody_steps {
             self.go_on_stepping(ctx);
-        }
-    }
-}
-
-impl<const N: usize> Handler<Call<Disturb<N>>> for ArmSim<N> {
-    type Result = ();
-
-    fn handle(&mut self, Call { ask, reply }: Call<Disturb<N>>, ctx: &mut Context<Self>) {
-        self.attend_call(ctx);
-        let mut rejected = ask.rejected;
-        if self.simulation.divergence().is_some() {
-            rejected.refuse("effort", &DIVERGED);
-        }
-        match (ask.effort, ask.duration) {
-            (Some(effort), Some(duration)) if rejected.is_empty() => {
-                self.change(ArmInput::Disturbance { effort, duration });
-                reply.conclude(Ok(Push { effort, duration }));
-            }
-            _ => reply.conclude(Err(rejected)),
         }
     }
 }
@@ -198,5 +130,36 @@ impl<const N: usize> ArmSim<N> {
             time: self.simulation.time(),
             end,
         }));
+    }
+}
+
+impl Callable for Step {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read_or_none(arguments, service);
+        Ok(Self {
+            steps: fields.count("steps", MAX_STEPS),
+            rejected: fields.finish(),
+        })
+    }
+}
+
+impl Answered for Step {
+    fn write(answer: Result<Stepped, Rejections>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            steps: u64,
+            time: f64,
+        }
+        match answer {
+            Ok(Stepped { steps, time, end }) => {
+                let status = match end {
+                    StepsEnd::AllTaken => "",
+                    StepsEnd::Diverged => "steps ended early: the simulation has diverged",
+                    StepsEnd::Resumed => "steps ended early: the arm has been resumed",
+                };
+                to.response(&Values { steps, time }, status)
+            }
+            Err(rejected) => to.response(&Empty {}, &rejected.status()),
+        }
     }
 }

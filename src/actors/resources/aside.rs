@@ -1,8 +1,8 @@
 //! Work that would keep the gateway's thread for longer than a turn, done on another thread meanwhile.
 //!
-//! That thread serves every client: nothing holds it for much more than a millisecond. Work that is longer, needs
-//! nothing but its bytes and is waited for by one client (a frame of megabytes to be read, a message to be encoded, a
-//! long list to be written) is done here.
+//! The gateway's thread serves every client: nothing holds it for much more than a millisecond. Work that is longer,
+//! needs nothing but its bytes and is waited for by one client (a frame of megabytes to be read, a message to be
+//! encoded, a long list to be written) is done here.
 //!
 //! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of errand; the others
 //! wait in the order in which they came.
@@ -12,8 +12,8 @@ use std::sync::Arc;
 use tokio::sync::Semaphore;
 use tokio::task::{spawn_blocking, yield_now};
 
-use crate::actors::compute::work_clock;
 use crate::actors::panics::contain;
+use crate::actors::resources::work_clock;
 
 /// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other, and the arm and
 /// the gateway keep most of the machine.

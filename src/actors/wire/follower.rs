@@ -8,8 +8,8 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
 use crate::actors::node::{Done, Feedback, Respond};
+use crate::actors::resources::budget::Share;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
@@ -34,7 +34,7 @@ pub enum ActionRequest {
         /// Its fields, unread.
         arguments: Arguments,
         /// Who sent it.
-        follower: Follower,
+        follower: GoalFollower,
         /// Dropped when the goal has been set in motion, or refused: the client's next frame is read then.
         done: Done,
     },
@@ -58,7 +58,7 @@ pub struct Canceller {
 }
 
 /// The client that sent a goal, and the ways to it.
-pub struct Follower {
+pub struct GoalFollower {
     /// Results, which are never lost.
     pub respond: Recipient<Respond>,
     /// Feedback, which may be.
@@ -88,7 +88,7 @@ impl Canceller {
     }
 }
 
-impl Follower {
+impl GoalFollower {
     /// Whether this goal is the one that is meant.
     #[must_use]
     pub fn is_meant_by(&self, who: &Canceller) -> bool {
