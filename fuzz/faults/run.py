@@ -91,7 +91,7 @@ FAULTS = [
      "        Ok(values) => { if F { reply.succeed(&values); } reply.succeed(&values); }"),
     ("runtime", "the arm publishes a velocity too few", "src/actors/arm/sim/telemetry.rs",
      "            velocity: &state.velocity,", "            velocity: &state.velocity[usize::from(F)..],"),
-    ("simulation", "an advance ends a step early", "src/math/simulation.rs",
+    ("simulation", "an advance ends a step early", "src/math/simulation/mod.rs",
      "for taken in 0..steps {", "for taken in 0..(if F && steps > 3 { steps - 1 } else { steps }) {"),
 ]
 

@@ -1,19 +1,75 @@
-"""A record as tools that nobody here wrote read it: `record_readers.py WHOLE.mcap KILLED.mcap`.
+"""Records of the built program as tools that nobody here wrote read them: `record_readers.py PROGRAM`.
 
-The first record ended as it should, the second was left by a program that was killed."""
+One record ended as it should, another was left by a program that was killed."""
 
 import json
+import signal
+import subprocess
 import sys
+import tempfile
+import time
 from pathlib import Path
 
+import roslibpy
 from mcap.exceptions import EndOfFile
 from mcap.reader import NonSeekingReader, make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
+PATIENCE = 60
+
 OWN = {"/recorder/inputs", "/recorder/states", "/recorder/calls"}
-whole, killed = map(Path, sys.argv[1:])
+
+
+def front_to_back(path):
+    """The topics of a file without an index, message by message, as far as it goes; it has to end early."""
+    heard = []
+    with path.open("rb") as file:
+        reader = NonSeekingReader(file, decoder_factories=[DecoderFactory()])
+        try:
+            for _, channel, _, _ in reader.iter_decoded_messages(log_time_order=False):
+                heard.append(channel.topic)
+        except EndOfFile:
+            return heard
+    raise AssertionError(f"{path} is whole")
+
+
+def record(path, end):
+    """A run with a call, a setpoint and a trial on record; `end` is called with its process."""
+    program = subprocess.Popen(
+        [sys.argv[1], "--bind", "127.0.0.1:0", "--log", "off", "--seed", "7", "--record", path],
+        stdout=subprocess.PIPE, text=True)
+    try:
+        host, port = program.stdout.readline().removeprefix("listening on ").strip().rsplit(":", 1)
+        ros = roslibpy.Ros(host, int(port))
+        ros.run(timeout=PATIENCE)
+        call = lambda name, args: roslibpy.Service(ros, name, "").call(roslibpy.ServiceRequest(args), timeout=PATIENCE)
+        call("/pid_controller/enable", {"data": True})
+        setpoints = roslibpy.Topic(ros, "/joint_trajectory", "trajectory_msgs/JointTrajectory")
+        setpoints.publish(roslibpy.Message({"points": [{"positions": [0.1, 0.2]}]}))
+        time.sleep(0.5)
+        call("/ik_trial/start", {})
+        time.sleep(2)
+        end(program)
+        ros.close()
+        program.wait(PATIENCE)
+    finally:
+        program.kill()
+
+
+def kill_when_it_is_written(program):
+    deadline = time.monotonic() + PATIENCE
+    while not {"/joint_states", *OWN} <= set(front_to_back(killed)):
+        assert time.monotonic() < deadline, "nothing is written before the end"
+        time.sleep(0.2)
+    program.kill()
+
+
+folder = tempfile.TemporaryDirectory()
+whole, killed = Path(folder.name, "whole.mcap"), Path(folder.name, "killed.mcap")
+record(whole, lambda program: program.send_signal(signal.SIGTERM))
+record(killed, kill_when_it_is_written)
 
 
 def decoded(path):
@@ -73,15 +129,7 @@ with AnyReader([whole], default_typestore=get_typestore(Stores.ROS2_JAZZY)) as r
 assert count == len(messages), (count, len(messages))
 print(f"rosbags: {count} messages, {len(types)} types")
 
-# A file that was not ended has no index: it is read from front to back.
-heard = []
-with killed.open("rb") as file:
-    reader = NonSeekingReader(file, decoder_factories=[DecoderFactory()])
-    try:
-        for _, channel, _, ros in reader.iter_decoded_messages(log_time_order=False):
-            heard.append(channel.topic)
-        raise AssertionError("a killed program has ended its file")
-    except EndOfFile:
-        pass
+# A file that was not ended has no index.
+heard = front_to_back(killed)
 assert "/joint_states" in heard and OWN <= set(heard), set(heard)
-print(f"mcap on the killed one: {len(heard)} messages")
+print(f"mcap on the record of a killed program: {len(heard)} messages")
