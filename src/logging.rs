@@ -115,7 +115,7 @@ impl<S: Subscriber> Layer<S> for Warnings {
 }
 
 /// The folders in which the actors stand; a node has none of their names.
-const FOLDERS: [&str; 4] = ["gateway", "arm", "compute", "ros"];
+const FOLDERS: [&str; 5] = ["resources", "gateway", "arm", "compute", "ros"];
 
 /// The actor in whose module something was reported: `registry` of `pendularm::actors::gateway::registry::ops`.
 fn node_of(target: &'static str) -> &'static str {

@@ -1,4 +1,5 @@
-//! The page's modules as one file, so that a browser asks once instead of sixty times.
+//! The page's modules as one file, and its style sheets as another, so that a browser asks twice instead of seventy
+//! times.
 //!
 //! Each module becomes a function that runs once and returns what the module exports. The file exports them all as
 //! `modules`, by their names.
@@ -77,9 +78,37 @@ fn variable(name: &str) -> String {
     format!("${}", name.trim_end_matches(".js"))
 }
 
+/// The style sheet `main` with those in place of its `@import "file";` lines.
+#[must_use]
+pub fn styles(main: &str, sheets: &[Module<'_>]) -> String {
+    let text_of = |name: &str| sheets.iter().find(|(one, _)| *one == name).map(|one| one.1);
+    let mut text = String::new();
+    for line in text_of(main).unwrap_or_default().lines() {
+        let imported = line
+            .strip_prefix("@import \"")
+            .and_then(|rest| rest.strip_suffix("\";"))
+            .and_then(text_of);
+        let _ = writeln!(text, "{}", imported.unwrap_or(line));
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_style_sheet_has_those_that_it_imports_in_their_places() {
+        let sheets = [
+            ("low.css", "p { margin: 0; }\n"),
+            (
+                "style.css",
+                "/* all */\n@import \"low.css\";\na { color: red; }\n",
+            ),
+        ];
+        let text = styles("style.css", &sheets);
+        assert_eq!(text, "/* all */\np { margin: 0; }\n\na { color: red; }\n");
+    }
 
     const MAIN: &str = "import {\n  a as first,\n  B,\n} from \"./low.js\";\nimport { c } from \"./mid.js\";\nfirst(B, \
                         c);\n";

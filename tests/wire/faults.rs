@@ -86,7 +86,10 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
         }
         frames
     });
-    std::thread::sleep(Duration::from_millis(200));
+    // Everything is under way: the arm has made twelve ticks beside it.
+    for _ in 0..12 {
+        watchers[0].message("/joint_states");
+    }
     let pid = runtime.pid().to_string();
     let sent = Command::new("kill").args(["-TERM", &pid]).status();
     assert!(sent.expect("kill runs").success());

@@ -100,7 +100,12 @@ fn after_a_response_no_older_state_follows_under_either_spelling() {
     let mut client = runtime.connect();
     client.send(&json!({"op": "subscribe", "topic": "joint_states", "throttle_rate": 300}));
     client.message("joint_states");
-    std::thread::sleep(Duration::from_millis(100));
+    // Some ticks later messages are held back: another client, which is not throttled, has seen them.
+    let mut other = runtime.connect();
+    other.subscribe("/joint_states");
+    for _ in 0..6 {
+        other.message("/joint_states");
+    }
     client.ask("/arm_sim/reset", json!({}));
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.ask("/arm_sim/reset", json!({}));

@@ -65,7 +65,10 @@ fn a_signal_ends_a_program_with_clients_that_watch_flood_or_never_read() {
         let frame = b"{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\"}\n".repeat(100);
         while std::io::Write::write_all(&mut &flood, &frame).is_ok() {}
     });
-    std::thread::sleep(Duration::from_millis(100));
+    // The flood is under way: the arm has made some ticks beside it.
+    for _ in 0..6 {
+        watchers[0].message("/joint_states");
+    }
     ends_on(&mut runtime, "TERM");
     flooding.join().unwrap();
     for client in &mut watchers {

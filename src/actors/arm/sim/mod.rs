@@ -24,7 +24,7 @@ pub use self::messages::{
 };
 pub use self::node::{ArmSim, BREATHER, PUBLISH_RATE, WAKE_UP_BUDGET, joint_names};
 pub use self::services::disturb::{Disturb, Push};
-pub use self::services::echo::Echo;
+pub use self::services::field_by_field::{Echo, FieldByField};
 pub use self::services::gains::SetGains;
 pub use self::services::integrator::{Integrator, SetIntegrator};
 pub use self::services::params::SetParams;

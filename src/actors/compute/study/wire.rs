@@ -12,7 +12,7 @@ use super::{
     NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
     RunOffline, Study, SuggestGains, Suggested,
 };
-use crate::actors::arm::sim::{SetGains, SetParams};
+use crate::actors::arm::sim::{FieldByField as _, SetGains, SetParams};
 use crate::actors::wire::{Address, Answered, Callable, Nodes, Streamed};
 use crate::math::arm::ArmError;
 use crate::math::integrator::Method;

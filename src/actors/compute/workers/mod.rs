@@ -1,10 +1,10 @@
 //! A few threads that do the heavy requests in turns, so that no client waits for another's million steps.
 //!
 //! A computation is advanced for one slice and waits for its next turn, which goes to whoever has had least of the
-//! workers' time (`workers/turns.rs`). A connection has at most one computation here at a time (the rest wait in the
-//! connection), so each connection gets the same share, and one that asks for little waits for nobody who asks for
-//! much. What they hold together is counted when room is taken for its answer
-//! ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
+//! workers' processor time (`workers/turns.rs`): what a busy machine keeps a worker from is charged to nobody. A
+//! connection has at most one computation here at a time (the rest wait in the connection), so each connection gets the
+//! same share, and one that asks for little waits for nobody who asks for much. What they hold together is counted when
+//! room is taken for its answer ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
 //!
 //! At most [`MAX_ADMITTED`] are here at once, one for every connection that there can be: nobody is refused because of
 //! what others ask. Computations whose callers have gone make room.
@@ -16,7 +16,7 @@ mod turns;
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 pub use self::computation::{Computation, Progress};
 pub use self::turns::{Owner, RUNTIME};
@@ -187,13 +187,13 @@ impl PoolState {
 
     /// Gives a computation that was taken its turn.
     fn advance(&self, place: Ticket, mut job: Job) {
-        let began = work_clock::now();
-        let progress = contain(|| job.advance(began + SLICE));
+        let began = work_clock::spent();
+        let progress = contain(|| job.advance(work_clock::now() + SLICE));
         let progress = progress.unwrap_or_else(|panic| {
             tracing::error!(%panic, "a computation ended; its caller has an answer");
             Progress::Finished
         });
-        let took = work_clock::now() - began;
+        let took = work_clock::spent().saturating_sub(began);
         if let Some(end) = self.put_back(place, job, progress, took) {
             self.end(place, end, began);
         }
@@ -241,8 +241,8 @@ impl PoolState {
         None
     }
 
-    /// Ends a computation whose last turn began then.
-    fn end(&self, place: Ticket, End { mut job, why }: End, began: Instant) {
+    /// Ends a computation whose last turn began when this thread had had so much of a processor.
+    fn end(&self, place: Ticket, End { mut job, why }: End, began: Duration) {
         // Dropped outside the lock: the end of a computation may free many megabytes.
         let end = contain(move || {
             if let Some(why) = why {
@@ -253,7 +253,9 @@ impl PoolState {
             tracing::error!(%panic, "the end of a computation failed");
         }
         let mut queue = self.lock();
-        queue.turns.leave(place, work_clock::now() - began);
+        queue
+            .turns
+            .leave(place, work_clock::spent().saturating_sub(began));
         queue.retry();
         if queue.turns.waiting() > 0 {
             self.changed.notify_all();
@@ -336,6 +338,46 @@ mod tests {
         while !pool.is_idle() {
             thread::yield_now();
         }
+    }
+
+    /// Has a turn of five milliseconds, in which it computes or sleeps.
+    struct Turn {
+        sleeps: bool,
+        log: mpsc::Sender<bool>,
+    }
+
+    impl Computation for Turn {
+        fn advance(&mut self, _deadline: Instant) -> Progress {
+            const TURN: Duration = Duration::from_millis(5);
+            let before = work_clock::spent();
+            if self.sleeps {
+                thread::sleep(TURN);
+            }
+            while !self.sleeps && work_clock::spent() - before < TURN {
+                std::hint::spin_loop();
+            }
+            self.log.send(self.sleeps).unwrap();
+            Progress::Unfinished
+        }
+
+        fn refuse(&mut self, _why: &'static str) {}
+    }
+
+    /// Who sleeps in its turns has more of them: it is charged for what it has had of a processor.
+    #[test]
+    fn what_a_worker_was_kept_from_is_charged_to_nobody() {
+        const TURNS: usize = 40;
+        let (log, seen) = mpsc::channel();
+        let pool = WorkerPool::without_threads();
+        for (client, sleeps) in [(1, true), (2, false)] {
+            let log = log.clone();
+            pool.submit(ConnectionId(client), Box::new(Turn { sleeps, log }));
+        }
+        for _ in 0..TURNS {
+            assert!(pool.turn());
+        }
+        let asleep = seen.try_iter().filter(|sleeps| *sleeps).count();
+        assert!((TURNS * 3 / 4..TURNS).contains(&asleep), "{asleep}");
     }
 
     #[test]

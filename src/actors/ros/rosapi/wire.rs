@@ -13,7 +13,7 @@ use super::{
     DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
     ParamChange, ParameterValue, Rosapi, SetParam, Unknown,
 };
-use crate::actors::arm::sim::{SetGains, SetIntegrator, SetParams};
+use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams};
 use crate::actors::wire::{Address, Answered, Callable, Nodes, Streamed};
 use crate::protocol::catalog::{self, Service};
 use crate::protocol::messages::Stamp;

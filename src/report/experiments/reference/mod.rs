@@ -1,10 +1,10 @@
 //! Reference motions: the same arm, another derivation, twice the digits, and a bound on their own error.
 //!
 //! An error, in the study, is a distance to one of these. A motion is expanded in Taylor series of high order in
-//! double-double arithmetic from the Lagrangian ([`ReferenceMotion::of`]), twice with different order and tolerance; the
-//! distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every instant, or its effort held
-//! from one control instant to the next as the live arm holds it. [`exact_steps`] takes the steps of the four methods
-//! in the same arithmetic: their truncation error without rounding.
+//! double-double arithmetic from the Lagrangian ([`ReferenceMotion::of`]), twice with different order and tolerance;
+//! the distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every instant, or its
+//! effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the steps of the
+//! four methods in the same arithmetic: their truncation error without rounding.
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 

@@ -16,14 +16,14 @@ use std::hint::black_box;
 use counts::{Counts, Kind, STEPS, read};
 use tables::{steps_table, table};
 
-use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
 use crate::math::particle::Particle;
-use crate::math::pid::{Gains, Setpoint};
+use crate::math::pid::Gains;
 use crate::math::simulation::Simulation;
 use crate::report::csv::Csv;
+use crate::report::experiments::step_scene::ready;
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Bars, number};
@@ -58,34 +58,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-fn start<const N: usize>(
-    gravity: f64,
-    integral: bool,
-    control: bool,
-    method: Method,
-) -> Simulation<N>
-where
-    Gains<N>: Default,
-{
-    let arm = Arm::new([1.0; N], [1.0; N], gravity).unwrap_or_default();
-    let mut gains = Gains::default();
-    if !integral {
-        gains.ki = [0.0; N];
-    }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(control);
-    simulation
-}
-
 fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
     let effort = making.choose(
         Effort {
@@ -108,11 +80,11 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
         making.at(kinds.len(), 12);
     };
     let two = |gravity, integral, control, method| {
-        let ready = start::<2>(gravity, integral, control, method);
+        let ready = ready::<2>(gravity, integral, control, method);
         move || run(&ready)
     };
     let three = |gravity, control| {
-        let ready = start::<3>(gravity, true, control, Method::Rk4);
+        let ready = ready::<3>(gravity, true, control, Method::Rk4);
         move || run(&ready)
     };
     add(
@@ -165,8 +137,8 @@ where
     Gains<N>: Default,
 {
     Method::ALL.into_iter().all(|method| {
-        let mut off = start::<N>(9.81, true, false, method);
-        let mut zero = start::<N>(9.81, true, true, method);
+        let mut off = ready::<N>(9.81, true, false, method);
+        let mut zero = ready::<N>(9.81, true, true, method);
         zero.set_gains(Gains {
             kp: [0.0; N],
             ki: [0.0; N],

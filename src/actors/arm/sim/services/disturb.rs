@@ -6,12 +6,12 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
+use super::field_by_field::FieldByField;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
@@ -67,14 +67,17 @@ impl<const N: usize> Handler<Call<Disturb<N>>> for ArmSim<N> {
     }
 }
 
-impl<const N: usize> Callable for Disturb<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read_or_none(arguments, service);
-        Ok(Self {
+impl<const N: usize> FieldByField for Disturb<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
             effort: fields.array("effort", Bound::Finite),
             duration: fields.number("duration", Bound::Positive),
-            rejected: fields.finish(),
-        })
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 

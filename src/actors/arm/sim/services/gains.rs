@@ -6,14 +6,13 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::echo::Echo;
+use super::field_by_field::{Echo, FieldByField};
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::pid::Gains;
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
@@ -22,7 +21,7 @@ pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
 }
 
 /// Sets the controller's gains, each at least 0.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SetGains<const N: usize> {
     /// \[N m/rad\].
     pub kp: Option<[f64; N]>,
@@ -32,17 +31,6 @@ pub struct SetGains<const N: usize> {
     pub kd: Option<[f64; N]>,
     /// Fields that were not valid.
     pub rejected: Rejections,
-}
-
-impl<const N: usize> Default for SetGains<N> {
-    fn default() -> Self {
-        Self {
-            kp: None,
-            ki: None,
-            kd: None,
-            rejected: Rejections::default(),
-        }
-    }
 }
 
 impl<const N: usize> SetGains<N> {
@@ -83,9 +71,18 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl<const N: usize> Callable for SetGains<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Ok(Self::request(Fields::read_or_none(arguments, service)))
+impl<const N: usize> FieldByField for SetGains<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            kp: fields.array("kp", Bound::NonNegative),
+            ki: fields.array("ki", Bound::NonNegative),
+            kd: fields.array("kd", Bound::NonNegative),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 
@@ -99,28 +96,5 @@ impl<const N: usize> Answered for SetGains<N> {
         }
         let Gains { kp, ki, kd } = &values;
         to.response(&Values { kp, ki, kd }, &rejected.status())
-    }
-}
-
-impl<const N: usize> SetGains<N> {
-    /// The request that these fields make.
-    #[must_use]
-    pub fn request(mut fields: Fields<'_>) -> Self {
-        let ask = Self::of(&mut fields);
-        Self {
-            rejected: fields.finish(),
-            ..ask
-        }
-    }
-
-    /// The values that these fields give; what is rejected stays with them.
-    #[must_use]
-    pub fn of(fields: &mut Fields<'_>) -> Self {
-        Self {
-            kp: fields.array("kp", Bound::NonNegative),
-            ki: fields.array("ki", Bound::NonNegative),
-            kd: fields.array("kd", Bound::NonNegative),
-            rejected: Rejections::default(),
-        }
     }
 }

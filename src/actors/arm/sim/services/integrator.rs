@@ -6,14 +6,13 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::echo::Echo;
+use super::field_by_field::{Echo, FieldByField};
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::integrator::Method;
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
@@ -76,9 +75,17 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Callable for SetIntegrator {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Ok(Self::request(Fields::read_or_none(arguments, service)))
+impl FieldByField for SetIntegrator {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            method: fields.choice("method", &Method::ALL, Method::name),
+            timestep: fields.number("timestep", Bound::Positive),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 
@@ -92,17 +99,5 @@ impl Answered for SetIntegrator {
         let Integrator { method, timestep } = values;
         let method = method.name();
         to.response(&Values { method, timestep }, &rejected.status())
-    }
-}
-
-impl SetIntegrator {
-    /// The request that these fields make.
-    #[must_use]
-    pub fn request(mut fields: Fields<'_>) -> Self {
-        Self {
-            method: fields.choice("method", &Method::ALL, Method::name),
-            timestep: fields.number("timestep", Bound::Positive),
-            rejected: fields.finish(),
-        }
     }
 }

@@ -8,7 +8,7 @@
 //! from the arm, which hears of both.
 
 pub(super) mod disturb;
-pub(super) mod echo;
+pub(super) mod field_by_field;
 pub(super) mod gains;
 pub(super) mod integrator;
 pub(super) mod params;

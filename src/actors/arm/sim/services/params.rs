@@ -6,14 +6,13 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::echo::Echo;
+use super::field_by_field::{Echo, FieldByField};
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::arm::{Arm, ArmError};
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
@@ -22,7 +21,7 @@ pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
 }
 
 /// Sets the arm's parameters.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SetParams<const N: usize> {
     /// \[m/s²\], at least 0.
     pub gravity: Option<f64>,
@@ -32,17 +31,6 @@ pub struct SetParams<const N: usize> {
     pub lengths: Option<[f64; N]>,
     /// Fields that were not valid.
     pub rejected: Rejections,
-}
-
-impl<const N: usize> Default for SetParams<N> {
-    fn default() -> Self {
-        Self {
-            gravity: None,
-            masses: None,
-            lengths: None,
-            rejected: Rejections::default(),
-        }
-    }
 }
 
 impl<const N: usize> SetParams<N> {
@@ -92,9 +80,18 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl<const N: usize> Callable for SetParams<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        Ok(Self::request(Fields::read_or_none(arguments, service)))
+impl<const N: usize> FieldByField for SetParams<N> {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            gravity: fields.number("gravity", Bound::NonNegative),
+            masses: fields.array("masses", Bound::Positive),
+            lengths: fields.array("lengths", Bound::Positive),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 
@@ -112,28 +109,5 @@ impl<const N: usize> Answered for SetParams<N> {
             lengths: values.lengths(),
         };
         to.response(&values, &rejected.status())
-    }
-}
-
-impl<const N: usize> SetParams<N> {
-    /// The request that these fields make.
-    #[must_use]
-    pub fn request(mut fields: Fields<'_>) -> Self {
-        let ask = Self::of(&mut fields);
-        Self {
-            rejected: fields.finish(),
-            ..ask
-        }
-    }
-
-    /// The values that these fields give; what is rejected stays with them.
-    #[must_use]
-    pub fn of(fields: &mut Fields<'_>) -> Self {
-        Self {
-            gravity: fields.number("gravity", Bound::NonNegative),
-            masses: fields.array("masses", Bound::Positive),
-            lengths: fields.array("lengths", Bound::Positive),
-            rejected: Rejections::default(),
-        }
     }
 }

@@ -6,15 +6,14 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::echo::Echo;
+use super::field_by_field::{Echo, FieldByField};
 use crate::actors::arm::sim::messages::GoalJudged;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call, Reply};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::arm::State;
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
@@ -80,10 +79,15 @@ impl<const N: usize> ArmSim<N> {
         }
     }
 }
-impl<const N: usize> Callable for Reset<N> {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let rejected = Fields::read_or_none(arguments, service).finish();
-        Ok(Self { rejected })
+impl<const N: usize> FieldByField for Reset<N> {
+    fn of(_: &mut Fields<'_>) -> Self {
+        Self {
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 

@@ -11,14 +11,14 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::disturb::DIVERGED;
+use super::field_by_field::FieldByField;
 use crate::actors::arm::sim::messages::RefuseSteps;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::arm::sim::state::steps::{Stepped, Steps, StepsEnd};
 use crate::actors::node::{Ask, Call, Unserved};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 
 /// Enters the route of this file into the registry's table.
@@ -133,13 +133,16 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Callable for Step {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let mut fields = Fields::read_or_none(arguments, service);
-        Ok(Self {
+impl FieldByField for Step {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
             steps: fields.count("steps", MAX_STEPS),
-            rejected: fields.finish(),
-        })
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 

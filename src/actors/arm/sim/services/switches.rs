@@ -6,13 +6,12 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::echo::Echo;
+use super::field_by_field::{Echo, FieldByField};
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
-use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
-use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
 
 /// Enters the routes of this file into the registry's table.
@@ -24,12 +23,6 @@ pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
 #[derive(Serialize)]
 struct Switch {
     data: bool,
-}
-
-/// The one field of a switch, and what was rejected.
-fn read_switch(service: Service, arguments: &Arguments) -> (Option<bool>, Rejections) {
-    let mut fields = Fields::read_or_none(arguments, service);
-    (fields.boolean("data"), fields.finish())
 }
 
 fn write_switch(echo: &Echo<bool>, to: &Address) -> Bytes {
@@ -75,10 +68,16 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Callable for Pause {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let (paused, rejected) = read_switch(service, arguments);
-        Ok(Self { paused, rejected })
+impl FieldByField for Pause {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            paused: fields.boolean("data"),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 
@@ -125,10 +124,16 @@ impl<const N: usize> ArmSim<N> {
     }
 }
 
-impl Callable for Enable {
-    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
-        let (enabled, rejected) = read_switch(service, arguments);
-        Ok(Self { enabled, rejected })
+impl FieldByField for Enable {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            enabled: fields.boolean("data"),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
     }
 }
 

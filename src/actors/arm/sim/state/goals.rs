@@ -11,6 +11,7 @@ use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
 
 /// The arm's memory of goals.
+#[derive(Default)]
 pub(crate) struct Goals<const N: usize> {
     pub(crate) tracked: Option<Tracked<N>>,
     /// How the latest goal ended, for a question that crossed the news on its way.
@@ -27,16 +28,6 @@ pub(crate) struct Tracked<const N: usize> {
     pub(crate) owner: Recipient<GoalJudged<N>>,
     /// Its setpoint is held, and it is judged.
     pub(crate) commanded: bool,
-}
-
-impl<const N: usize> Default for Goals<N> {
-    fn default() -> Self {
-        Self {
-            tracked: None,
-            latest: None,
-            before_reset: 0.0,
-        }
-    }
 }
 
 impl<const N: usize> Goals<N> {

@@ -9,6 +9,7 @@ use crate::actors::arm::sim::messages::HeldLimit;
 use crate::study::control_loop::ControlLoop;
 
 /// The arm's memory of its limit.
+#[derive(Default)]
 pub(crate) struct LimitWatch<const N: usize> {
     /// Who predicts, if anybody does.
     pub(crate) study: Option<Recipient<HeldLimit<N>>>,
@@ -20,18 +21,6 @@ pub(crate) struct LimitWatch<const N: usize> {
     pub(crate) known: Option<(ControlLoop<N>, f64)>,
     /// Whether the timestep was too long when that was last published.
     pub(crate) warned: bool,
-}
-
-impl<const N: usize> Default for LimitWatch<N> {
-    fn default() -> Self {
-        Self {
-            study: None,
-            asked: None,
-            waiting: false,
-            known: None,
-            warned: false,
-        }
-    }
 }
 
 /// Whether two loops have one limit: it depends on everything but the timestep.
