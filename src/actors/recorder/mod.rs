@@ -7,7 +7,7 @@ mod messages;
 mod tape;
 mod wire;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
 use actix::prelude::*;
@@ -104,14 +104,7 @@ impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
         let Some(folder) = &self.folder else {
             return reply.answer(Err(NotRecorded::NoFolder));
         };
-        let mut name = ask.name.unwrap_or_else(made_up_name);
-        if !name.ends_with(".mcap") {
-            name.push_str(".mcap");
-        }
-        let target = TapeTarget {
-            path: folder.join(&name),
-            limit: Some(MAX_RECORD_BYTES),
-        };
+        let (name, target) = place(folder, ask.name);
         let begun = self.begin(target, ctx);
         ctx.wait(begun.map(move |begun, _, _| reply.answer(begun.map(|()| name))));
     }
@@ -231,7 +224,39 @@ impl<const N: usize> Recorder<N> {
     }
 }
 
-fn made_up_name() -> String {
-    let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-    format!("run-{}", since_1970.as_millis())
+/// The place of a client's record: the file's name, and all about the file.
+fn place(folder: &Path, name: Option<String>) -> (String, TapeTarget) {
+    let made_up = || {
+        let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
+        format!("run-{}", since_1970.as_millis())
+    };
+    let mut name = name.unwrap_or_else(made_up);
+    if !name.ends_with(".mcap") {
+        name.push_str(".mcap");
+    }
+    let target = TapeTarget {
+        path: folder.join(&name),
+        limit: Some(MAX_RECORD_BYTES),
+    };
+    (name, target)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clients_record_lies_in_the_folder_and_is_bounded() {
+        for name in ["a", "a.mcap"] {
+            let (name, target) = place(Path::new("runs"), Some(name.to_owned()));
+            assert_eq!(name, "a.mcap");
+            assert_eq!(target.path, Path::new("runs/a.mcap"));
+            assert_eq!(target.limit, Some(MAX_RECORD_BYTES));
+        }
+        let (name, _) = place(Path::new("runs"), None);
+        assert!(
+            name.starts_with("run-") && name.ends_with(".mcap"),
+            "{name}"
+        );
+    }
 }

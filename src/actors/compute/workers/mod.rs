@@ -275,6 +275,7 @@ mod tests {
     use super::*;
     use crate::actors::ConnectionId;
     use std::sync::mpsc;
+    use std::time::Instant;
 
     struct Counting {
         name: &'static str,
