@@ -16,6 +16,7 @@ use tokio::runtime::Builder;
 use tokio::time::{Instant, sleep, timeout};
 
 use super::signals::Signals;
+use crate::actors::arm::follow::{PathArm, PathFollower};
 use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
@@ -29,6 +30,7 @@ use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
+use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::wire::Nodes;
@@ -170,6 +172,7 @@ where
     });
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
+    Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
     let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
     Rosapi::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
@@ -182,6 +185,7 @@ where
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
+    PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
     let tracker = GoalTracker {
         track: arm.clone().recipient(),
         command: arm.clone().recipient(),

@@ -29,6 +29,10 @@ fn census() -> Census {
             service("/add", Some("demo/srv/Add")),
             service("/nameless", None),
         ],
+        actions: vec![
+            service("/dance", Some("demo/action/Dance")),
+            service("/untyped", None),
+        ],
     }
 }
 
@@ -451,6 +455,6 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
 fn the_version_is_2_of_a_distribution_of_our_own() {
     assert_eq!(
         values(Rosapi::GetRosVersion, json!({})),
-        json!({"version": 2, "distro": "pendularm"})
+        json!({"version": 2, "distro": "jazzy"})
     );
 }

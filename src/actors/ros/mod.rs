@@ -3,5 +3,6 @@
 //! **Invariant:** these nodes hold no state of the arm; they ask for it.
 
 pub mod follower;
+pub mod parameters;
 pub mod rosapi;
 pub mod rosout;

@@ -13,6 +13,8 @@ table! {
         Ik = "ik",
         /// Drives the arm to a goal.
         IkAction = "ik_action",
+        /// Leads the arm along paths.
+        JointTrajectoryController = "joint_trajectory_controller",
         /// Timed trials.
         IkTrial = "ik_trial",
         /// Predictions and offline runs.

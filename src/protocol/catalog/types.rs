@@ -5,6 +5,7 @@
 
 pub use super::entry::{Constant, Count, Type};
 use super::entry::{Field, byte, message, required};
+use super::parameter_types;
 use super::topics::Topic;
 use crate::protocol::names;
 
@@ -13,7 +14,8 @@ const SEPARATOR: &str = "=";
 
 /// All message types: those of the topics, then those inside.
 pub fn all() -> impl Iterator<Item = Type> {
-    Topic::ALL.into_iter().map(Topic::message).chain(PARTS)
+    let topics = Topic::ALL.into_iter().map(Topic::message);
+    topics.chain(PARTS).chain(parameter_types::TYPES)
 }
 
 /// The type of that name; its middle part may be left out.
@@ -78,7 +80,7 @@ const TIME: [Field; 2] = [
 ];
 
 /// The types inside others.
-const PARTS: [Type; 12] = [
+const PARTS: [Type; 13] = [
     message(
         "std_msgs/msg/Header",
         &[
@@ -100,6 +102,15 @@ const PARTS: [Type; 12] = [
                 "builtin_interfaces/msg/Duration",
                 "s, ns",
             ),
+        ],
+    ),
+    message(
+        "control_msgs/msg/JointTolerance",
+        &[
+            required("name", "string", ""),
+            required("position", "float64", "rad"),
+            required("velocity", "float64", "rad/s"),
+            required("acceleration", "float64", "rad/s^2"),
         ],
     ),
     message(

@@ -6,4 +6,5 @@ pub mod cbor;
 pub mod cdr;
 pub mod parameters;
 pub mod rosapi;
+pub mod stamps;
 pub mod urdf;

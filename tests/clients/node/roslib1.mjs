@@ -35,6 +35,8 @@ async function overWebSocket() {
   packed.unsubscribe();
 
   check((await call(ros, "/pid_controller/enable", { data: true })).data, "enabled");
+  const refused = await call(ros, "/ik/solve", { x: 9, y: 9 }).then(() => "", String);
+  check(refused.includes("beyond"), `the words of a refusal: ${refused}`);
   const trajectory = new ROSLIB.Topic({ ros, name: "/joint_trajectory", messageType: "trajectory_msgs/JointTrajectory" });
   trajectory.publish(new ROSLIB.Message({ points: [{ positions: [0.2, 0.3] }] }));
   const results = new ROSLIB.Topic({ ros, name: "/ik_action/result", messageType: "pendularm_interfaces/IkResult" });

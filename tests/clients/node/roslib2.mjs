@@ -33,6 +33,9 @@ run("roslib 2", async () => {
 
   const enable = new Service({ ros, name: "/pid_controller/enable", serviceType: "pendularm_interfaces/srv/Enable" });
   check((await within("enabling", (ok, no) => enable.callService({ data: true }, ok, no))).data, "enabled");
+  const solve = new Service({ ros, name: "/ik/solve", serviceType: "pendularm_interfaces/srv/Solve" });
+  const refused = await within("a refusal", (ok, no) => solve.callService({ x: 9, y: 9 }, no, ok));
+  check(String(refused).includes("beyond"), `the words of a refusal: ${refused}`);
   const trajectory = new Topic({ ros, name: "/joint_trajectory", messageType: "trajectory_msgs/JointTrajectory" });
   trajectory.publish({ points: [{ positions: [0.2, 0.3] }] });
 

@@ -228,6 +228,11 @@ impl<const N: usize> ArmSim<N> {
 }
 
 impl<const N: usize> Goals<N> {
+    /// Simulation time up to the last reset \[s\].
+    pub(super) const fn before_reset(&self) -> f64 {
+        self.before_reset
+    }
+
     fn is_tracked(&self, number: u64) -> bool {
         self.tracked
             .as_ref()

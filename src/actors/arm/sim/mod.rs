@@ -12,6 +12,7 @@
 
 mod goals;
 mod limit;
+mod motion;
 mod scene;
 mod services;
 mod steps;
@@ -30,6 +31,7 @@ use self::goals::Goals;
 pub use self::goals::{ArmPose, CommandGoal, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::limit::LimitWatch;
 pub use self::limit::{ArmSettings, Consult, HeldLimit, LEAST_PAUSE, Present};
+pub use self::motion::{ArmMotion, Motion, MoveSetpoint};
 pub use self::services::{
     Echo, Enable, Integrator, Pause, Reset, SetGains, SetIntegrator, SetParams, SetSetpoint,
 };

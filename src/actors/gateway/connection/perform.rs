@@ -10,7 +10,7 @@ use crate::actors::gateway::aside::{Errand, aside};
 use crate::actors::gateway::awake::stay_awake;
 use crate::actors::gateway::budget::Share;
 use crate::actors::gateway::limits::READ_HERE;
-use crate::actors::gateway::messages::{Request, Respond};
+use crate::actors::gateway::messages::{Request, Respond, form_of};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
@@ -67,7 +67,8 @@ impl Reader {
             Ok(op) => self.perform(id, op, share).await,
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
-                self.say(messages::failure(&service, id.as_ref(), &why), None)
+                let form = form_of(&self.shared.wants_text);
+                self.say(messages::failure(&service, id.as_ref(), &why, form), None)
                     .await;
             }
             Err(OpError::Status(problem)) => {

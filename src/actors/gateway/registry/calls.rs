@@ -50,7 +50,9 @@ impl Registry {
                     node(ServiceCall {
                         service,
                         arguments: call.args,
-                        caller: caller.within(Arc::clone(&client.outlets.account)),
+                        caller: caller
+                            .within(Arc::clone(&client.outlets.account))
+                            .told(client.outlets.error_form()),
                     });
                     return Handled::by_node(ended);
                 }

@@ -9,6 +9,8 @@ mod census;
 mod fan_out;
 mod nodes;
 mod ops;
+mod pursuers;
+mod pursuit;
 mod refusal;
 mod services;
 mod state;

@@ -104,12 +104,35 @@ pub enum NotSet {
     /// It has no value of its own.
     #[error("name: robot_description is made from lengths and masses")]
     Derived,
+    /// Its value is of another type.
+    #[error("{name} must be a {expected} (type {number}), got type {found}")]
+    WrongType {
+        /// The parameter's name.
+        name: &'static str,
+        /// The name of its type.
+        expected: &'static str,
+        /// The number of its type.
+        number: u8,
+        /// The number of the type that came.
+        found: u8,
+    },
     /// The value can't be read.
     #[error("value must be JSON text")]
     NotJson,
     /// The arm does not take it.
     #[error("{0}")]
     Rejected(Rejections),
+}
+
+impl NotSet {
+    /// What was rejected is why a parameter was not set.
+    pub(in crate::actors::ros) fn unless_empty(rejected: Rejections) -> Result<(), Self> {
+        if rejected.is_empty() {
+            Ok(())
+        } else {
+            Err(Self::Rejected(rejected))
+        }
+    }
 }
 
 /// Whether there is a parameter of that name.

@@ -13,6 +13,7 @@ pub use self::messages::{
     Change, DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted,
     NotSet, ParameterValue, SetParam, Unknown,
 };
+pub(super) use self::wire::read_change;
 use crate::actors::arm::sim::{
     ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
 };
@@ -141,14 +142,7 @@ impl<const N: usize> Handler<Call<SetParam<N>>> for Rosapi<N> {
         };
         let rejected = change_parameter(change, self.arm.clone()).into_actor(self);
         ctx.spawn(rejected.map(|rejected, _, _| {
-            let outcome = rejected.map(|rejected| {
-                if rejected.is_empty() {
-                    Ok(())
-                } else {
-                    Err(NotSet::Rejected(rejected))
-                }
-            });
-            give(reply, outcome);
+            give(reply, rejected.map(NotSet::unless_empty));
         }));
     }
 }
@@ -188,7 +182,7 @@ fn no_arm() -> Unserved {
 }
 
 /// Passes on what has come of a question to the arm.
-fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
+pub(super) fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
     match answer {
         Ok(answer) => reply.answer(answer),
         Err(_) => reply.refuse(no_arm()),
@@ -196,7 +190,7 @@ fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
 }
 
 /// The present value of a parameter.
-async fn value<const N: usize>(
+pub(super) async fn value<const N: usize>(
     parameter: Parameter,
     arm: ArmParameters<N>,
 ) -> Result<ParameterValue<N>, Unserved> {
@@ -237,7 +231,7 @@ async fn value<const N: usize>(
 }
 
 /// Has the arm change a parameter; gives what was not taken.
-async fn change_parameter<const N: usize>(
+pub(super) async fn change_parameter<const N: usize>(
     change: Change<N>,
     arm: ArmParameters<N>,
 ) -> Result<Rejections, Unserved> {

@@ -156,19 +156,27 @@ impl<const N: usize> Served for SetParam<N> {
         let (name, text) = read_texts(service, arguments)?;
         let change = match Parameter::from_name(&name) {
             None => Err(NotSet::Unknown),
-            Some(parameter) => read_change(parameter, &text),
+            Some(parameter) => read_text(parameter, &text),
         };
         Ok(Self { change })
     }
 }
 
-/// A value in JSON text, as the arm's own service would read it.
-fn read_change<const N: usize>(parameter: Parameter, text: &str) -> Result<Change<N>, NotSet> {
-    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+/// A value in JSON text.
+fn read_text<const N: usize>(parameter: Parameter, text: &str) -> Result<Change<N>, NotSet> {
     // As lenient about numbers as every frame: they are refused by the parameter's name.
     let text = json::accept_literals(text.to_owned());
     let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson)?;
-    let fields = Fields::single(service, field, &value);
+    read_change(parameter, &value)
+}
+
+/// A value, as the arm's own service would read it.
+pub(in crate::actors::ros) fn read_change<const N: usize>(
+    parameter: Parameter,
+    value: &RawValue,
+) -> Result<Change<N>, NotSet> {
+    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+    let fields = Fields::single(service, field, value);
     Ok(match service {
         Service::SetParams => Change::Params(SetParams::request(fields)),
         Service::SetGains => Change::Gains(SetGains::request(fields)),
