@@ -26,10 +26,11 @@
 //! | [`node::Call`] of [`StartTrial`](arm::ik_trial::StartTrial), [`SkipTarget`](arm::ik_trial::SkipTarget), [`StopTrial`](arm::ik_trial::StopTrial) | registry | `ik_trial` | timed trials |
 //! | [`node::Call`] of [`IntegrationStep`](compute::integration::IntegrationStep), [`PredictStability`](compute::study::PredictStability), [`RunOffline`](compute::study::RunOffline), [`SuggestGains`](compute::study::SuggestGains), [`PlanRun`](compute::study::PlanRun) | registry | integration, study | computations, done by the workers |
 //! | [`node::Call`] of [`Look`](ros::rosapi::Look), [`GetParam`](ros::rosapi::GetParam), [`SetParam`](ros::rosapi::SetParam), ... | registry | rosapi | what there is |
-//! | [`node::Call`] of [`GetParameters`](ros::parameters::GetParameters), [`SetParameters`](ros::parameters::SetParameters), ... | registry | parameters | the same as nodes of ROS 2 tell it |
-//! | [`follow::FollowPath`](arm::follow::FollowPath) / [`follow::StopFollowing`](arm::follow::StopFollowing) | registry | follow | a path, and its end |
-//! | [`arm_sim::ArmMotion`](arm::sim::ArmMotion) / [`arm_sim::MoveSetpoint`](arm::sim::MoveSetpoint) | follow | `arm_sim` | how the arm moves; its setpoint moved on along a path |
-//! | [`node::Feedback`] | `ik_action`, follow | registry | feedback of a goal, for the client that sent it by the action |
+//! | [`GetParameters`](ros::parameters::GetParameters), ... | registry | parameters | the same as ROS 2 has it |
+//! | [`FollowPath`](arm::follow::FollowPath), its [end](arm::follow::StopFollowing) | registry | follow | a path |
+//! | [`ArmMotion`](arm::sim::ArmMotion), [`MoveSetpoint`](arm::sim::MoveSetpoint) | follow | `arm_sim` | along it |
+//! | [`WishFrames`](ros::tf_web::WishFrames), its [end](ros::tf_web::ForgetFrames) | registry | `tf_web` | frames |
+//! | [`node::Feedback`] | `ik_action`, follow, `tf_web` | registry | feedback of a goal, for the client that sent it |
 //! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: nothing is made without |
 //! | [`node::Publish`] / [`node::Respond`] | nodes | registry | a topic message; an answer. What the arm says is written by the registry |
 //! | [`arm_sim::ArmPose`](arm::sim::ArmPose) | ik, `ik_trial` | `arm_sim` | lengths, positions and time, asked for every time |

@@ -33,6 +33,7 @@ use crate::actors::gateway::registry::{Attach, Registry};
 use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
 use crate::actors::ros::rosout::Rosout;
+use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -177,6 +178,13 @@ where
     Rosapi::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
+
+    let frames = TfRepublisher::new(
+        arm.clone().recipient(),
+        arm.clone().recipient(),
+        registry.clone().recipient(),
+    );
+    TfRepublisher::attach(&frames.start(), nodes);
 
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);

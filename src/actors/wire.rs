@@ -181,7 +181,7 @@ impl Caller {
 
     /// The caller is told in this form why the call failed.
     #[must_use]
-    pub fn told(mut self, form: ErrorForm) -> Self {
+    pub fn with_errors(mut self, form: ErrorForm) -> Self {
         if let Some(address) = &mut self.address {
             address.error_form = form;
         }

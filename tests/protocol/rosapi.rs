@@ -105,7 +105,7 @@ fn topics_of_a_type_are_found_by_either_of_its_names() {
     for type_name in ["std_msgs/String", "std_msgs/msg/String"] {
         assert_eq!(
             values(Rosapi::TopicsForType, json!({"type": type_name})),
-            json!({"topics": ["/robot_description", "/chat"]})
+            json!({"topics": ["/robot_description", "/robot_description_semantic", "/chat"]})
         );
     }
     let none = values(Rosapi::TopicsForType, json!({"type": "demo/X"}));

@@ -146,7 +146,10 @@ fn an_action_that_is_withdrawn_takes_no_goals_but_ends_those_it_has() {
     dancer.settle();
     client.send(&goal("b", false));
     assert_eq!(with_op(&mut client, "action_result")["id"], "b");
-    dancer.send(&json!({"op": "action_result", "id": id, "action": "/dance", "values": {}, "status": 5, "result": true}));
+    dancer.send(
+        &json!({"op": "action_result", "id": id, "action": "/dance", "values": {}, "status": 5,
+                "result": true}),
+    );
     let end = with_op(&mut client, "action_result");
     assert_eq!((&end["id"], &end["status"]), (&json!("a"), &json!(5)));
     dancer.send(&json!({"op": "unadvertise_action", "action": "/dance"}));

@@ -6,3 +6,4 @@ pub mod follower;
 pub mod parameters;
 pub mod rosapi;
 pub mod rosout;
+pub mod tf_web;

@@ -1,13 +1,13 @@
 //! The actions: one row each. Goals with progress and an end, as rosbridge has them beside topics and services.
 //!
-//! **Invariant:** an action has the fields of the services and topics that do the same, where there are such; others have
-//! those of ROS 2.
+//! **Invariant:** an action has the fields of the services and topics that do the same, where there are such; others
+//! have those of ROS 2.
 
 use super::entry::{Field, optional, required};
 use super::node::Node;
-use super::services::Service;
+use super::services::{Service, WISH};
 use super::table::table;
-use super::topics::Topic;
+use super::topics::{TRANSFORMS, Topic};
 use crate::protocol::names;
 
 table! {
@@ -21,6 +21,15 @@ table! {
             goal: Service::SendGoal.fields(),
             result: Topic::IkResult.fields(),
             feedback: Topic::IkFeedback.fields(),
+        },
+        /// Frames for web viewers, as feedback.
+        TfSubscription = ActionEntry {
+            name: "/tf2_web_republisher",
+            type_name: "tf2_web_republisher_interfaces/action/TFSubscription",
+            owner: Node::TfRepublisher,
+            goal: &WISH,
+            result: &[],
+            feedback: &TRANSFORMS,
         },
         /// Leads the arm along a path.
         FollowJointTrajectory = ActionEntry {

@@ -19,6 +19,8 @@ table! {
         IkTrial = "ik_trial",
         /// Predictions and offline runs.
         Study = "study",
+        /// Puts frames together for web viewers.
+        TfRepublisher = "tf2_web_republisher",
         /// The rosbridge side: connections and registry.
         Gateway = "gateway",
         /// Tells what there is.

@@ -73,12 +73,14 @@ table! {
             .response(fields![required("values", "rcl_interfaces/msg/ParameterValue[]", "")])
             .all_or_nothing(),
         /// Their types.
-        GetParameterTypes = service("/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes", Node::ArmSim)
+        GetParameterTypes = service(
+            "/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes", Node::ArmSim)
             .request(&NAMES)
             .response(fields![required("types", "uint8[]", "")])
             .all_or_nothing(),
-        /// What they are.
-        DescribeParameters = service("/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters", Node::ArmSim)
+        /// Their descriptions.
+        DescribeParameters = service(
+            "/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters", Node::ArmSim)
             .request(&NAMES)
             .response(fields![required("descriptors", "rcl_interfaces/msg/ParameterDescriptor[]", "")])
             .all_or_nothing(),
@@ -128,6 +130,18 @@ table! {
         TrialSkip = service("/ik_trial/skip", "pendularm_interfaces/srv/TrialSkip", Node::IkTrial),
         /// Ends the trial.
         TrialStop = service("/ik_trial/stop", "pendularm_interfaces/srv/TrialStop", Node::IkTrial),
+        /// Which topic has the frames that web viewers want.
+        RepublishTfs = service("/republish_tfs", "tf2_web_republisher/srv/RepublishTFs", Node::TfRepublisher)
+            .request(fields![
+                optional("source_frames", "string[]", ""),
+                optional("target_frame", "string", ""),
+                optional("angular_thres", "float32", ""),
+                optional("trans_thres", "float32", ""),
+                optional("rate", "float32", "Hz"),
+                optional("timeout", "builtin_interfaces/msg/Duration", "s, ns"),
+            ])
+            .response(fields![required("topic_name", "string", "")])
+            .all_or_nothing(),
         /// Predicts the largest stable timestep.
         Stability = service("/study/stability", "pendularm_interfaces/srv/Stability", Node::Study)
             .request(fields![
@@ -255,6 +269,15 @@ const TRIAL: [Field; 3] = [
     optional("duration", "float64", "s"),
     optional("epsilon", "float64", "m"),
     optional("success_hold", "float64", "s"),
+];
+
+/// A viewer's wish: frames, as seen from another.
+pub(super) const WISH: [Field; 5] = [
+    required("source_frames", "string[]", ""),
+    required("target_frame", "string", ""),
+    optional("angular_thres", "float32", ""),
+    optional("trans_thres", "float32", ""),
+    optional("rate", "float32", "Hz"),
 ];
 
 /// The type of a request's `gains`; its members are the fields of `/pid_controller/set_gains`.

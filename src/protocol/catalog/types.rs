@@ -6,7 +6,8 @@
 pub use super::entry::{Constant, Count, Type};
 use super::entry::{Field, byte, message, required};
 use super::parameter_types;
-use super::topics::Topic;
+use super::services::WISH;
+use super::topics::{TRANSFORMS, Topic};
 use crate::protocol::names;
 
 /// Stands between the definitions of a type and of the types in it: 80 of these in a line.
@@ -80,7 +81,7 @@ const TIME: [Field; 2] = [
 ];
 
 /// The types inside others.
-const PARTS: [Type; 13] = [
+const PARTS: [Type; 16] = [
     message(
         "std_msgs/msg/Header",
         &[
@@ -112,6 +113,19 @@ const PARTS: [Type; 13] = [
             required("velocity", "float64", "rad/s"),
             required("acceleration", "float64", "rad/s^2"),
         ],
+    ),
+    message(
+        "actionlib_msgs/msg/GoalStatus",
+        &[
+            required("goal_id", "actionlib_msgs/msg/GoalID", ""),
+            required("status", "uint8", ""),
+            required("text", "string", ""),
+        ],
+    ),
+    message("tf2_web_republisher/msg/TFSubscriptionGoal", &WISH),
+    message(
+        "tf2_web_republisher/msg/TFSubscriptionFeedback",
+        &TRANSFORMS,
     ),
     message(
         "diagnostic_msgs/msg/DiagnosticStatus",

@@ -106,11 +106,11 @@ pub enum Op {
         /// Action name.
         action: String,
     },
-    /// What a client says that pursues goals of an action.
+    /// An operation of a client that pursues goals of an action.
     Pursue {
         /// Action name.
         action: String,
-        /// What it says.
+        /// Which of them.
         pursuit: PursuerOp,
     },
     /// A piece of a longer frame.
@@ -254,7 +254,7 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
-/// What a client says that pursues goals; where it is about one goal, the frame's id says which.
+/// An operation of a client that pursues goals; where it is about one goal, the frame's id says which.
 #[derive(Debug, Clone)]
 pub enum PursuerOp {
     /// The sender pursues the action from now on.

@@ -6,5 +6,6 @@ pub mod cbor;
 pub mod cdr;
 pub mod parameters;
 pub mod rosapi;
+pub mod srdf;
 pub mod stamps;
 pub mod urdf;

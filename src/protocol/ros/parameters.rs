@@ -112,7 +112,7 @@ impl Parameter {
         }
     }
 
-    /// What it is, in a few words.
+    /// A description in a few words.
     #[must_use]
     pub fn description(self) -> String {
         match (self.field(), self.unit_and_kind().0) {

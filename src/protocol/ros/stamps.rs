@@ -10,7 +10,7 @@ use crate::protocol::names;
 const SECONDS: &[u8] = b"\"sec\":";
 const NANOSECONDS: &[u8] = b",\"nanosec\":";
 
-/// Whether `asked` is ROS 1's name of the type that ROS 2 calls `type_name`: `std_msgs/Header` of `std_msgs/msg/Header`.
+/// Whether `asked` is ROS 1's name of a type of ROS 2: `std_msgs/Header` of `std_msgs/msg/Header`.
 #[must_use]
 pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
     asked != type_name && asked == names::short_type(type_name)
@@ -67,9 +67,16 @@ mod tests {
 
     #[test]
     fn every_stamp_gets_the_names_of_ros_1_beside_its_own() {
-        let frame = br#"{"a":{"sec":-1,"nanosec":5},"text":"\"sec\":3,\"nanosec\":4","sec":7,"b":{"sec":2,"nanosec":30}}"#;
-        let expected = br#"{"a":{"sec":-1,"nanosec":5,"secs":-1,"nsecs":5},"text":"\"sec\":3,\"nanosec\":4","sec":7,"b":{"sec":2,"nanosec":30,"secs":2,"nsecs":30}}"#;
-        assert_eq!(with_ros1_names(frame), &expected[..]);
+        let stamps = |first: &str, second: &str| {
+            let text = r#""\"sec\":3,\"nanosec\":4""#;
+            format!(r#"{{"a":{{{first}}},"text":{text},"sec":7,"b":{{{second}}}}}"#)
+        };
+        let frame = stamps(r#""sec":-1,"nanosec":5"#, r#""sec":2,"nanosec":30"#);
+        let expected = stamps(
+            r#""sec":-1,"nanosec":5,"secs":-1,"nsecs":5"#,
+            r#""sec":2,"nanosec":30,"secs":2,"nsecs":30"#,
+        );
+        assert_eq!(with_ros1_names(frame.as_bytes()), expected.as_bytes());
         for none in [&b""[..], b"{}", b"\"sec\":", b"\"sec\":1,\"nano"] {
             assert_eq!(with_ros1_names(none), none);
         }

@@ -46,6 +46,16 @@ async function overWebSocket() {
   check(end.goal_id === goal_id && end.outcome === "reached", "reached");
 }
 
+/** What ros3d shows an arm by: as roslib has it by default, and by the service. */
+async function viewer(options) {
+  const ros = await connect({ url, ...options });
+  const tf = new ROSLIB.TFClient({ ros, fixedFrame: "/world", rate: 30 });
+  const hand = await within("the hand", (resolve) => tf.subscribe("hand", resolve));
+  check(Math.hypot(hand.translation.x, hand.translation.y) > 0.1, "where the hand is");
+  tf.dispose();
+  ros.close();
+}
+
 async function overTcp() {
   const port = address.split(":").pop();
   const ros = await connect({ host: "127.0.0.1", port: Number(port), encoding: "utf8" });
@@ -58,5 +68,7 @@ async function overTcp() {
 
 run("roslib 1", async () => {
   await overWebSocket();
+  await viewer({});
+  await viewer({ groovyCompatibility: false });
   await overTcp();
 });

@@ -6,14 +6,15 @@
 //!
 //! **Invariant:** at most one goal is active, and each that was accepted has exactly one result.
 
+mod answers;
 mod wire;
 
 use std::time::Duration;
 
 use actix::prelude::*;
 
-use self::wire::{ResultCode, feedback, result};
-use crate::actors::arm::sim::{ArmMotion, ArmSim, Motion, MoveSetpoint};
+use self::answers::{ResultCode, feedback, result};
+use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
 use crate::actors::node::Done;
 use crate::actors::ros::follower::{Canceller, Follower, GoalStatus};
 use crate::math::arm::State;
@@ -158,7 +159,7 @@ impl<const N: usize> ActivePath<N> {
 
 impl<const N: usize> PathFollower<N> {
     /// Sets a goal in motion, in place of the one before.
-    fn begin(&mut self, goal: FollowPath<N>, motion: &Motion<N>, ctx: &mut Context<Self>) {
+    fn begin(&mut self, goal: FollowPath<N>, motion: &JointMotion<N>, ctx: &mut Context<Self>) {
         let start = Waypoint {
             time: 0.0,
             position: motion.state.position,
@@ -198,7 +199,7 @@ impl<const N: usize> PathFollower<N> {
         }));
     }
 
-    fn lead(&mut self, motion: &Motion<N>, done: Option<Done>, ctx: &mut Context<Self>) {
+    fn lead(&mut self, motion: &JointMotion<N>, done: Option<Done>, ctx: &mut Context<Self>) {
         let Some(goal) = &mut self.active else {
             return;
         };

@@ -1,9 +1,8 @@
-//! Goals of `control_msgs/action/FollowJointTrajectory` in JSON, their feedback and their results.
+//! Goals of `control_msgs/action/FollowJointTrajectory` in JSON.
 //!
 //! **Invariant:** a long goal is read on another thread, and what its client sends behind it waits.
 
 use actix::prelude::*;
-use serde_json::{Value, json};
 
 use super::{FollowPath, PathFollower, StopFollowing};
 use crate::actors::arm::sim::joint_names;
@@ -11,25 +10,14 @@ use crate::actors::gateway::aside::{Errand, aside};
 use crate::actors::node::Done;
 use crate::actors::ros::follower::{ActionRequest, Follower};
 use crate::actors::wire::{LONG_ARGUMENTS, Nodes, Route};
-use crate::math::arm::State;
-use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
-use crate::protocol::messages::{Header, Stamp};
 use crate::protocol::op::follow::{FollowGoal, JointTolerance};
 
 /// How far off each joint may be at the end where the goal does not say \[rad\].
 const GOAL_TOLERANCE: f64 = 0.05;
-/// How long after the end it may take for that where the goal does not say \[s\]: long enough for any arm that is coming.
+/// How long after the end it may take for that where the goal does not say \[s\].
 const GOAL_TIME: f64 = 5.0;
-
-/// How a goal has ended, as the action counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ResultCode {
-    Successful = 0,
-    PathToleranceViolated = -4,
-    GoalToleranceViolated = -5,
-}
 
 impl<const N: usize> PathFollower<N> {
     /// Enters this node's action into the registry's table.
@@ -107,44 +95,4 @@ fn tolerance<const N: usize>(default: Option<f64>, given: &[JointTolerance]) -> 
         }
     }
     tolerance
-}
-
-pub(super) fn result(code: ResultCode, why: &str) -> Value {
-    json!({"error_code": code as i32, "error_string": why})
-}
-
-/// How the arm follows at simulation time `now`, `time` after the start \[s\].
-pub(super) fn feedback<const N: usize>(
-    now: f64,
-    time: f64,
-    desired: &Setpoint<N>,
-    actual: &State<N>,
-) -> Value {
-    let stamp = Stamp::from_seconds(time);
-    let point = |positions: &[f64], velocities: &[f64]| {
-        json!({
-            "positions": positions,
-            "velocities": velocities,
-            "accelerations": [],
-            "effort": [],
-            "time_from_start": stamp,
-        })
-    };
-    let off = |wanted: &[f64], is: &[f64]| -> Vec<f64> {
-        wanted
-            .iter()
-            .zip(is)
-            .map(|(wanted, is)| wanted - is)
-            .collect()
-    };
-    json!({
-        "header": Header::world(now),
-        "joint_names": joint_names::<N>().as_slice(),
-        "desired": point(&desired.position, &desired.velocity),
-        "actual": point(&actual.position, &actual.velocity),
-        "error": point(
-            &off(&desired.position, &actual.position),
-            &off(&desired.velocity, &actual.velocity),
-        ),
-    })
 }

@@ -31,7 +31,7 @@ use self::goals::Goals;
 pub use self::goals::{ArmPose, CommandGoal, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
 use self::limit::LimitWatch;
 pub use self::limit::{ArmSettings, Consult, HeldLimit, LEAST_PAUSE, Present};
-pub use self::motion::{ArmMotion, Motion, MoveSetpoint};
+pub use self::motion::{ArmMotion, JointMotion, MoveSetpoint};
 pub use self::services::{
     Echo, Enable, Integrator, Pause, Reset, SetGains, SetIntegrator, SetParams, SetSetpoint,
 };

@@ -10,12 +10,12 @@ use crate::math::pid::Setpoint;
 
 /// How the arm moves now. From `joint_trajectory_controller`, while it leads the arm.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Motion<N>")]
+#[rtype(result = "JointMotion<N>")]
 pub struct ArmMotion<const N: usize>;
 
 /// The arm at one instant.
 #[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
-pub struct Motion<const N: usize> {
+pub struct JointMotion<const N: usize> {
     /// Positions and velocities.
     pub state: State<N>,
     /// The joint state that is held.
@@ -38,11 +38,11 @@ pub struct MoveSetpoint<const N: usize> {
 }
 
 impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
-    type Result = Motion<N>;
+    type Result = JointMotion<N>;
 
-    fn handle(&mut self, _: ArmMotion<N>, ctx: &mut Context<Self>) -> Motion<N> {
+    fn handle(&mut self, _: ArmMotion<N>, ctx: &mut Context<Self>) -> JointMotion<N> {
         self.attend(ctx);
-        Motion {
+        JointMotion {
             state: *self.simulation.state(),
             setpoint: *self.simulation.pid().setpoint(),
             time: self.simulation.time(),

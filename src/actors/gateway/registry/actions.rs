@@ -51,6 +51,7 @@ impl Registry {
             action: Arc::from(goal.action.as_str()),
             id,
             wants_feedback: goal.feedback,
+            gone: Arc::clone(&client.outlets.gone),
             share,
         };
         let node = match refusal.map_or_else(|| self.pursuer(&goal), Err) {

@@ -52,7 +52,7 @@ impl Registry {
                         arguments: call.args,
                         caller: caller
                             .within(Arc::clone(&client.outlets.account))
-                            .told(client.outlets.error_form()),
+                            .with_errors(client.outlets.error_form()),
                     });
                     return Handled::by_node(ended);
                 }

@@ -1,7 +1,7 @@
 //! Actions that clients pursue: who pursues which, and the goals that are on their way.
 //!
-//! **Invariant:** a forwarded goal ends by its own pursuer's result, or with that client, and only once. Goals outlive who
-//! sent them; then nobody hears of them any more.
+//! **Invariant:** a forwarded goal ends by its own pursuer's result, or with that client, and only once. Goals outlive
+//! who sent them; then nobody hears of them any more.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;

@@ -36,7 +36,7 @@ impl<const N: usize> Ask for GetParameters<N> {
     type Answer = Vec<Option<ParameterValue<N>>>;
 }
 
-/// What kind of value parameters have; answered by what was asked, since no value is needed for it.
+/// The types of parameters; answered by what was asked, since no value is needed for it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct GetParameterTypes {
     /// The parameters; none where there is none of a name.
@@ -47,7 +47,7 @@ impl Ask for GetParameterTypes {
     type Answer = Vec<Option<Parameter>>;
 }
 
-/// What parameters are; answered like their types.
+/// Descriptions of parameters; answered like their types.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DescribeParameters {
     /// The parameters, each with its name as it was asked for.

@@ -125,7 +125,7 @@ pub enum NotSet {
 }
 
 impl NotSet {
-    /// What was rejected is why a parameter was not set.
+    /// Rejections are why a parameter was not set.
     pub(in crate::actors::ros) fn unless_empty(rejected: Rejections) -> Result<(), Self> {
         if rejected.is_empty() {
             Ok(())

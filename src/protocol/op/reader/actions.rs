@@ -1,4 +1,4 @@
-//! The operations of actions: goals and cancellations from those who send them, progress and ends from those who pursue them.
+//! The operations of actions: goals and cancellations from those who send them, the rest from those who pursue them.
 //!
 //! **Invariant:** an end has a status of `action_msgs/msg/GoalStatus`, also where its sender leaves that out.
 
@@ -35,7 +35,7 @@ impl OpReader<'_> {
         })
     }
 
-    /// What a client says that pursues goals.
+    /// An operation of a client that pursues goals.
     pub(super) fn pursuit(&self) -> Result<Op, Problem> {
         let action = self.name("action")?;
         let pursuit = match self.op {
