@@ -1,3 +1,4 @@
+// @ts-check
 // The arm on its canvas: grid, reach, trail of the tip, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
 // Invariant: a frame allocates nothing, and nothing is drawn while nothing is seen to change.

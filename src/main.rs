@@ -13,8 +13,9 @@ use pendularm::plan;
 #[cfg(feature = "report")]
 use pendularm::report;
 
-/// Memory that was freed goes back to the system within ten seconds, by a thread that nobody waits for. The C library's allocator
-/// keeps it for ever where the last of it lies behind something small, which after a burst of small messages is the rule.
+/// Memory that was freed goes back to the system within ten seconds, by a thread that nobody waits for. The C library's
+/// allocator keeps it for ever where the last of it lies behind something small, which after a burst of small messages
+/// is the rule.
 #[global_allocator]
 static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 

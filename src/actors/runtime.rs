@@ -1,7 +1,8 @@
 //! Starts every node in order, chooses their threads, and ends everything within a second.
 //!
 //! Threads: this one for the gateway (listeners, connections, registry) and the small nodes; one for the arm; a few
-//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that looks at the number of links.
+//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that
+//! looks at the number of links.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 
@@ -26,10 +27,10 @@ use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::gate::{Admission, Gate};
 use crate::actors::gateway::files;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
+use crate::actors::resources::gauges::Gauges;
 use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
 use crate::actors::ros::rosout::Rosout;
@@ -67,14 +68,14 @@ pub enum RunError {
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on another
-/// thread; it should not return.
+/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on
+/// another thread; it should not return.
 ///
 /// # Errors
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
 pub fn run(options: &Options, last_resort: impl FnOnce() + Send + 'static) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
-    // What clients were owed is dropped here: that, too, is part of the end.
+    // Answers that clients were owed are dropped here, which is part of the end.
     System::new().block_on(serve(options, &mut signals))
 }
 
@@ -129,7 +130,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     Ok(())
 }
 
-/// What is asked of clients, and what they find behind it.
+/// The gate: it asks clients for the token, and has the door of the web behind it.
 fn gate(options: &Options, unauthenticated: usize) -> Gate {
     Gate {
         token: options.token.clone(),

@@ -134,7 +134,8 @@ fn figure(out: &mut String, figure: &Figure) {
     append(
         out,
         format_args!(
-            "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
+            "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a \
+             href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
             escape(&figure.caption),
             name = escape(&figure.name)
         ),
@@ -185,10 +186,10 @@ fn making(out: &mut String, sections: &[Section], machine: &Machine) {
         );
     }
     out.push_str("</dl><p>Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
-         quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of the same \
-         steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and not from the arm's \
-         own kernel; their own uncertainty is the distance to a second series of other order and tolerance. Nothing is tuned per \
-         method.</p><ul class=\"sections\">");
+         quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of \
+         the same steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and \
+         not from the arm's own kernel; their own uncertainty is the distance to a second series of other order and \
+         tolerance. Nothing is tuned per method.</p><ul class=\"sections\">");
     for section in sections {
         let quick = if section.quick { ", quick" } else { "" };
         append(

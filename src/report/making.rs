@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use super::csv::Csv;
-use super::progress::Progress;
+use super::progress::ProgressBar;
 
 /// The tools at hand while a section is made.
 #[derive(Debug)]
@@ -13,7 +13,7 @@ pub(crate) struct Making<'a> {
     pub(super) quick: bool,
     /// Where the report is written, and counts from outside are looked for.
     pub(super) out: &'a Path,
-    pub(super) progress: &'a mut Progress,
+    pub(super) progress: &'a mut ProgressBar,
     /// Stems and contents of `.csv` files.
     pub(super) tables: Vec<(String, Csv)>,
 }

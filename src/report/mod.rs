@@ -1,8 +1,9 @@
 //! The study as a page to look at: `pendularm report --out report/`.
 //!
-//! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one `.csv` and
-//! `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their files. What is
-//! measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the drawing are.
+//! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one
+//! `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their
+//! files. What is measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the
+//! drawing are.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 
@@ -25,7 +26,7 @@ use std::time::Instant;
 use figures::SECTIONS;
 use machine::Machine;
 use making::Making;
-use progress::Progress;
+use progress::ProgressBar;
 use section::{Block, Section, Table};
 use serde_json::{Value, json};
 
@@ -89,7 +90,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         .filter(|maker| wanted(maker.name))
         .map(weight)
         .sum();
-    let mut progress = Progress::new(total);
+    let mut progress = ProgressBar::new(total);
     let mut sections = Vec::new();
     for maker in &SECTIONS {
         let file = kept.join(format!("{}.json", maker.name));
@@ -126,7 +127,7 @@ fn make(
     maker: &figures::Maker,
     options: &ReportOptions,
     machine: &Machine,
-    progress: &mut Progress,
+    progress: &mut ProgressBar,
 ) -> Result<Section, ReportError> {
     let started = Instant::now();
     let mut making = Making {

@@ -5,6 +5,7 @@
 use std::ffi::OsString;
 use std::process::{Command, Output, Stdio};
 
+use crate::common;
 use pendularm::options::{DEFAULT_BIND, Links, Options, Parsed, UsageError};
 use proptest::prelude::*;
 use tracing::level_filters::LevelFilter;
@@ -408,22 +409,9 @@ proptest! {
     }
 }
 
-/// The program itself, with nothing of the tester's environment that could change what it does.
+/// The program itself with these arguments.
 fn program(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pendularm"));
-    for variable in [
-        "ARM_SIM_LINKS",
-        "ARM_SIM_BIND",
-        "ARM_SIM_SEED",
-        "ARM_SIM_LOG",
-        "ARM_SIM_TOKEN",
-        "ARM_SIM_ALLOW_HOST",
-        "ARM_SIM_ALLOW_ORIGIN",
-        "ARM_SIM_STRICT_ORIGIN",
-        "ARM_SIM_REPORT",
-    ] {
-        command.env_remove(variable);
-    }
+    let mut command = common::program();
     command.args(arguments).stdin(Stdio::null());
     command
 }

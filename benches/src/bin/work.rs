@@ -7,12 +7,11 @@
 
 use std::hint::black_box;
 
-use pendularm::math::arm::{Arm, State};
 use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
-use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
+use pendularm::math::pid::Gains;
+use pendularm::report::experiments::step_scene::ready;
 
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
@@ -23,23 +22,8 @@ where
     } else {
         9.81
     };
-    let arm = Arm::<N>::new([1.0; N], [1.0; N], gravity).expect("an arm");
-    let mut gains = Gains::<N>::default();
-    if what.contains("pd") {
-        gains.ki = [0.0; N];
-    }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    // Angles stay small enough for one path through sine and cosine.
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(what.contains("pd") || what.contains("pid"));
+    let (pd, pid) = (what.contains("pd"), what.contains("pid"));
+    let mut simulation = ready::<N>(gravity, !pd, pd || pid, method);
     assert_eq!(simulation.advance(count), count);
     black_box(simulation.state());
 }

@@ -11,10 +11,10 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::{Notify, oneshot};
 
-use super::budget::Account;
 use super::encoded::Encoded;
 use crate::actors::ConnectionId;
 pub use crate::actors::node::{Feedback, Publish, Respond};
+use crate::actors::resources::budget::Account;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Op;

@@ -6,7 +6,7 @@
 use serde_json::value::RawValue;
 
 use super::Arguments;
-use super::fields::{Bound, Fields, Rejection, Rejections};
+use super::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::catalog::Action;
 use crate::protocol::wire::{json, text};
 
@@ -69,7 +69,7 @@ impl FollowGoal {
         let [path_tolerance, goal_tolerance] = tolerances.map(|(name, entries)| {
             let indexed = entries.into_iter().enumerate();
             let read = indexed.map(|(at, raw)| tolerance(raw, &format!("{name}[{at}]"), joints));
-            read.collect::<Result<Vec<_>, Rejection>>()
+            read.collect::<Result<Vec<_>, RejectedField>>()
         });
         Ok(Self {
             points: points(trajectory, joints)?,
@@ -83,18 +83,18 @@ impl FollowGoal {
     }
 }
 
-fn refused(field: &str, reason: &str) -> Rejection {
-    Rejection::refused(field, &reason)
+fn refused(field: &str, reason: &str) -> RejectedField {
+    RejectedField::refused(field, &reason)
 }
 
-fn mistyped(field: &str, expected: &str, raw: &RawValue) -> Rejection {
+fn mistyped(field: &str, expected: &str, raw: &RawValue) -> RejectedField {
     refused(
         field,
         &format!("must be {expected}, got {}", text::found(raw)),
     )
 }
 
-fn points(trajectory: &RawValue, joints: &[&str]) -> Result<Vec<FollowPoint>, Rejection> {
+fn points(trajectory: &RawValue, joints: &[&str]) -> Result<Vec<FollowPoint>, RejectedField> {
     let [names, points] = json::members(trajectory.get(), &["joint_names", "points"])
         .map_err(|_| mistyped("trajectory", "an object", trajectory))?;
     let order = order(names, joints)?;
@@ -116,7 +116,7 @@ fn points(trajectory: &RawValue, joints: &[&str]) -> Result<Vec<FollowPoint>, Re
 }
 
 /// For each joint of the arm, where the message has it.
-fn order(names: Option<&RawValue>, joints: &[&str]) -> Result<Vec<usize>, Rejection> {
+fn order(names: Option<&RawValue>, joints: &[&str]) -> Result<Vec<usize>, RejectedField> {
     let field = "trajectory.joint_names";
     let expected = format!("must name {}, each once", joints.join(", "));
     let wrong = || refused(field, &expected);
@@ -131,7 +131,7 @@ fn order(names: Option<&RawValue>, joints: &[&str]) -> Result<Vec<usize>, Reject
     places.collect::<Option<_>>().ok_or_else(wrong)
 }
 
-fn point(raw: &RawValue, field: &str, order: &[usize]) -> Result<FollowPoint, Rejection> {
+fn point(raw: &RawValue, field: &str, order: &[usize]) -> Result<FollowPoint, RejectedField> {
     let names = ["positions", "velocities", "time_from_start"];
     let [positions, velocities, time] =
         json::members(raw.get(), &names).map_err(|_| mistyped(field, "an object", raw))?;
@@ -155,7 +155,7 @@ fn is_empty(raw: &RawValue) -> bool {
 }
 
 /// A finite number for each joint, in the arm's order.
-fn by_joint(raw: &RawValue, field: &str, order: &[usize]) -> Result<Vec<f64>, Rejection> {
+fn by_joint(raw: &RawValue, field: &str, order: &[usize]) -> Result<Vec<f64>, RejectedField> {
     let expected = order.len();
     let entries =
         json::entries(raw, expected).ok_or_else(|| mistyped(field, "an array of numbers", raw))?;
@@ -177,7 +177,7 @@ fn by_joint(raw: &RawValue, field: &str, order: &[usize]) -> Result<Vec<f64>, Re
         .collect())
 }
 
-fn finite(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, Rejection> {
+fn finite(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedField> {
     let value = json::number(raw).ok_or_else(|| mistyped(field, "a number", raw))?;
     if !value.is_finite() {
         return Err(refused(field, "must be a finite number"));
@@ -192,7 +192,7 @@ fn finite(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, Rejection> {
 }
 
 /// A duration in seconds, under the names of ROS 2 or of ROS 1.
-fn seconds(raw: &RawValue, field: &str) -> Result<f64, Rejection> {
+fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
     let names = ["sec", "nanosec", "secs", "nsecs"];
     let [sec, nanosec, secs, nsecs] = json::members(raw.get(), &names)
         .map_err(|_| mistyped(field, "an object with sec and nanosec", raw))?;
@@ -203,7 +203,11 @@ fn seconds(raw: &RawValue, field: &str) -> Result<f64, Rejection> {
     Ok(part(sec.or(secs), "sec")? + 1e-9 * part(nanosec.or(nsecs), "nanosec")?)
 }
 
-fn tolerance(raw: &RawValue, field: &str, joints: &[&str]) -> Result<JointTolerance, Rejection> {
+fn tolerance(
+    raw: &RawValue,
+    field: &str,
+    joints: &[&str],
+) -> Result<JointTolerance, RejectedField> {
     let [name, position, velocity] = json::members(raw.get(), &["name", "position", "velocity"])
         .map_err(|_| mistyped(field, "an object", raw))?;
     let number = |raw: Option<&RawValue>, name: &str| match raw {

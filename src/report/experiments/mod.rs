@@ -9,9 +9,11 @@
 //! | [`error`](mod@error) | error against evaluations for all methods in the same scenes |
 //! | [`conditioning`] | digits lost in the accelerations of arms with uneven masses |
 //! | [`budget`] | truncation, rounding and control hold, apart |
+//! | [`step_scene`] | the arm whose steps are timed and counted |
 //! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
 //!
-//! Everything steps through [`crate::math`], the live arm's own code, and is compared with [`crate::study`]'s predictions.
+//! Everything steps through [`crate::math`], the live arm's own code, and is compared with [`crate::study`]'s
+//! predictions.
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
@@ -24,3 +26,4 @@ pub mod measure;
 pub mod reference;
 mod sampled;
 pub mod scenarios;
+pub mod step_scene;

@@ -16,7 +16,7 @@ use actix::prelude::*;
 use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
 use crate::actors::node::Done;
-use crate::actors::ros::follower::{Canceller, Follower, GoalStatus};
+use crate::actors::wire::follower::{Canceller, GoalFollower, GoalStatus};
 use crate::math::arm::State;
 use crate::math::goal::Cadence;
 use crate::math::pid::Setpoint;
@@ -60,7 +60,7 @@ impl<const N: usize> PathArm<N> {
 /// The goal that is being followed.
 struct ActivePath<const N: usize> {
     course: Course<N>,
-    follower: Follower,
+    follower: GoalFollower,
     /// Simulation time of its start \[s\], since the reset before it.
     began: f64,
     /// Simulation time up to that reset \[s\].
@@ -97,7 +97,7 @@ pub struct FollowPath<const N: usize> {
     /// How long after the end they may take for that \[s\].
     pub patience: f64,
     /// Who sent it.
-    pub follower: Follower,
+    pub follower: GoalFollower,
     /// Dropped when the arm is on its way, or the goal refused.
     pub done: Done,
 }

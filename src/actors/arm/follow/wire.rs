@@ -6,9 +6,9 @@ use actix::prelude::*;
 
 use super::{FollowPath, PathFollower, StopFollowing};
 use crate::actors::arm::sim::joint_names;
-use crate::actors::gateway::aside::{Errand, aside};
 use crate::actors::node::Done;
-use crate::actors::ros::follower::{ActionRequest, Follower};
+use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::wire::follower::{ActionRequest, GoalFollower};
 use crate::actors::wire::{LONG_ARGUMENTS, Nodes, Route};
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
@@ -56,7 +56,7 @@ fn requests<const N: usize>(
 }
 
 /// The goal for an arm of `N` links; the reader has checked how many values there are.
-fn path<const N: usize>(goal: FollowGoal, mut follower: Follower, done: Done) -> FollowPath<N> {
+fn path<const N: usize>(goal: FollowGoal, mut follower: GoalFollower, done: Done) -> FollowPath<N> {
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let points = goal.points.iter().map(|point| Waypoint {
         time: point.time,

@@ -4,7 +4,7 @@
 
 use actix::prelude::*;
 
-use super::ArmSim;
+use super::node::ArmSim;
 use crate::math::arm::State;
 use crate::math::pid::Setpoint;
 
@@ -46,7 +46,7 @@ impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
             state: *self.simulation.state(),
             setpoint: *self.simulation.pid().setpoint(),
             time: self.simulation.time(),
-            before_reset: self.goals.before_reset(),
+            before_reset: self.goals.before_reset,
         }
     }
 }

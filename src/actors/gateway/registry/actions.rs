@@ -8,12 +8,12 @@ use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use super::refusal::Refusal;
-use super::state::{Origin, Registry};
+use super::state::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Frames, Handled};
 use crate::actors::node::Feedback;
-use crate::actors::ros::follower::{ActionRequest, Canceller, Follower};
 use crate::actors::wire::Route;
+use crate::actors::wire::follower::{ActionRequest, Canceller, GoalFollower};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::Level;
 use crate::protocol::names;
@@ -43,8 +43,8 @@ impl Registry {
         let share = client
             .outlets
             .account
-            .take(size_of::<Follower>() + goal.action.len() + id_bytes);
-        let follower = Follower {
+            .take(size_of::<GoalFollower>() + goal.action.len() + id_bytes);
+        let follower = GoalFollower {
             respond: ctx.address().recipient(),
             feedback: ctx.address().recipient(),
             connection: from,
@@ -80,7 +80,7 @@ impl Registry {
     ) -> Handled {
         let node = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
         let Some(node) = node else {
-            let origin = Origin { from, id };
+            let origin = FrameOrigin { from, id };
             if let Err(why) = self.forward_cancellation(&origin, action) {
                 self.send_status(from, Level::Error, &why.to_string(), origin.id.as_ref());
             }

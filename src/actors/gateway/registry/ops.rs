@@ -11,7 +11,7 @@ use super::census::Use;
 use super::fan_out::Pace;
 use super::refusal::Refusal;
 use super::services::Provider;
-use super::state::{Origin, Registry};
+use super::state::{FrameOrigin, Registry};
 use super::topics::{Subscription, throttle_of};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS};
@@ -29,7 +29,7 @@ use crate::protocol::wire::series::Series;
 impl Registry {
     /// Performs one op of a client that is known.
     pub(super) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
-        let origin = Origin {
+        let origin = FrameOrigin {
             from: request.from,
             id: request.id,
         };
@@ -97,7 +97,7 @@ impl Registry {
 
     fn advertise(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         topic: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -125,7 +125,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unadvertise(&mut self, origin: &Origin, topic: &str) {
+    fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
@@ -141,7 +141,7 @@ impl Registry {
     /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
     fn publish(
         &mut self,
-        origin: Origin,
+        origin: FrameOrigin,
         topic: &str,
         msg: &Payload,
         heard: Option<Payload>,
@@ -197,7 +197,7 @@ impl Registry {
         Handled::at_once().and_by_subscribers(pace.end())
     }
 
-    fn subscribe(&mut self, origin: &Origin, subscribe: &Subscribe) -> Result<(), Refusal> {
+    fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
@@ -273,7 +273,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
+    fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
@@ -301,7 +301,7 @@ impl Registry {
 
     fn advertise_service(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         spelling: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -341,7 +341,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unadvertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
+    fn unadvertise_service(&mut self, origin: &FrameOrigin, service: &str) -> Result<(), Refusal> {
         let name = &*names::absolute(service);
         if !self.withdraw_service(name, origin.from) {
             return Err(Refusal::NotProvider(service.to_owned()));

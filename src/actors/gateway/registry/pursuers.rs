@@ -7,8 +7,8 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
 use crate::actors::gateway::registry::services::{Provider, Services};
+use crate::actors::resources::budget::Share;
 use crate::protocol::names;
 use crate::protocol::wire::payload::Payload;
 

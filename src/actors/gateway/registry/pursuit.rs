@@ -7,11 +7,11 @@ use std::sync::Arc;
 use super::pursuers::ForwardedGoal;
 use super::refusal::Refusal;
 use super::services::Provider;
-use super::state::{Origin, Registry};
+use super::state::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{CALL_BYTES, MAX_BACKLOG, MAX_PROVIDED, MAX_WAITING_GOALS};
 use crate::actors::gateway::messages::{Deliver, Frames};
-use crate::actors::ros::follower::GoalStatus;
+use crate::actors::wire::follower::GoalStatus;
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
@@ -22,7 +22,7 @@ impl Registry {
     /// Does what a client says that pursues goals.
     pub(super) fn pursue(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         action: &str,
         pursuit: PursuerOp,
     ) -> Result<(), Refusal> {
@@ -44,7 +44,7 @@ impl Registry {
 
     fn advertise_action(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         spelling: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -78,7 +78,7 @@ impl Registry {
     }
 
     /// The goals that are on their way stay with the client.
-    fn unadvertise_action(&mut self, origin: &Origin, spelling: &str) -> Result<(), Refusal> {
+    fn unadvertise_action(&mut self, origin: &FrameOrigin, spelling: &str) -> Result<(), Refusal> {
         let action = &*names::absolute(spelling);
         if !self.withdraw_action(action, origin.from) {
             return Err(Refusal::NotPursuer(spelling.to_owned()));
@@ -155,7 +155,7 @@ impl Registry {
     /// Asks the client that pursues a goal of this client to end it.
     pub(super) fn forward_cancellation(
         &self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         action: &str,
     ) -> Result<(), Refusal> {
         let meant = self
@@ -179,7 +179,7 @@ impl Registry {
     /// Progress goes to who sent the goal, if it was asked for; a slow client may miss some.
     fn pass_feedback(
         &self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         action: &str,
         values: &Payload,
     ) -> Result<(), Refusal> {
@@ -206,7 +206,7 @@ impl Registry {
     /// The end of a goal goes to who sent it.
     fn pass_end(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         action: &str,
         encode: impl FnOnce(&ForwardedGoal) -> bytes::Bytes,
     ) -> Result<(), Refusal> {

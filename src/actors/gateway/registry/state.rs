@@ -16,11 +16,11 @@ use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
 use super::topics::{Subscription, Topics};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::limits::{MAX_CONNECTIONS, REGISTRATION_BYTES};
 use crate::actors::gateway::messages::{Outlets, Response};
 use crate::actors::node::Interest;
+use crate::actors::resources::budget::Share;
+use crate::actors::resources::gauges::Gauges;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self as frames, ErrorForm, Level};
 use crate::protocol::names;
@@ -284,7 +284,7 @@ impl Registry {
 }
 
 /// Who sent the frame that is being performed, and its `id`.
-pub(super) struct Origin {
+pub(super) struct FrameOrigin {
     pub(super) from: ConnectionId,
     pub(super) id: Option<Payload>,
 }

@@ -8,7 +8,9 @@ mod wire;
 
 use actix::prelude::*;
 
-use super::rosapi::{ArmParameters, Change, NotSet, ParameterValue, change_parameter, give, value};
+use super::rosapi::{
+    ArmParameters, NotSet, ParamChange, ParameterValue, change_parameter, give, value,
+};
 use crate::actors::node::{Ask, Call, Unserved};
 use crate::protocol::ros::parameters::Parameter;
 
@@ -62,7 +64,7 @@ impl Ask for DescribeParameters {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetParameters<const N: usize> {
     /// The changes, or why there can be none.
-    pub changes: Vec<Result<Change<N>, NotSet>>,
+    pub changes: Vec<Result<ParamChange<N>, NotSet>>,
 }
 
 impl<const N: usize> Ask for SetParameters<N> {
@@ -159,7 +161,7 @@ async fn values<const N: usize>(
 }
 
 async fn set<const N: usize>(
-    changes: Vec<Result<Change<N>, NotSet>>,
+    changes: Vec<Result<ParamChange<N>, NotSet>>,
     arm: ArmParameters<N>,
 ) -> Result<Vec<Result<(), NotSet>>, Unserved> {
     let mut results = Vec::with_capacity(changes.len());

@@ -11,11 +11,11 @@ use serde_json::value::RawValue;
 use super::{
     DescribeParameters, GetParameterTypes, GetParameters, ListParameters, Parameters, SetParameters,
 };
-use crate::actors::ros::rosapi::{Change, NotSet, ParameterValue, read_change};
-use crate::actors::wire::{Address, Answered, Nodes, Served};
+use crate::actors::ros::rosapi::{NotSet, ParamChange, ParameterValue, read_change};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
-use crate::protocol::op::fields::{Fields, Rejection, Rejections};
+use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
 use crate::protocol::ros::parameters::{MAX_NAMED, Parameter, ParameterType};
 use crate::protocol::wire::json::text;
 
@@ -59,28 +59,28 @@ fn read_parameters(
         .collect())
 }
 
-impl Served for ListParameters {
+impl Callable for ListParameters {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let prefixes = read_texts(service, arguments, "prefixes")?;
         Ok(Self { prefixes })
     }
 }
 
-impl<const N: usize> Served for GetParameters<N> {
+impl<const N: usize> Callable for GetParameters<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let parameters = read_parameters(service, arguments)?;
         Ok(Self { parameters })
     }
 }
 
-impl Served for GetParameterTypes {
+impl Callable for GetParameterTypes {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let parameters = read_parameters(service, arguments)?;
         Ok(Self { parameters })
     }
 }
 
-impl Served for DescribeParameters {
+impl Callable for DescribeParameters {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let names = read_texts(service, arguments, "names")?.into_iter();
         let parameters = names.map(|name| {
@@ -118,7 +118,7 @@ struct GivenParameterValue<'a> {
     double_array_value: Option<&'a RawValue>,
 }
 
-impl<const N: usize> Served for SetParameters<N> {
+impl<const N: usize> Callable for SetParameters<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let entries = fields.entries("parameters", MAX_NAMED);
@@ -133,7 +133,7 @@ impl<const N: usize> Served for SetParameters<N> {
                     let field = format!("parameters[{index}]");
                     let reason =
                         "must be a rcl_interfaces/msg/Parameter: name and value, with its type";
-                    return Err(Rejection::refused(&field, &reason).into());
+                    return Err(RejectedField::refused(&field, &reason).into());
                 }
             }
         }
@@ -142,7 +142,7 @@ impl<const N: usize> Served for SetParameters<N> {
 }
 
 impl GivenParameter<'_> {
-    fn change<const N: usize>(&self) -> Result<Change<N>, NotSet> {
+    fn change<const N: usize>(&self) -> Result<ParamChange<N>, NotSet> {
         let name = text(self.name).ok_or(NotSet::Unknown)?;
         let parameter = Parameter::from_name(&name).ok_or(NotSet::Unknown)?;
         let expected = parameter.kind();

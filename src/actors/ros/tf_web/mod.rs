@@ -17,7 +17,7 @@ use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose, SimulationTime};
 use crate::actors::node::{Ask, Call, Interest, Publish};
-use crate::actors::ros::follower::{Canceller, Follower, GoalStatus};
+use crate::actors::wire::follower::{Canceller, GoalFollower, GoalStatus};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::republished::{frames, seen_from};
 use crate::protocol::messages::scene::WORLD;
@@ -62,7 +62,7 @@ pub struct WishFrames {
 /// Who wishes for frames.
 pub enum Wisher {
     /// A client that has sent a goal of the action.
-    Client(Box<Follower>),
+    Client(Box<GoalFollower>),
     /// Somebody who has published a goal of this id.
     Topic(String),
 }

@@ -11,13 +11,13 @@ use serde_json::value::RawValue;
 
 use super::{ForgetFrames, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames, Wisher};
 use crate::actors::node::Respond;
-use crate::actors::ros::follower::ActionRequest;
-use crate::actors::wire::{Address, Answered, Nodes, Route, Served, TopicMessage};
+use crate::actors::wire::follower::ActionRequest;
+use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::messages::republished::is_frame;
 use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::fields::{Bound, Fields, Rejection, Rejections};
+use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::op::{Arguments, MAX_ARGS};
 use crate::protocol::wire::json;
 
@@ -48,7 +48,7 @@ impl<const N: usize> TfRepublisher<N> {
 
 // ---- the service ----------------------------------------------------------------------------------------------------
 
-impl Served for RepublishTfs {
+impl Callable for RepublishTfs {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let target = fields.text("target_frame");
@@ -156,7 +156,7 @@ fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
 
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
 fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
-    let refused = |field: &str, why: &str| Rejections::from(Rejection::refused(field, &why));
+    let refused = |field: &str, why: &str| Rejections::from(RejectedField::refused(field, &why));
     if msg.get().len() > MAX_ARGS {
         return Err(refused(
             "msg",

@@ -1,49 +1,33 @@
 //! Work that a scene does not need, and whether it is left out.
 //!
 //! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
-//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be unmeasured.
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be
+//! unmeasured.
 //!
 //! **Invariant:** no number in here that was not measured for this report.
 
 mod cells;
+mod counts;
 mod server;
 mod tables;
 
-use std::collections::HashMap;
 use std::hint::black_box;
 
+use counts::{Counts, Kind, STEPS, read};
 use tables::{steps_table, table};
 
-use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
 use crate::math::particle::Particle;
-use crate::math::pid::{Gains, Setpoint};
+use crate::math::pid::Gains;
 use crate::math::simulation::Simulation;
 use crate::report::csv::Csv;
+use crate::report::experiments::step_scene::ready;
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Bars, number};
-use crate::report::timing::{Effort, Timing, time};
-
-const STEPS: u64 = 20_000;
-
-/// One kind of step, by the name that `benches/src/bin/work.rs` knows it by.
-struct Kind {
-    name: &'static str,
-    timing: Timing,
-}
-
-impl Kind {
-    /// Time of one step \[s\].
-    fn step_time(&self) -> f64 {
-        self.timing.minimum / in_f64(STEPS)
-    }
-}
-
-/// Counts by name, as the script left them.
-type Counts = HashMap<String, f64>;
+use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let counts = read(making);
@@ -74,46 +58,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-fn read(making: &Making<'_>) -> Counts {
-    let text = std::fs::read_to_string(making.out.join("work.csv")).unwrap_or_default();
-    text.lines()
-        .skip(1)
-        .filter_map(|line| {
-            let mut fields = line.split(',');
-            let name = fields.next()?.to_owned();
-            Some((name, fields.next()?.parse().ok()?))
-        })
-        .collect()
-}
-
-fn start<const N: usize>(
-    gravity: f64,
-    integral: bool,
-    control: bool,
-    method: Method,
-) -> Simulation<N>
-where
-    Gains<N>: Default,
-{
-    let arm = Arm::new([1.0; N], [1.0; N], gravity).unwrap_or_default();
-    let mut gains = Gains::default();
-    if !integral {
-        gains.ki = [0.0; N];
-    }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(control);
-    simulation
-}
-
 fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
     let effort = making.choose(
         Effort {
@@ -136,11 +80,11 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
         making.at(kinds.len(), 12);
     };
     let two = |gravity, integral, control, method| {
-        let ready = start::<2>(gravity, integral, control, method);
+        let ready = ready::<2>(gravity, integral, control, method);
         move || run(&ready)
     };
     let three = |gravity, control| {
-        let ready = start::<3>(gravity, true, control, Method::Rk4);
+        let ready = ready::<3>(gravity, true, control, Method::Rk4);
         move || run(&ready)
     };
     add(
@@ -193,8 +137,8 @@ where
     Gains<N>: Default,
 {
     Method::ALL.into_iter().all(|method| {
-        let mut off = start::<N>(9.81, true, false, method);
-        let mut zero = start::<N>(9.81, true, true, method);
+        let mut off = ready::<N>(9.81, true, false, method);
+        let mut zero = ready::<N>(9.81, true, true, method);
         zero.set_gains(Gains {
             kp: [0.0; N],
             ki: [0.0; N],
@@ -262,7 +206,8 @@ fn findings(counts: &Counts) -> Vec<String> {
         server::encoded(counts, "server-11-subscribers"),
     ) {
         findings.push(format!(
-            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} instructions each, for eleven {} at {}.",
+            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} \
+             instructions each, for eleven {} at {}.",
             number(none),
             number(one),
             number(each.round()),
@@ -272,7 +217,8 @@ fn findings(counts: &Counts) -> Vec<String> {
     }
     if let (Some(off), Some(on)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid")) {
         findings.push(format!(
-            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} instructions instead of {}.",
+            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} \
+             instructions instead of {}.",
             number(off.round()),
             number(on.round())
         ));
