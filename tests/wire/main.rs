@@ -61,6 +61,8 @@ mod parameters;
 mod pause_reset;
 mod pid;
 mod readme;
+#[cfg(feature = "record")]
+mod record;
 mod rosapi;
 mod series;
 mod services;

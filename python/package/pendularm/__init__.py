@@ -12,6 +12,7 @@ from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
 from .report import read_report
 from .study import Critical, Plan, Rollout, Stability, plan, rollout, stability
+from .sweep import Run, Sweep, sweep
 
 __version__ = _version("pendularm")
 
@@ -22,8 +23,10 @@ __all__ = [
     "Divergence",
     "Plan",
     "Rollout",
+    "Run",
     "Simulation",
     "Stability",
+    "Sweep",
     "default_gains",
     "dynamics",
     "end_effector",
@@ -32,4 +35,5 @@ __all__ = [
     "read_report",
     "rollout",
     "stability",
+    "sweep",
 ]

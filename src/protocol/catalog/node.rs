@@ -25,6 +25,8 @@ table! {
         Gateway = "gateway",
         /// Tells what there is.
         Rosapi = "rosapi",
+        /// Runs on record.
+        Recorder if "record" = "recorder",
     }
 }
 

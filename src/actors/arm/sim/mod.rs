@@ -16,6 +16,7 @@ mod scene;
 mod services;
 mod state;
 mod telemetry;
+mod tell;
 
 pub use self::limit::LEAST_PAUSE;
 pub use self::messages::{
@@ -33,5 +34,6 @@ pub use self::services::reset::Reset;
 pub use self::services::setpoint::SetSetpoint;
 pub use self::services::step::{MAX_STEPS, STEPS_IN_A_ROW, Step};
 pub use self::services::switches::{Enable, Pause};
+pub use self::state::journal::{ArmEvent, ArmListener, ArmNews, Tell};
 pub use self::state::steps::{Stepped, StepsEnd};
 pub use self::state::turn::{TURN, TURN_MESSAGES};

@@ -7,6 +7,7 @@ use actix::prelude::*;
 use super::node::ArmSim;
 use crate::math::arm::State;
 use crate::math::pid::Setpoint;
+use crate::math::simulation::ArmInput;
 
 /// How the arm moves now. From `joint_trajectory_controller`, while it leads the arm.
 #[derive(Message, Debug, Clone, Copy)]
@@ -58,7 +59,7 @@ impl<const N: usize> Handler<MoveSetpoint<N>> for ArmSim<N> {
         self.attend(ctx);
         let is_known = *self.simulation.pid().setpoint() == message.from;
         if is_known {
-            self.simulation.set_setpoint(message.to);
+            self.change(ArmInput::Setpoint(message.to));
         }
         is_known
     }

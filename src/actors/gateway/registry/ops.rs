@@ -15,7 +15,7 @@ use super::state::{FrameOrigin, Registry};
 use super::topics::{Subscription, throttle_of};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS};
-use crate::actors::gateway::messages::{Configure, Handled, Request};
+use crate::actors::gateway::messages::{Configure, Handled, Overheard, Request};
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::limits::MAX_NAME;
@@ -173,6 +173,9 @@ impl Registry {
         let Some(listener) = listener else {
             return Handled::at_once().and_by_subscribers(pace.end());
         };
+        if let Some(topic) = Topic::from_name(topic) {
+            self.ear.hear(Overheard::Heard(topic, msg));
+        }
         let (done, ended) = oneshot::channel();
         listener(TopicMessage {
             msg: heard.unwrap_or_else(|| msg.clone()),
@@ -230,11 +233,11 @@ impl Registry {
             }
             None => None,
         };
+        let first = !self.is_wanted(&absolute);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
         let share = client.register(topic.len() + bytes);
-        let first = !self.topics.has_subscribers(&absolute);
         let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());

@@ -18,8 +18,13 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
+mod checkpoint;
+mod input;
+
 use std::ops::ControlFlow;
 
+pub use self::checkpoint::Checkpoint;
+pub use self::input::ArmInput;
 use super::arm::{Arm, State};
 use super::dynamics::forward_dynamics;
 use super::integrator::{Increment, Method, increment, two_sum};
