@@ -4,7 +4,8 @@
 //!
 //! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero; a disturbance that
 //!    has not ended ([`Disturbance`]) is added to it;
-//! 2. that effort is held while [`increment`] evaluates [`forward_dynamics`] at the method's stages ([`step_under`]);
+//! 2. that effort is held while [`increment`] evaluates [`forward_dynamics`], or at gravity 0 [`weightless_dynamics`],
+//!    at the method's stages ([`step_under`]);
 //! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
 //!
 //! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
@@ -21,7 +22,7 @@
 use std::ops::ControlFlow;
 
 use super::arm::{Arm, State};
-use super::dynamics::forward_dynamics;
+use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::{Increment, Method, increment, two_sum};
 use super::pid::{Control, Gains, Pid, Setpoint};
 
@@ -350,6 +351,10 @@ pub fn step_under<const N: usize>(
 ) -> Increment<N> {
     let State { position, velocity } = state;
     // The motion does not depend on the time, so none is reckoned for the stages.
+    if arm.gravity() == 0.0 {
+        let acceleration = |_, q: &[f64; N], v: &[f64; N]| weightless_dynamics(arm, q, v, effort);
+        return increment(method, acceleration, 0.0, position, velocity, h);
+    }
     let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
     increment(method, acceleration, 0.0, position, velocity, h)
 }

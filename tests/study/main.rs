@@ -24,6 +24,7 @@ mod growth;
 mod motion;
 mod planner;
 mod poses;
+mod properties;
 mod reference;
 mod report;
 mod rollout;

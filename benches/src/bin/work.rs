@@ -3,7 +3,8 @@
 //! `cargo run --release --bin work -- VARIANT COUNT`
 //!
 //! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. `step-LINKS-METHOD-WHAT` is a step of
-//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges.
+//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges. WHAT is
+//! `free`, `pid`, `pd` (no integral), `pi` (no damping) or `pushed` (`pid` under a disturbance of zeros), with `weightless` before it.
 
 use std::hint::black_box;
 
@@ -18,15 +19,17 @@ fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
     Gains<N>: Default,
 {
-    let gravity = if what.contains("weightless") {
-        0.0
-    } else {
-        9.81
-    };
+    let has = |word: &str| what.split('-').any(|part| part == word);
+    let gravity = if has("weightless") { 0.0 } else { 9.81 };
     let arm = Arm::<N>::new([1.0; N], [1.0; N], gravity).expect("an arm");
     let mut gains = Gains::<N>::default();
-    if what.contains("pd") {
+    if has("pd") {
         gains.ki = [0.0; N];
+    }
+    if has("pi") {
+        gains.kd = [0.0; N];
+        // Undamped, an integral would drive it away.
+        gains.ki = gains.ki.map(|ki| 1e-3 * ki);
     }
     let mut simulation = Simulation::new(arm, gains);
     simulation.set_method(method);
@@ -39,7 +42,10 @@ where
         position: [0.4; N],
         velocity: [0.0; N],
     });
-    simulation.enable(what.contains("pd") || what.contains("pid"));
+    simulation.enable(["pd", "pi", "pid", "pushed"].iter().any(|law| has(law)));
+    if has("pushed") {
+        simulation.disturb([0.0; N], 1e9);
+    }
     assert_eq!(simulation.advance(count), count);
     black_box(simulation.state());
 }
