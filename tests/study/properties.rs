@@ -4,7 +4,6 @@
 //! runs as many as `COUNT` says, in an optimised build; the tests here run hundreds.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::fmt::Debug;
 
 use glam::DVec2;
 use pendularm::math::arm::{Arm, State};
@@ -364,15 +363,15 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
     }
 }
 
-/// Both numbers of links, in turn.
-fn both<T: Debug>(case: u64, two: impl FnOnce() -> T, three: impl FnOnce() -> T) -> T {
-    if case.is_multiple_of(2) { two() } else { three() }
-}
-
+/// Runs a property for both numbers of links, in turn.
 macro_rules! property {
     ($check:ident, $few:expr, $per:expr) => {
         run(stringify!($check), cases($few, $per), |case, tally| {
-            both(case, || $check::<2>(case, tally), || $check::<3>(case, tally))
+            if case.is_multiple_of(2) {
+                $check::<2>(case, tally);
+            } else {
+                $check::<3>(case, tally);
+            }
         })
     };
 }
