@@ -19,6 +19,7 @@
 
 mod equilibrium;
 mod error;
+mod experiments;
 mod gains;
 mod growth;
 mod motion;

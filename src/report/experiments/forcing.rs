@@ -28,7 +28,10 @@ pub const COARSEST: u64 = 16;
 const ALIASED: f64 = 64.0 * std::f64::consts::TAU;
 
 /// Frequency of the fast force \[rad/s\].
-const FAST: f64 = 100.0;
+const FAST: f64 = 20.0;
+
+/// Kinks and jumps that are tried.
+const TRIES: u32 = 32;
 
 /// One kind of force.
 #[derive(Debug, Clone, Copy)]
@@ -81,10 +84,10 @@ pub const FORCES: [Force; 6] = [
     },
     Force {
         name: "fast",
-        formula: "10⁴ sin(100 t)",
+        formula: "10⁴ sin(20 t)",
         order: Method::order,
         function: |_| format!("1e4*sin({FAST}*t)"),
-        exact: |t, _| FAST * t - (FAST * t).sin(),
+        exact: |t, _| 1e4 / (FAST * FAST) * (FAST * t - (FAST * t).sin()),
         varied: false,
     },
     Force {
@@ -112,14 +115,15 @@ pub const FORCES: [Force; 6] = [
 ];
 
 impl Force {
-    /// The largest error over a run of `steps` steps, in parts of the largest position; `None` if it cannot be run.
+    /// The largest error over a run of `steps` steps, in parts of the farthest that the particle truly comes; `None` if it
+    /// cannot be run.
     #[must_use]
     pub fn error(&self, method: Method, steps: u64) -> Option<f64> {
-        let tries = if self.varied { 12 } else { 1 };
+        let tries = if self.varied { TRIES } else { 1 };
         let mut squares = 0.0;
         for index in 0..tries {
-            // A third and some: on no grid of powers of two.
-            let c = 0.7 + 0.037_123 * f64::from(index);
+            // Steps of the golden ratio: evenly spread within a step, whatever its length.
+            let c = 0.5 + (0.618_033_988_749_894_9 * f64::from(index + 1)).fract();
             let error = self.error_with(c, method, steps)?;
             squares += error * error;
         }
@@ -131,12 +135,14 @@ impl Force {
         let dt = DURATION / in_f64(steps);
         let mut particle = Particle::new(function, 0.0, 0.0, dt, steps, method).ok()?;
         particle.advance(usize::MAX);
-        let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
-        for (index, position) in particle.positions().iter().enumerate() {
-            let exact = (self.exact)(length_in_f64(index) * dt, c);
-            worst = worst.max((position - exact).abs());
-            largest = largest.max(exact.abs());
-        }
-        Some(worst / largest)
+        let exact = |t: f64| (self.exact)(t, c);
+        let off = |(index, position): (usize, &f64)| {
+            (position - exact(length_in_f64(index) * dt)).abs()
+        };
+        let worst = particle.positions().iter().enumerate().map(off);
+        // Not at the steps: where they fall on whole periods the particle is where it began at all of them.
+        let largest = (0..=1000).map(|part| exact(DURATION * f64::from(part) / 1000.0).abs());
+        let most = |values: &mut dyn Iterator<Item = f64>| values.fold(0.0, f64::max);
+        Some(most(&mut worst.into_iter()) / most(&mut largest.into_iter()))
     }
 }

@@ -66,9 +66,9 @@ fn compute(making: &mut Making<'_>) -> Vec<Data> {
     let halvings = making.choose(15, 9);
     let effort = making.choose(
         Effort {
-            least: 5,
+            least: 3,
             most: 25,
-            seconds: 0.2,
+            seconds: 0.05,
         },
         Effort {
             least: 3,

@@ -1,0 +1,351 @@
+//! Stability beyond small deviations: by amplitude of a move, by speed of a swing, and beside a periodic swing.
+//!
+//! **Invariant:** every cell is measured; predictions are drawn over them and nothing is filled in.
+
+use crate::math::arm::{Arm, State};
+use crate::math::count::length_in_f64;
+use crate::math::integrator::Method;
+use crate::report::csv::Csv;
+use crate::report::experiments::nonlinear::{PeriodicSwing, arrives, is_carried, move_of, spun};
+use crate::report::making::Making;
+use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::svg::{Axis, Heat, Key, Plot, Point, Series, Unit, number, scientific, seconds};
+use crate::study::control_loop::ControlLoop;
+use crate::study::motion::Motion;
+use crate::study::stability::{limit_held, limits};
+
+/// Ends of the axes: timestep \[s\], amplitude \[rad\] and spin \[rad/s\].
+const MOVE_STEPS: (f64, f64) = (5e-4, 2e-2);
+const AMPLITUDES: (f64, f64) = (0.1, 100.0);
+const SWING_STEPS: (f64, f64) = (1e-3, 0.5);
+const SPINS: (f64, f64) = (0.3, 300.0);
+
+/// Amplitudes of the periodic swings \[rad\], and steps of a method in one of their periods.
+const SWINGS: [f64; 7] = [0.1, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8];
+const PER_PERIOD: [u32; 7] = [16, 32, 64, 128, 256, 512, 1024];
+
+/// The swing whose multipliers are shown by timestep.
+const SHOWN: f64 = 0.6;
+
+/// A map of one method: cells that fail, and the predicted line.
+struct Map {
+    method: Method,
+    /// Predicted limit \[s\] and measured verdict, row by row.
+    rows: Vec<(f64, Vec<bool>)>,
+}
+
+impl Map {
+    /// Cells below the prediction, and those of them that fail.
+    fn below(&self, columns: &[f64], part: f64) -> (usize, usize) {
+        let mut counts = (0, 0);
+        for (limit, row) in &self.rows {
+            for (h, holds) in columns.iter().zip(row) {
+                if *h <= part * limit {
+                    counts.0 += 1;
+                    counts.1 += usize::from(!holds);
+                }
+            }
+        }
+        counts
+    }
+}
+
+pub(super) fn make(making: &mut Making<'_>) -> Section {
+    let columns = making.choose(32, 12);
+    let (moves, swings) = (moves(making, columns), spins(making, columns));
+    let mut csv = Csv::new("kind,method,dt,amplitude_or_spin,holds,predicted_limit");
+    for (kind, maps, steps, values) in [
+        ("move", &moves, MOVE_STEPS, AMPLITUDES),
+        ("spin", &swings, SWING_STEPS, SPINS),
+    ] {
+        for map in maps {
+            for (value, (limit, row)) in centres(values, columns).iter().zip(&map.rows) {
+                for (h, holds) in centres(steps, columns).iter().zip(row) {
+                    csv.row(&[
+                        kind.into(),
+                        map.method.name().into(),
+                        (*h).into(),
+                        (*value).into(),
+                        u64::from(*holds).into(),
+                        (*limit).into(),
+                    ]);
+                }
+            }
+        }
+    }
+    making.keep("nonlinear-map", csv);
+    let floquet = Floquet::of(making);
+    making.keep("floquet", floquet.csv());
+    let advised = within(&moves, MOVE_STEPS, columns, 0.8);
+    let carried = within(&swings, SWING_STEPS, columns, 0.8);
+    Section {
+        findings: vec![floquet.finding()],
+        verdicts: vec![
+            verdict("moves of every amplitude arrive", advised),
+            verdict("swings of every speed keep their energy", carried),
+            floquet.verdict(),
+        ],
+        blocks: vec![
+            Block::Figure(map_figure(&moves, &swings, columns)),
+            Block::Figure(floquet.figure()),
+            Block::Table(floquet.table()),
+        ],
+        ..Section::default()
+    }
+}
+
+fn verdict(what: &str, (cells, lost): (usize, usize)) -> Verdict {
+    Verdict {
+        claim: format!("Within 0.8 of the predicted limit {what} (in 98 of 100 cells)"),
+        seen: format!("{} of {cells} cells", cells - lost),
+        holds: cells > 0 && 50 * lost <= cells,
+    }
+}
+
+fn within(maps: &[Map], steps: (f64, f64), columns: usize, part: f64) -> (usize, usize) {
+    let steps = centres(steps, columns);
+    maps.iter()
+        .map(|map| map.below(&steps, part))
+        .fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1))
+}
+
+fn edges((low, high): (f64, f64), count: usize) -> Vec<f64> {
+    let part = |index: usize| length_in_f64(index) / length_in_f64(count);
+    (0..=count)
+        .map(|index| low * (high / low).powf(part(index)))
+        .collect()
+}
+
+fn centres(ends: (f64, f64), count: usize) -> Vec<f64> {
+    let middle = |pair: &[f64]| pair.iter().product::<f64>().sqrt();
+    edges(ends, count).windows(2).map(middle).collect()
+}
+
+/// Moves under the default gains: limited by the pose that bears least, and by their own speed.
+fn moves(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
+    let mut maps = Vec::new();
+    for method in Method::ALL {
+        let poses = limits(&move_of(1.0, method, 1e-3)).trusted().unwrap_or(f64::INFINITY);
+        let row = |amplitude: f64| {
+            let motion = Motion::ahead(&move_of(amplitude, method, 1e-3), &State::rest());
+            let verdicts = centres(MOVE_STEPS, columns)
+                .into_iter()
+                .map(|h| arrives(&move_of(amplitude, method, h)));
+            (motion.timestep.min(poses), verdicts.collect())
+        };
+        let rows = centres(AMPLITUDES, columns).into_iter().map(row).collect();
+        maps.push(Map { method, rows });
+        making.at(maps.len(), 9);
+    }
+    maps
+}
+
+/// Free swings: limited by the frequency of small ones, and by their speed. A method that lets small swings grow at every
+/// timestep is limited by the speed alone here, for in four seconds little comes of that.
+fn spins(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
+    let mut maps = Vec::new();
+    for method in Method::ALL {
+        let free = ControlLoop::free(Arm::<2>::default()).with_method(method);
+        let small = limit_held(&free).filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
+        let row = |spin: f64| {
+            let motion = Motion::ahead(&free, &spun(spin));
+            let verdicts = centres(SWING_STEPS, columns)
+                .into_iter()
+                .map(|h| is_carried(&spun(spin), method, h));
+            (motion.timestep.min(small), verdicts.collect())
+        };
+        let rows = centres(SPINS, columns).into_iter().map(row).collect();
+        maps.push(Map { method, rows });
+        making.at(4 + maps.len(), 9);
+    }
+    maps
+}
+
+fn map_figure(moves: &[Map], swings: &[Map], columns: usize) -> Figure {
+    let mut plots = Vec::new();
+    for (maps, steps, values, label, title) in [
+        (moves, MOVE_STEPS, AMPLITUDES, "turn of the first joint [rad]", "move"),
+        (swings, SWING_STEPS, SPINS, "spin of the first joint [rad/s]", "free swing"),
+    ] {
+        for map in maps {
+            let mut plot = Plot::new(
+                format!("{}, {title}", map.method),
+                Axis::log_between("timestep", Unit::Seconds, steps.0, steps.1),
+                Axis::log_between(label, Unit::Number, values.0, values.1),
+            );
+            let level = |holds: &bool| if *holds { -2 } else { 3 };
+            plot.heat = Some(Heat {
+                x: edges(steps, columns),
+                y: edges(values, columns),
+                rows: map.rows.iter().map(|(_, row)| row.iter().map(level).collect()).collect(),
+            });
+            let line = centres(values, columns)
+                .into_iter()
+                .zip(&map.rows)
+                .map(|(value, (limit, _))| (*limit, value))
+                .filter(|(limit, _)| *limit <= steps.1);
+            plot.series.push(Series::line("ink", line));
+            plots.push(plot);
+        }
+    }
+    Figure::new(
+        "nonlinear-map",
+        "Beyond small deviations the timestep is limited by speed",
+        "Top: moves of 2 links under the default gains, from rest; blue where both joints are within 0.02 rad after 6 s, orange where not. Bottom: free swings from (0, 0.5) with the first joint spinning; \
+         orange where the energy above the hanging arm's trebles within 4 s. Line: the smaller of the limit by linearisation (moves: the least of all poses; swings: of small swings, where there is one) and \
+         the timestep_limit_motion that the service answers. A set of moves that no timestep brings home in time shows as orange at the top of every panel.",
+        &[Key::line("ink", "predicted limit")],
+        &plots,
+    )
+}
+
+/// Multipliers of the methods, by amplitude and by timestep.
+struct Floquet {
+    /// Amplitude, period, and the true multiplier's modulus.
+    true_ones: Vec<(f64, f64, f64)>,
+    /// Method, amplitude, timestep, modulus.
+    of_methods: Vec<(Method, f64, f64, f64)>,
+}
+
+impl Floquet {
+    fn of(making: &mut Making<'_>) -> Self {
+        let mut floquet = Self {
+            true_ones: vec![],
+            of_methods: vec![],
+        };
+        for amplitude in SWINGS {
+            let Some(swing) = PeriodicSwing::of(amplitude) else {
+                continue;
+            };
+            // So many steps of order 4 are the truth.
+            let truth = swing.transverse(Method::Rk4, 4096);
+            floquet.true_ones.push((amplitude, swing.period, truth));
+            for method in Method::ALL {
+                for steps in PER_PERIOD {
+                    let modulus = swing.transverse(method, steps);
+                    let h = swing.period / f64::from(steps);
+                    floquet.of_methods.push((method, amplitude, h, modulus));
+                }
+            }
+        }
+        making.at(9, 9);
+        floquet
+    }
+
+    fn csv(&self) -> Csv {
+        let mut csv = Csv::new("method,amplitude,dt,modulus");
+        for (amplitude, _, modulus) in &self.true_ones {
+            csv.row(&["true".into(), (*amplitude).into(), 0.0.into(), (*modulus).into()]);
+        }
+        for (method, amplitude, h, modulus) in &self.of_methods {
+            csv.row(&[method.name().into(), (*amplitude).into(), (*h).into(), (*modulus).into()]);
+        }
+        csv
+    }
+
+    fn shown(&self, method: Method) -> impl Iterator<Item = (f64, f64)> {
+        self.of_methods
+            .iter()
+            .filter(move |run| run.0 == method && run.1.to_bits() == SHOWN.to_bits())
+            .map(|run| (run.2, run.3))
+    }
+
+    fn finding(&self) -> String {
+        let first_unstable = self.true_ones.iter().find(|swing| swing.2 > 1.001);
+        let words = first_unstable.map_or_else(
+            || "none of these swings is unstable by itself".to_owned(),
+            |(amplitude, _, modulus)| {
+                format!(
+                    "from an amplitude of {} rad on the swing itself is unstable (multiplier {}), and no method can follow it for long",
+                    number(*amplitude),
+                    number(*modulus)
+                )
+            },
+        );
+        format!("**Beside a periodic swing of 2 links deviations stay small only while the swing is small**: {words}.")
+    }
+
+    /// Where the true multipliers lie on the unit circle, a method's come to it with its order; Euler's and midpoint's from
+    /// outside.
+    fn verdict(&self) -> Verdict {
+        let off = |method: Method| -> Vec<f64> {
+            self.shown(method).map(|(_, modulus)| modulus - 1.0).collect()
+        };
+        let grows = [Method::Euler, Method::Midpoint]
+            .iter()
+            .all(|method| !off(*method).is_empty() && off(*method).iter().all(|off| *off > -1e-9));
+        let seen: Vec<String> = Method::ALL
+            .iter()
+            .map(|method| {
+                let at = off(*method).get(3).copied().unwrap_or(f64::NAN);
+                format!("{method} 1 {} {}", if at < 0.0 { "-" } else { "+" }, scientific(at.abs()))
+            })
+            .collect();
+        Verdict {
+            claim: format!(
+                "Beside the swing of {SHOWN} rad, whose own multipliers are on the unit circle, deviations grow under Euler and midpoint at every timestep"
+            ),
+            seen: format!("at 128 steps a period: {}", seen.join(", ")),
+            holds: grows,
+        }
+    }
+
+    fn figure(&self) -> Figure {
+        let mut by_amplitude = Plot::new(
+            "The swing itself",
+            Axis::linear("amplitude of the first joint [rad]", 0.0, 2.0),
+            Axis::log_between("largest multiplier of a period", Unit::Number, 0.5, 1e3),
+        );
+        let points = self.true_ones.iter().map(|(amplitude, period, modulus)| {
+            let told = format!("period {}, multiplier {}", seconds(*period), number(*modulus));
+            Point::new(*amplitude, *modulus, told)
+        });
+        by_amplitude.series.push(Series {
+            class: "ink",
+            marker: crate::report::svg::Marker::Circle,
+            line: true,
+            dashed: false,
+            points: points.collect(),
+        });
+        let mut by_timestep = Plot::new(
+            format!("Methods, amplitude {SHOWN} rad"),
+            Axis::log_between("timestep", Unit::Seconds, 1e-3, 0.3),
+            Axis::log_between("| multiplier - 1 |", Unit::Number, 1e-13, 10.0),
+        );
+        for method in Method::ALL {
+            let points = self.shown(method).map(|(h, modulus)| {
+                let sign = if modulus > 1.0 { "grows" } else { "dies out" };
+                let off = (modulus - 1.0).abs();
+                Point::new(h, off.max(1e-13), format!("{method}: {sign}, {}", scientific(off)))
+            });
+            by_timestep.series.push(Series::of(method, points.collect()));
+        }
+        Figure::new(
+            "floquet",
+            "Floquet multipliers along a periodic swing",
+            "2 links swing from rest on one side through the hanging pose to rest on the other and back, without control. Left: the true multiplier of the pair beside the swing; above 1 the swing is unstable \
+             by itself. Right: how far from the unit circle a method puts it, by timestep; the table says to which side.",
+            &Key::methods(),
+            &[by_amplitude, by_timestep],
+        )
+    }
+
+    fn table(&self) -> Table {
+        let mut head = vec!["Method".to_owned()];
+        let steps: Vec<f64> = self.shown(Method::Euler).map(|(h, _)| h).collect();
+        head.extend(steps.iter().map(|h| seconds(*h)));
+        let head: Vec<&str> = head.iter().map(String::as_str).collect();
+        let mut table = Table::new(
+            "floquet",
+            format!("Multiplier less 1 beside the swing of {SHOWN} rad"),
+            "Positive: deviations grow; negative: they die out, where in truth they neither grow nor die out.",
+            &head,
+        );
+        for method in Method::ALL {
+            let mut row = vec![Cell::method(method)];
+            row.extend(self.shown(method).map(|(_, modulus)| Cell::new(scientific(modulus - 1.0))));
+            table.rows.push(row);
+        }
+        table
+    }
+}
