@@ -132,14 +132,28 @@ impl<const N: usize> Simulation<N> {
     pub fn advance_with(
         &mut self,
         steps: u64,
-        mut observe: impl FnMut(&Self) -> ControlFlow<()>,
+        observe: impl FnMut(&Self) -> ControlFlow<()>,
     ) -> u64 {
         if self.divergence.is_some() {
             return 0;
         }
+        // Asked once for all steps: in every one it would cost as much as 2 links save by it.
+        if self.arm.gravity() == 0.0 {
+            self.take_steps::<false>(steps, observe)
+        } else {
+            self.take_steps::<true>(steps, observe)
+        }
+    }
+
+    #[inline]
+    fn take_steps<const WEIGHS: bool>(
+        &mut self,
+        steps: u64,
+        mut observe: impl FnMut(&Self) -> ControlFlow<()>,
+    ) -> u64 {
         // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
         for taken in 0..steps {
-            if !self.take_step() {
+            if !self.take_step::<WEIGHS>() {
                 self.divergence = Some(Divergence {
                     step: self.steps + 1,
                     time: self.time(),
@@ -155,7 +169,7 @@ impl<const N: usize> Simulation<N> {
 
     /// One step, unless its result is not finite: then nothing changes, and `false`.
     #[inline]
-    fn take_step(&mut self) -> bool {
+    fn take_step<const WEIGHS: bool>(&mut self) -> bool {
         let mut control = if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)
         } else {
@@ -169,7 +183,8 @@ impl<const N: usize> Simulation<N> {
         }
         let State { position, velocity } = &self.state;
         let effort = &control.effort;
-        let (dq, dv) = step_under(&self.arm, self.method, &self.state, effort, self.timestep);
+        let (dq, dv) =
+            step_as::<N, WEIGHS>(&self.arm, self.method, &self.state, effort, self.timestep);
         let (position, position_carry) = add(position, &self.carry.position, &dq);
         let (velocity, velocity_carry) = add(velocity, &self.carry.velocity, &dv);
         let next = State { position, velocity };
@@ -349,13 +364,31 @@ pub fn step_under<const N: usize>(
     effort: &[f64; N],
     h: f64,
 ) -> Increment<N> {
+    if arm.gravity() == 0.0 {
+        step_as::<N, false>(arm, method, state, effort, h)
+    } else {
+        step_as::<N, true>(arm, method, state, effort, h)
+    }
+}
+
+/// [`step_under`], of an arm with gravity or without.
+#[inline(always)]
+fn step_as<const N: usize, const WEIGHS: bool>(
+    arm: &Arm<N>,
+    method: Method,
+    state: &State<N>,
+    effort: &[f64; N],
+    h: f64,
+) -> Increment<N> {
     let State { position, velocity } = state;
     // The motion does not depend on the time, so none is reckoned for the stages.
-    if arm.gravity() == 0.0 {
-        let acceleration = |_, q: &[f64; N], v: &[f64; N]| weightless_dynamics(arm, q, v, effort);
-        return increment(method, acceleration, 0.0, position, velocity, h);
-    }
-    let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
+    let acceleration = |_, q: &[f64; N], v: &[f64; N]| {
+        if WEIGHS {
+            forward_dynamics(arm, q, v, effort)
+        } else {
+            weightless_dynamics(arm, q, v, effort)
+        }
+    };
     increment(method, acceleration, 0.0, position, velocity, h)
 }
 

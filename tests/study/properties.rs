@@ -215,11 +215,17 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         };
         tally.tried += 1;
         if let Some(bound) = found.bound {
-            assert!(held >= 0.999 * bound, "{told}: {held} at {pose:?}, {found:?}");
+            assert!(
+                held >= 0.999 * bound,
+                "{told}: {held} at {pose:?}, {found:?}"
+            );
         }
         // What is found by search alone may be missed by a little.
         let within = if found.certified { 0.99 } else { 0.9 };
-        assert!(held >= within * least, "{told}: {held} at {pose:?}, {found:?}");
+        assert!(
+            held >= within * least,
+            "{told}: {held} at {pose:?}, {found:?}"
+        );
     }
 }
 
@@ -258,7 +264,10 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     };
     assert!(found.settled_after <= wish.settling_time, "{told}");
     let least = limits(&control).trusted().unwrap();
-    assert!(least >= 0.999 * wish.margin * free.timestep, "{told}: {least}");
+    assert!(
+        least >= 0.999 * wish.margin * free.timestep,
+        "{told}: {least}"
+    );
     let mut live = control.simulation(State::rest());
     let mut off_at = 0.0;
     // Ten moves stand for all of them: another may take a half more.
@@ -269,7 +278,10 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
             off_at = live.time();
         }
     }
-    assert!(off_at <= 1.5 * wish.settling_time, "{told}: {off_at} s, {control:?}");
+    assert!(
+        off_at <= 1.5 * wish.settling_time,
+        "{told}: {off_at} s, {control:?}"
+    );
 }
 
 /// A state to begin with, and a time for which the motion from there is known.
@@ -307,9 +319,7 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         let every = (steps / 10).max(1);
         let spacing = candidate.timestep * every as f64;
         let truth = Reference::of(&arm, &start, &Law::FREE, spacing, steps / every);
-        let tip = |state: &State<N>| -> DVec2 {
-            forward(arm.lengths(), &state.position).position
-        };
+        let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
         for index in 0..truth.len() {
             live.advance(every as u64);
             let off = tip(live.state()).distance(tip(&truth.state(index).unwrap()));
@@ -361,7 +371,10 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
             tally.tried += 1;
         }
         None => {
-            assert!(off <= 50.0 * deviation.largest_uncertainty() + 1e-14, "{told}");
+            assert!(
+                off <= 50.0 * deviation.largest_uncertainty() + 1e-14,
+                "{told}"
+            );
             tally.open += 1;
         }
     }

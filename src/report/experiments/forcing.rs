@@ -136,9 +136,8 @@ impl Force {
         let mut particle = Particle::new(function, 0.0, 0.0, dt, steps, method).ok()?;
         particle.advance(usize::MAX);
         let exact = |t: f64| (self.exact)(t, c);
-        let off = |(index, position): (usize, &f64)| {
-            (position - exact(length_in_f64(index) * dt)).abs()
-        };
+        let off =
+            |(index, position): (usize, &f64)| (position - exact(length_in_f64(index) * dt)).abs();
         let worst = particle.positions().iter().enumerate().map(off);
         // Not at the steps: where they fall on whole periods the particle is where it began at all of them.
         let largest = (0..=1000).map(|part| exact(DURATION * f64::from(part) / 1000.0).abs());

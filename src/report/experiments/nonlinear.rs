@@ -157,9 +157,8 @@ fn through_hanging(amplitude: f64, second: f64) -> Option<(f64, f64)> {
     let arm = Arm::<2>::default();
     let mut state = State::at_rest([amplitude - FRAC_PI_2, second]);
     let mut time = 0.0;
-    let advance = |state: &State<2>, h: f64| {
-        state.plus(&step_under(&arm, Method::Rk4, state, &[0.0; 2], h))
-    };
+    let advance =
+        |state: &State<2>, h: f64| state.plus(&step_under(&arm, Method::Rk4, state, &[0.0; 2], h));
     while state.position[0] > -FRAC_PI_2 {
         state = advance(&state, FINE);
         time += FINE;

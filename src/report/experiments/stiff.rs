@@ -131,7 +131,8 @@ impl StiffScene {
         let hanging = [-FRAC_PI_2, 0.0];
         let even = Arm::<2>::default();
         let rates = |arm: &Arm<2>| {
-            let swing = (gravity_gradient(arm, &hanging)[0] / mass_matrix(arm, &hanging)[0][0]).sqrt();
+            let swing =
+                (gravity_gradient(arm, &hanging)[0] / mass_matrix(arm, &hanging)[0][0]).sqrt();
             let unit = forward_dynamics(arm, &hanging, &[0.0; 2], &[0.0, 1.0])[1];
             let still = forward_dynamics(arm, &hanging, &[0.0; 2], &[0.0; 2])[1];
             (swing, unit - still)
@@ -214,7 +215,9 @@ impl StiffScene {
                     finite
                 }
                 (_, Solver::Rodas3) => self.rodas3(&mut y, h, &mut evaluations).is_some(),
-                _ => self.implicit_midpoint(&mut y, h, &mut evaluations).is_some(),
+                _ => self
+                    .implicit_midpoint(&mut y, h, &mut evaluations)
+                    .is_some(),
             };
             if !finite {
                 break;
@@ -310,5 +313,6 @@ fn apart(reference: &[[f64; 2]], positions: &[[f64; 2]]) -> f64 {
         return f64::INFINITY;
     }
     let both = reference.iter().flatten().zip(positions.iter().flatten());
-    both.map(|(one, other)| (one - other).abs()).fold(0.0, f64::max)
+    both.map(|(one, other)| (one - other).abs())
+        .fold(0.0, f64::max)
 }

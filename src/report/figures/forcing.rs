@@ -29,11 +29,7 @@ struct Line {
 
 impl Line {
     fn order(&self) -> Option<f64> {
-        let inside = self
-            .points
-            .iter()
-            .rev()
-            .filter(|point| point.1 > ROUNDING);
+        let inside = self.points.iter().rev().filter(|point| point.1 > ROUNDING);
         slope(inside.take(FITTED).copied())
     }
 
@@ -118,7 +114,12 @@ fn figure(lines: &[Line]) -> Figure {
             let mut plot = Plot::new(
                 format!("{}: {}", force.name, force.formula),
                 Axis::log("timestep", Unit::Seconds, times),
-                Axis::log_between("largest error / farthest position", Unit::Number, 1e-16, 1e4),
+                Axis::log_between(
+                    "largest error / farthest position",
+                    Unit::Number,
+                    1e-16,
+                    1e4,
+                ),
             );
             for line in of_force() {
                 let points = line.points.iter().map(|&(dt, error)| {

@@ -125,7 +125,9 @@ fn centres(ends: (f64, f64), count: usize) -> Vec<f64> {
 fn moves(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
     let mut maps = Vec::new();
     for method in Method::ALL {
-        let poses = limits(&move_of(1.0, method, 1e-3)).trusted().unwrap_or(f64::INFINITY);
+        let poses = limits(&move_of(1.0, method, 1e-3))
+            .trusted()
+            .unwrap_or(f64::INFINITY);
         let row = |amplitude: f64| {
             let motion = Motion::ahead(&move_of(amplitude, method, 1e-3), &State::rest());
             let verdicts = centres(MOVE_STEPS, columns)
@@ -146,7 +148,9 @@ fn spins(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
     let mut maps = Vec::new();
     for method in Method::ALL {
         let free = ControlLoop::free(Arm::<2>::default()).with_method(method);
-        let small = limit_held(&free).filter(|limit| *limit > 0.0).unwrap_or(f64::INFINITY);
+        let small = limit_held(&free)
+            .filter(|limit| *limit > 0.0)
+            .unwrap_or(f64::INFINITY);
         let row = |spin: f64| {
             let motion = Motion::ahead(&free, &spun(spin));
             let verdicts = centres(SWING_STEPS, columns)
@@ -164,8 +168,20 @@ fn spins(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
 fn map_figure(moves: &[Map], swings: &[Map], columns: usize) -> Figure {
     let mut plots = Vec::new();
     for (maps, steps, values, label, title) in [
-        (moves, MOVE_STEPS, AMPLITUDES, "turn of the first joint [rad]", "move"),
-        (swings, SWING_STEPS, SPINS, "spin of the first joint [rad/s]", "free swing"),
+        (
+            moves,
+            MOVE_STEPS,
+            AMPLITUDES,
+            "turn of the first joint [rad]",
+            "move",
+        ),
+        (
+            swings,
+            SWING_STEPS,
+            SPINS,
+            "spin of the first joint [rad/s]",
+            "free swing",
+        ),
     ] {
         for map in maps {
             let mut plot = Plot::new(
@@ -177,7 +193,11 @@ fn map_figure(moves: &[Map], swings: &[Map], columns: usize) -> Figure {
             plot.heat = Some(Heat {
                 x: edges(steps, columns),
                 y: edges(values, columns),
-                rows: map.rows.iter().map(|(_, row)| row.iter().map(level).collect()).collect(),
+                rows: map
+                    .rows
+                    .iter()
+                    .map(|(_, row)| row.iter().map(level).collect())
+                    .collect(),
             });
             let line = centres(values, columns)
                 .into_iter()
@@ -235,10 +255,20 @@ impl Floquet {
     fn csv(&self) -> Csv {
         let mut csv = Csv::new("method,amplitude,dt,modulus");
         for (amplitude, _, modulus) in &self.true_ones {
-            csv.row(&["true".into(), (*amplitude).into(), 0.0.into(), (*modulus).into()]);
+            csv.row(&[
+                "true".into(),
+                (*amplitude).into(),
+                0.0.into(),
+                (*modulus).into(),
+            ]);
         }
         for (method, amplitude, h, modulus) in &self.of_methods {
-            csv.row(&[method.name().into(), (*amplitude).into(), (*h).into(), (*modulus).into()]);
+            csv.row(&[
+                method.name().into(),
+                (*amplitude).into(),
+                (*h).into(),
+                (*modulus).into(),
+            ]);
         }
         csv
     }
@@ -262,14 +292,18 @@ impl Floquet {
                 )
             },
         );
-        format!("**Beside a periodic swing of 2 links deviations stay small only while the swing is small**: {words}.")
+        format!(
+            "**Beside a periodic swing of 2 links deviations stay small only while the swing is small**: {words}."
+        )
     }
 
     /// Where the true multipliers lie on the unit circle, a method's come to it with its order; Euler's and midpoint's from
     /// outside.
     fn verdict(&self) -> Verdict {
         let off = |method: Method| -> Vec<f64> {
-            self.shown(method).map(|(_, modulus)| modulus - 1.0).collect()
+            self.shown(method)
+                .map(|(_, modulus)| modulus - 1.0)
+                .collect()
         };
         let grows = [Method::Euler, Method::Midpoint]
             .iter()
@@ -278,7 +312,11 @@ impl Floquet {
             .iter()
             .map(|method| {
                 let at = off(*method).get(3).copied().unwrap_or(f64::NAN);
-                format!("{method} 1 {} {}", if at < 0.0 { "-" } else { "+" }, scientific(at.abs()))
+                format!(
+                    "{method} 1 {} {}",
+                    if at < 0.0 { "-" } else { "+" },
+                    scientific(at.abs())
+                )
             })
             .collect();
         Verdict {
@@ -297,7 +335,11 @@ impl Floquet {
             Axis::log_between("largest multiplier of a period", Unit::Number, 0.5, 1e3),
         );
         let points = self.true_ones.iter().map(|(amplitude, period, modulus)| {
-            let told = format!("period {}, multiplier {}", seconds(*period), number(*modulus));
+            let told = format!(
+                "period {}, multiplier {}",
+                seconds(*period),
+                number(*modulus)
+            );
             Point::new(*amplitude, *modulus, told)
         });
         by_amplitude.series.push(Series {
@@ -316,9 +358,15 @@ impl Floquet {
             let points = self.shown(method).map(|(h, modulus)| {
                 let sign = if modulus > 1.0 { "grows" } else { "dies out" };
                 let off = (modulus - 1.0).abs();
-                Point::new(h, off.max(1e-13), format!("{method}: {sign}, {}", scientific(off)))
+                Point::new(
+                    h,
+                    off.max(1e-13),
+                    format!("{method}: {sign}, {}", scientific(off)),
+                )
             });
-            by_timestep.series.push(Series::of(method, points.collect()));
+            by_timestep
+                .series
+                .push(Series::of(method, points.collect()));
         }
         Figure::new(
             "floquet",
@@ -343,7 +391,10 @@ impl Floquet {
         );
         for method in Method::ALL {
             let mut row = vec![Cell::method(method)];
-            row.extend(self.shown(method).map(|(_, modulus)| Cell::new(scientific(modulus - 1.0))));
+            row.extend(
+                self.shown(method)
+                    .map(|(_, modulus)| Cell::new(scientific(modulus - 1.0))),
+            );
             table.rows.push(row);
         }
         table

@@ -142,7 +142,10 @@ fn figure(runs: &[Run]) -> Figure {
         .collect();
     keys.push(Key {
         dashed: true,
-        ..Key::line("soft", "growth with the root of the steps, and in proportion to them")
+        ..Key::line(
+            "soft",
+            "growth with the root of the steps, and in proportion to them",
+        )
     });
     Figure::new(
         "rounding",
@@ -162,7 +165,13 @@ fn table(runs: &[Run]) -> Table {
         "rounding",
         "Laws of growth",
         "The exponent is fitted over the last two decades of steps: 0 where nothing grows or the error is bounded, 1/2 of a random walk, 1 in proportion to the steps.",
-        &["Method", "Sums", "Steps", "Energy error / scale", "Exponent"],
+        &[
+            "Method",
+            "Sums",
+            "Steps",
+            "Energy error / scale",
+            "Exponent",
+        ],
     );
     for run in runs {
         let (steps, error) = run.end();

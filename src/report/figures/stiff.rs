@@ -7,13 +7,18 @@ use crate::report::csv::Csv;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Key, Marker, Plot, Point, Series, Unit, number, power, scientific, seconds};
+use crate::report::svg::{
+    Axis, Key, Marker, Plot, Point, Series, Unit, number, power, scientific, seconds,
+};
 use crate::report::timing::{Effort, Timing, time};
 
 /// The error that is to be kept \[rad\].
 const TARGET: f64 = 1e-4;
 
-const FAMILIES: [(By, &str); 2] = [(By::Gains, "a stronger brake"), (By::Masses, "a lighter link")];
+const FAMILIES: [(By, &str); 2] = [
+    (By::Gains, "a stronger brake"),
+    (By::Masses, "a lighter link"),
+];
 
 /// The cheapest run of a solver within the error, or why there is none.
 struct Cost {
@@ -62,7 +67,12 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
 
 /// The first run within the error, of ever twice as many steps. One that stability forbids for all that may be taken is not
 /// begun.
-fn cheapest(scene: &StiffScene, solver: Solver, fewest: Option<f64>, most: u64) -> Option<StiffRun> {
+fn cheapest(
+    scene: &StiffScene,
+    solver: Solver,
+    fewest: Option<f64>,
+    most: u64,
+) -> Option<StiffRun> {
     #[allow(clippy::cast_precision_loss, reason = "at most 2^19 steps")]
     if fewest.is_some_and(|fewest| fewest > most as f64) {
         return None;
@@ -79,7 +89,9 @@ fn cheapest(scene: &StiffScene, solver: Solver, fewest: Option<f64>, most: u64) 
 }
 
 fn section(making: &mut Making<'_>, costs: &[Cost], uncertainty: f64) -> Section {
-    let mut csv = Csv::new("stiffened_by,ratio,solver,steps,evaluations,error_rad,time_s,fewest_stable_steps");
+    let mut csv = Csv::new(
+        "stiffened_by,ratio,solver,steps,evaluations,error_rad,time_s,fewest_stable_steps",
+    );
     for cost in costs {
         csv.row(&[
             told(cost.by).into(),
@@ -103,11 +115,16 @@ fn section(making: &mut Making<'_>, costs: &[Cost], uncertainty: f64) -> Section
 }
 
 fn told(by: By) -> &'static str {
-    FAMILIES.iter().find(|family| family.0 == by).map_or("", |family| family.1)
+    FAMILIES
+        .iter()
+        .find(|family| family.0 == by)
+        .map_or("", |family| family.1)
 }
 
 fn of(costs: &[Cost], by: By, solver: Solver) -> impl Iterator<Item = &Cost> {
-    costs.iter().filter(move |cost| cost.by == by && cost.solver == solver)
+    costs
+        .iter()
+        .filter(move |cost| cost.by == by && cost.solver == solver)
 }
 
 /// The stiffness from which a baseline takes less time than every explicit method.
@@ -191,7 +208,14 @@ fn class(solver: Solver) -> (&'static str, Marker) {
 fn figure(costs: &[Cost]) -> Figure {
     let mut plots = Vec::new();
     for (by, told) in FAMILIES {
-        let x = || Axis::log_between("stiffness ratio: the elbow's rate per the swing's", Unit::Number, 0.5, 2e8);
+        let x = || {
+            Axis::log_between(
+                "stiffness ratio: the elbow's rate per the swing's",
+                Unit::Number,
+                0.5,
+                2e8,
+            )
+        };
         let mut evaluations = Plot::new(
             format!("Stiff by {told}: evaluations"),
             x(),
@@ -211,17 +235,25 @@ fn figure(costs: &[Cost]) -> Figure {
                 dashed,
                 points,
             };
-            let run = |value: &dyn Fn(&(StiffRun, Timing)) -> f64, told: &dyn Fn(f64) -> String| -> Vec<Point> {
+            let run = |value: &dyn Fn(&(StiffRun, Timing)) -> f64,
+                       told: &dyn Fn(f64) -> String|
+             -> Vec<Point> {
                 let points = of(costs, by, solver).filter_map(|cost| {
                     let value = value(cost.run.as_ref()?);
-                    Some(Point::new(cost.ratio, value, format!("{}: {}", solver.name(), told(value))))
+                    Some(Point::new(
+                        cost.ratio,
+                        value,
+                        format!("{}: {}", solver.name(), told(value)),
+                    ))
                 });
                 points.collect()
             };
             #[allow(clippy::cast_precision_loss, reason = "counts are below 2^53")]
             let counted = run(&|run| run.0.evaluations as f64, &scientific);
             evaluations.series.push(line(counted, false));
-            times.series.push(line(run(&|run| run.1.minimum, &seconds), false));
+            times
+                .series
+                .push(line(run(&|run| run.1.minimum, &seconds), false));
             if let Solver::Explicit(method) = solver {
                 let predicted = of(costs, by, solver)
                     .filter_map(|cost| {
@@ -253,7 +285,10 @@ fn figure(costs: &[Cost]) -> Figure {
     });
     Figure::new(
         "stiff",
-        format!("Cost of {} rad as the arm gets stiffer", power(TARGET.log10().round())),
+        format!(
+            "Cost of {} rad as the arm gets stiffer",
+            power(TARGET.log10().round())
+        ),
         format!(
             "2 links let go from (0.4, -0.3) for {DURATION} s with a brake at the elbow, law in every stage. Run time is that of the run whose evaluations are shown. Implicit midpoint and Rodas3 are baselines \
              of this report and cannot be chosen on the live arm; their Jacobians are taken by differences, and counted. Lines end where more than half a million steps would be needed."
@@ -268,15 +303,23 @@ fn table(costs: &[Cost]) -> Table {
     head.extend(Solver::ALL.map(Solver::name));
     let mut table = Table::new(
         "stiff",
-        format!("Evaluations and run time for {} rad", power(TARGET.log10().round())),
+        format!(
+            "Evaluations and run time for {} rad",
+            power(TARGET.log10().round())
+        ),
         "The first run within the error, of ever twice as many steps.",
         &head,
     );
     for (by, told) in FAMILIES {
-        let ratios: Vec<f64> = of(costs, by, Solver::Rodas3).map(|cost| cost.ratio).collect();
+        let ratios: Vec<f64> = of(costs, by, Solver::Rodas3)
+            .map(|cost| cost.ratio)
+            .collect();
         for ratio in ratios {
             let mut row = vec![Cell::new(told), Cell::new(scientific(ratio))];
-            for cost in costs.iter().filter(|cost| cost.by == by && cost.ratio.to_bits() == ratio.to_bits()) {
+            for cost in costs
+                .iter()
+                .filter(|cost| cost.by == by && cost.ratio.to_bits() == ratio.to_bits())
+            {
                 row.push(match (&cost.run, cost.fewest) {
                     (Some((run, timing)), _) => {
                         Cell::new(run.evaluations.to_string()).detail(seconds(timing.minimum))

@@ -16,8 +16,8 @@ use tables::{steps_table, table};
 
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
-use crate::math::expression::Expression;
 use crate::math::dynamics::forward_dynamics;
+use crate::math::expression::Expression;
 use crate::math::integrator::{Method, increment};
 use crate::math::particle::Particle;
 use crate::math::pid::{Gains, Setpoint};

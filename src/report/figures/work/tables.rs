@@ -85,7 +85,9 @@ pub(super) fn table(kinds: &[Kind], counts: &Counts, same_bits: [bool; 2]) -> Ta
     table.rows.push(allocation_row(counts));
     table.rows.push(vec![
         Cell::new("A locked joint"),
-        Cell::new("there is none: every joint of this arm turns, and a link less is an arm of its own"),
+        Cell::new(
+            "there is none: every joint of this arm turns, and a link less is an arm of its own",
+        ),
     ]);
     let proofs = [
         (
