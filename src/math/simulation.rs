@@ -145,7 +145,6 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    #[inline]
     fn take_steps<const WEIGHS: bool>(
         &mut self,
         steps: u64,
@@ -168,7 +167,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// One step, unless its result is not finite: then nothing changes, and `false`.
-    #[inline]
+    #[inline(always)] // into both loops: called, it takes a dozen instructions more
     fn take_step<const WEIGHS: bool>(&mut self) -> bool {
         let mut control = if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)

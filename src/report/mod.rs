@@ -176,7 +176,7 @@ fn make(
     for (stem, csv) in making.tables {
         write(&options.out.join(format!("{stem}.csv")), &csv.into_text())?;
     }
-    for block in &section.blocks {
+    for block in section.glance.iter().chain(&section.blocks) {
         if let Block::Figure(figure) = block {
             let path = options.out.join(format!("{}.svg", figure.name));
             write(&path, &figure.sheet)?;
@@ -193,11 +193,12 @@ fn make(
 /// Everything but the drawings.
 fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
     let tables = |section: &Section| -> Vec<Value> {
-        let in_body = section.blocks.iter().filter_map(|block| match block {
+        let blocks = section.glance.iter().chain(&section.blocks);
+        let tables = blocks.filter_map(|block| match block {
             Block::Table(table) => Some(table),
             Block::Text(_) | Block::Figure(_) => None,
         });
-        section.glance.iter().chain(in_body).map(rows).collect()
+        tables.map(rows).collect()
     };
     let sections: Vec<Value> = sections
         .iter()

@@ -48,7 +48,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let mut section = Section {
         findings: findings(&data),
         verdicts: verdicts(&data),
-        glance: vec![cheapest(&data)],
+        glance: vec![Block::Table(cheapest(&data))],
         ..Section::default()
     };
     section

@@ -5,11 +5,13 @@
 mod map;
 mod period;
 mod radius;
+mod regions;
 mod words;
 
 use map::map;
 use period::{growth, period_table, periods};
 use radius::radius_figure;
+use regions::regions_figure;
 use words::{findings, verdicts};
 
 use crate::math::arm::Arm;
@@ -74,12 +76,14 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let periods = periods(making, &mut meter);
     let (radius, csv) = radius_figure(&lines);
     making.keep("spectral-radius", csv);
+    let (regions, csv) = regions_figure();
+    making.keep("regions", csv);
     let growth = growth(making, &mut meter);
     making.keep("control-period", growth.csv.clone());
     Section {
         findings: findings(&lines),
         verdicts: verdicts(&lines, &map, &periods, &growth),
-        glance: vec![edges(&lines)],
+        glance: vec![Block::Table(edges(&lines)), Block::Figure(regions)],
         blocks: vec![
             Block::Figure(radius),
             Block::Figure(growth.figure()),
