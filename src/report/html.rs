@@ -149,7 +149,8 @@ fn figure(out: &mut String, figure: &Figure) {
     append(
         out,
         format_args!(
-            "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
+            "</div><figcaption>{} <a href=\"{name}.svg\">{name}.svg</a>, <a \
+             href=\"{name}.csv\">{name}.csv</a></figcaption></figure>",
             escape(&figure.caption),
             name = escape(&figure.name)
         ),
@@ -207,10 +208,14 @@ fn making(out: &mut String, sections: &[Section], machine: &Machine) {
             format_args!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)),
         );
     }
-    out.push_str("</dl><p>Sections are made side by side on the cores there are, those that measure times one after the other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
-         quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of the same \
-         steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and not from the arm's \
-         own kernel; their own uncertainty is the distance to a second series of other order and tolerance. Nothing is tuned per \
+    out.push_str("</dl><p>Sections are made side by side on the cores there are, those that measure times one after \
+     the other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
+         quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of \
+         the same \
+         steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and not \
+         from the arm's \
+         own kernel; their own uncertainty is the distance to a second series of other order and tolerance. Nothing \
+         is tuned per \
          method.</p><ul class=\"sections\">");
     for section in sections {
         let quick = if section.quick { ", quick" } else { "" };

@@ -59,8 +59,10 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let own = largest(&panels, |lost| lost.recursion.1 - lost.inherent.1);
     Section {
         findings: vec![format!(
-            "**With a last link 10⁹ times lighter or heavier than the others bent and stretched arms lose at most {} of 16 digits**; with the second link folded back onto the first, up to {}, of \
-             which at most {} are the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix loses up to {}.",
+            "**With a last link 10⁹ times lighter or heavier than the others bent and stretched arms lose at most {} \
+             of 16 digits**; with the second link folded back onto the first, up to {}, of \
+             which at most {} are the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix \
+             loses up to {}.",
             number(worst),
             number(lost_folded),
             number(own.max(0.0)),
@@ -80,7 +82,8 @@ fn verdicts(worst: f64, own: f64, count: u32) -> Vec<Verdict> {
     vec![
         Verdict {
             claim: format!(
-                "In none of these poses are more than {ALLOWED} digits lost beyond those that lie in the angles' last bits"
+                "In none of these poses are more than {ALLOWED} digits lost beyond those that lie in the angles' last \
+                 bits"
             ),
             seen: format!("at worst {} digits beyond", number(own.max(0.0))),
             holds: own <= ALLOWED,
@@ -161,10 +164,12 @@ fn figure(panels: &[(&str, Vec<Column>)], worst: f64) -> Figure {
     Figure::new(
         "conditioning",
         format!(
-            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most of them",
+            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most \
+             of them",
             number(worst)
         ),
-        "Worst of all sampled states. The dashed line is what the last bit of an angle changes by itself: no way of solving can be asked for more. Crosses at the top: elimination failed.",
+        "Worst of all sampled states. The dashed line is what the last bit of an angle changes by itself: no way of \
+         solving can be asked for more. Crosses at the top: elimination failed.",
         &[
             key("c1", Marker::Diamond, false, "this arm's recursion"),
             key("c2", Marker::Square, false, "elimination of M(q)"),

@@ -20,14 +20,14 @@ const FITTED: usize = 6;
 /// By how much an order may be off.
 const AGREEMENT: f64 = 0.25;
 
-struct Line {
+struct Convergence {
     force: &'static Force,
     method: Method,
     /// Timestep and error.
     points: Vec<(f64, f64)>,
 }
 
-impl Line {
+impl Convergence {
     fn order(&self) -> Option<f64> {
         let inside = self.points.iter().rev().filter(|point| point.1 > ROUNDING);
         slope(inside.take(FITTED).copied())
@@ -50,7 +50,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
                     Some((DURATION / in_f64(steps), force.error(method, steps)?))
                 })
                 .collect();
-            lines.push(Line {
+            lines.push(Convergence {
                 force,
                 method,
                 points,
@@ -70,7 +70,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         }
     }
     making.keep("forcing", csv);
-    let judged: Vec<bool> = lines.iter().filter_map(Line::as_expected).collect();
+    let judged: Vec<bool> = lines.iter().filter_map(Convergence::as_expected).collect();
     let held = judged.iter().filter(|holds| **holds).count();
     Section {
         findings: vec![finding(&lines)],
@@ -86,18 +86,19 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-fn order_of(lines: &[Line], force: &str, method: Method) -> String {
+fn order_of(lines: &[Convergence], force: &str, method: Method) -> String {
     lines
         .iter()
         .find(|line| line.force.name == force && line.method == method)
-        .and_then(Line::order)
+        .and_then(Convergence::order)
         .map_or_else(|| "?".to_owned(), |order| format!("{order:.1}"))
 }
 
-fn finding(lines: &[Line]) -> String {
+fn finding(lines: &[Convergence]) -> String {
     let rk4 = |force| order_of(lines, force, Method::Rk4);
     format!(
-        "**RK4 is of order {} under a smooth force, of {} where the force has a kink and of {} where it jumps**: there it is no better than midpoint, or Euler, at four \
+        "**RK4 is of order {} under a smooth force, of {} where the force has a kink and of {} where it jumps**: \
+         there it is no better than midpoint, or Euler, at four \
          times the cost.",
         rk4("smooth"),
         rk4("kink"),
@@ -105,7 +106,7 @@ fn finding(lines: &[Line]) -> String {
     )
 }
 
-fn figure(lines: &[Line]) -> Figure {
+fn figure(lines: &[Convergence]) -> Figure {
     let plots: Vec<Plot> = FORCES
         .iter()
         .map(|force| {
@@ -123,8 +124,8 @@ fn figure(lines: &[Line]) -> Figure {
             );
             for line in of_force() {
                 let points = line.points.iter().map(|&(dt, error)| {
-                    let told = format!("{}, {}: {}", line.method, seconds(dt), number(error));
-                    Point::new(dt, error.max(1e-16), told)
+                    let words = format!("{}, {}: {}", line.method, seconds(dt), number(error));
+                    Point::new(dt, error.max(1e-16), words)
                 });
                 plot.series.push(Series::of(line.method, points.collect()));
             }
@@ -134,14 +135,16 @@ fn figure(lines: &[Line]) -> Figure {
     Figure::new(
         "forcing",
         "Where order is lost: forces through /arm_sim/integration_step",
-        "A particle of 1 kg, from rest, for 2 s; c is a time that lies on no step, and the error the root of the mean square over 32 of them. The fast force looks stiff and is not: nothing \
-         feeds back, so no timestep is unstable. The aliased one has a period of 1/64 s: at timesteps of whole periods every step sees the same force, and the particle is driven away.",
+        "A particle of 1 kg, from rest, for 2 s; c is a time that lies on no step, and the error the root of the mean \
+         square over 32 of them. The fast force looks stiff and is not: nothing \
+         feeds back, so no timestep is unstable. The aliased one has a period of 1/64 s: at timesteps of whole \
+         periods every step sees the same force, and the particle is driven away.",
         &Key::methods(),
         &plots,
     )
 }
 
-fn table(lines: &[Line]) -> Table {
+fn table(lines: &[Convergence]) -> Table {
     let mut table = Table::new(
         "forcing",
         "Orders, as expected and as observed",

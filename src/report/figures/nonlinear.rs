@@ -28,13 +28,13 @@ const PER_PERIOD: [u32; 7] = [16, 32, 64, 128, 256, 512, 1024];
 const SHOWN: f64 = 0.6;
 
 /// A map of one method: cells that fail, and the predicted line.
-struct Map {
+struct MotionMap {
     method: Method,
     /// Predicted limit \[s\] and measured verdict, row by row.
     rows: Vec<(f64, Vec<bool>)>,
 }
 
-impl Map {
+impl MotionMap {
     /// Cells below the prediction, and those of them that fail.
     fn below(&self, columns: &[f64], part: f64) -> (usize, usize) {
         let mut counts = (0, 0);
@@ -102,7 +102,7 @@ fn verdict(what: &str, (cells, lost): (usize, usize)) -> Verdict {
     }
 }
 
-fn within(maps: &[Map], steps: (f64, f64), columns: usize, part: f64) -> (usize, usize) {
+fn within(maps: &[MotionMap], steps: (f64, f64), columns: usize, part: f64) -> (usize, usize) {
     let steps = centres(steps, columns);
     maps.iter()
         .map(|map| map.below(&steps, part))
@@ -122,7 +122,7 @@ fn centres(ends: (f64, f64), count: usize) -> Vec<f64> {
 }
 
 /// Moves under the default gains: limited by the pose that bears least, and by their own speed.
-fn moves(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
+fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
     let mut maps = Vec::new();
     for method in Method::ALL {
         let poses = limits(&move_of(1.0, method, 1e-3))
@@ -136,7 +136,7 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
             (motion.timestep.min(poses), verdicts.collect())
         };
         let rows = centres(AMPLITUDES, columns).into_iter().map(row).collect();
-        maps.push(Map { method, rows });
+        maps.push(MotionMap { method, rows });
         making.at(maps.len(), 9);
     }
     maps
@@ -144,7 +144,7 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
 
 /// Free swings: limited by the frequency of small ones, and by their speed. A method that lets small swings grow at every
 /// timestep is limited by the speed alone here, for in four seconds little comes of that.
-fn spins(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
+fn spins(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
     let mut maps = Vec::new();
     for method in Method::ALL {
         let free = ControlLoop::free(Arm::<2>::default()).with_method(method);
@@ -159,13 +159,13 @@ fn spins(making: &mut Making<'_>, columns: usize) -> Vec<Map> {
             (motion.timestep.min(small), verdicts.collect())
         };
         let rows = centres(SPINS, columns).into_iter().map(row).collect();
-        maps.push(Map { method, rows });
+        maps.push(MotionMap { method, rows });
         making.at(4 + maps.len(), 9);
     }
     maps
 }
 
-fn map_figure(moves: &[Map], swings: &[Map], columns: usize) -> Figure {
+fn map_figure(moves: &[MotionMap], swings: &[MotionMap], columns: usize) -> Figure {
     let mut plots = Vec::new();
     for (maps, steps, values, label, title) in [
         (
@@ -211,9 +211,12 @@ fn map_figure(moves: &[Map], swings: &[Map], columns: usize) -> Figure {
     Figure::new(
         "nonlinear-map",
         "Beyond small deviations the timestep is limited by speed",
-        "Top: moves of 2 links under the default gains, from rest; blue where both joints are within 0.02 rad after 6 s, orange where not. Bottom: free swings from (0, 0.5) with the first joint spinning; \
-         orange where the energy above the hanging arm's trebles within 4 s. Line: the smaller of the limit by linearisation (moves: the least of all poses; swings: of small swings, where there is one) and \
-         the timestep_limit_motion that the service answers. A set of moves that no timestep brings home in time shows as orange at the top of every panel.",
+        "Top: moves of 2 links under the default gains, from rest; blue where both joints are within 0.02 rad after 6 \
+         s, orange where not. Bottom: free swings from (0, 0.5) with the first joint spinning; \
+         orange where the energy above the hanging arm's trebles within 4 s. Line: the smaller of the limit by \
+         linearisation (moves: the least of all poses; swings: of small swings, where there is one) and \
+         the timestep_limit_motion that the service answers. A set of moves that no timestep brings home in time \
+         shows as orange at the top of every panel.",
         &[Key::line("ink", "predicted limit")],
         &plots,
     )
@@ -286,7 +289,8 @@ impl Floquet {
             || "none of these swings is unstable by itself".to_owned(),
             |(amplitude, _, modulus)| {
                 format!(
-                    "from an amplitude of {} rad on the swing itself is unstable (multiplier {}), and no method can follow it for long",
+                    "from an amplitude of {} rad on the swing itself is unstable (multiplier {}), and no method can \
+                     follow it for long",
                     number(*amplitude),
                     number(*modulus)
                 )
@@ -321,7 +325,8 @@ impl Floquet {
             .collect();
         Verdict {
             claim: format!(
-                "Beside the swing of {SHOWN} rad, whose own multipliers are on the unit circle, deviations grow under Euler and midpoint at every timestep"
+                "Beside the swing of {SHOWN} rad, whose own multipliers are on the unit circle, deviations grow under \
+                 Euler and midpoint at every timestep"
             ),
             seen: format!("at 128 steps a period: {}", seen.join(", ")),
             holds: grows,
@@ -340,7 +345,7 @@ impl Floquet {
                 seconds(*period),
                 number(*modulus)
             );
-            Point::new(*amplitude, *modulus, told)
+            Point::new(*amplitude, *modulus, words)
         });
         by_amplitude.series.push(Series {
             class: "ink",
@@ -371,8 +376,10 @@ impl Floquet {
         Figure::new(
             "floquet",
             "Floquet multipliers along a periodic swing",
-            "2 links swing from rest on one side through the hanging pose to rest on the other and back, without control. Left: the true multiplier of the pair beside the swing; above 1 the swing is unstable \
-             by itself. Right: how far from the unit circle a method puts it, by timestep; the table says to which side.",
+            "2 links swing from rest on one side through the hanging pose to rest on the other and back, without \
+             control. Left: the true multiplier of the pair beside the swing; above 1 the swing is unstable \
+             by itself. Right: how far from the unit circle a method puts it, by timestep; the table says to which \
+             side.",
             &Key::methods(),
             &[by_amplitude, by_timestep],
         )

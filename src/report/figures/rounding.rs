@@ -14,14 +14,14 @@ const TIMESTEP: f64 = 2e-5;
 
 const BOTH: [(Adding, &str); 2] = [(Adding::Compensated, "carried"), (Adding::Plain, "plain")];
 
-struct Run {
+struct EnergyRun {
     method: Method,
     adding: Adding,
-    told: &'static str,
+    sums: &'static str,
     points: Vec<(f64, f64)>,
 }
 
-impl Run {
+impl EnergyRun {
     fn end(&self) -> (f64, f64) {
         self.points.last().copied().unwrap_or((0.0, f64::NAN))
     }
@@ -37,13 +37,13 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     };
     let mut runs = Vec::new();
     for method in Method::ALL {
-        for (adding, told) in BOTH {
+        for (adding, sums) in BOTH {
             let steps = steps(method, making.quick);
             let points = energy_error(method, TIMESTEP, steps, adding);
-            runs.push(Run {
+            runs.push(EnergyRun {
                 method,
                 adding,
-                told,
+                sums,
                 points,
             });
             making.at(runs.len(), 8);
@@ -52,13 +52,13 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     section(making, &runs)
 }
 
-fn section(making: &mut Making<'_>, runs: &[Run]) -> Section {
+fn section(making: &mut Making<'_>, runs: &[EnergyRun]) -> Section {
     let mut csv = Csv::new("method,sums,dt,steps,dE_max_scaled");
     for run in runs {
         for (steps, error) in &run.points {
             csv.row(&[
                 run.method.name().into(),
-                run.told.into(),
+                run.sums.into(),
                 TIMESTEP.into(),
                 (*steps).into(),
                 (*error).into(),
@@ -74,16 +74,17 @@ fn section(making: &mut Making<'_>, runs: &[Run]) -> Section {
     }
 }
 
-fn of(runs: &[Run], method: Method, adding: Adding) -> Option<&Run> {
+fn of(runs: &[EnergyRun], method: Method, adding: Adding) -> Option<&EnergyRun> {
     runs.iter()
         .find(|run| run.method == method && run.adding == adding)
 }
 
-fn finding(runs: &[Run]) -> Option<String> {
+fn finding(runs: &[EnergyRun]) -> Option<String> {
     let carried = of(runs, Method::Rk4, Adding::Compensated)?.end();
     let plain = of(runs, Method::Rk4, Adding::Plain)?;
     Some(format!(
-        "**After {} steps of RK4 at {} the energy of a regular 2-link swing is off by {} of its scale; without carrying the rounding of sums by {}**, which has grown \
+        "**After {} steps of RK4 at {} the energy of a regular 2-link swing is off by {} of its scale; without \
+         carrying the rounding of sums by {}**, which has grown \
          with the power {} of the number of steps.",
         power(carried.0.log10().round()),
         seconds(TIMESTEP),
@@ -93,7 +94,7 @@ fn finding(runs: &[Run]) -> Option<String> {
     ))
 }
 
-fn verdict(runs: &[Run]) -> Option<Verdict> {
+fn verdict(runs: &[EnergyRun]) -> Option<Verdict> {
     let carried = of(runs, Method::Rk4, Adding::Compensated)?.end().1;
     let plain = of(runs, Method::Rk4, Adding::Plain)?.end().1;
     Some(Verdict {
@@ -103,7 +104,7 @@ fn verdict(runs: &[Run]) -> Option<Verdict> {
     })
 }
 
-fn figure(runs: &[Run]) -> Figure {
+fn figure(runs: &[EnergyRun]) -> Figure {
     let plots: Vec<Plot> = BOTH
         .iter()
         .map(|(adding, _)| {
@@ -151,7 +152,8 @@ fn figure(runs: &[Run]) -> Figure {
         "rounding",
         "Energy over very many steps",
         format!(
-            "A regular swing of 2 links, let go 0.3 rad off the hanging pose, no control, steps of {}. The energy itself is computed in doubles, and that alone is \
+            "A regular swing of 2 links, let go 0.3 rad off the hanging pose, no control, steps of {}. The energy \
+             itself is computed in doubles, and that alone is \
              off by some 10⁻¹⁵ of the scale.",
             seconds(TIMESTEP)
         ),
@@ -160,11 +162,12 @@ fn figure(runs: &[Run]) -> Figure {
     )
 }
 
-fn table(runs: &[Run]) -> Table {
+fn table(runs: &[EnergyRun]) -> Table {
     let mut table = Table::new(
         "rounding",
         "Laws of growth",
-        "The exponent is fitted over the last two decades of steps: 0 where nothing grows or the error is bounded, 1/2 of a random walk, 1 in proportion to the steps.",
+        "The exponent is fitted over the last two decades of steps: 0 where nothing grows or the error is bounded, \
+         1/2 of a random walk, 1 in proportion to the steps.",
         &[
             "Method",
             "Sums",
@@ -177,7 +180,7 @@ fn table(runs: &[Run]) -> Table {
         let (steps, error) = run.end();
         table.rows.push(vec![
             Cell::method(run.method),
-            Cell::new(run.told),
+            Cell::new(run.sums),
             Cell::new(power(steps.log10().round())),
             Cell::new(scientific(error)),
             Cell::new(law(&run.points).map_or_else(|| "–".to_owned(), |law| format!("{law:.2}"))),

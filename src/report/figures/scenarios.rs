@@ -21,10 +21,10 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     for (index, scene) in all.iter().enumerate() {
         // Slow ones take seconds each, which a quick look does not have.
         let verdict = (!scene.slow || !making.quick).then(|| scene.run());
-        let told = verdict.as_ref().map(|verdict| plain(&verdict.observed));
+        let plainly = verdict.as_ref().map(|verdict| plain(&verdict.observed));
         let (observed, cell) = match &verdict {
             Some(verdict) => (
-                told.as_deref().unwrap_or_default(),
+                plainly.as_deref().unwrap_or_default(),
                 Cell::verdict(verdict.holds),
             ),
             None => (

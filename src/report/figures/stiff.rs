@@ -1,4 +1,4 @@
-//! Cost of an error by stiffness, explicit methods beside implicit baselines.
+//! CheapestRun of an error by stiffness, explicit methods beside implicit baselines.
 //!
 //! **Invariant:** what was not run because it would take too many steps is shown as a prediction, and said to be one.
 
@@ -21,7 +21,7 @@ const FAMILIES: [(By, &str); 2] = [
 ];
 
 /// The cheapest run of a solver within the error, or why there is none.
-struct Cost {
+struct CheapestRun {
     by: By,
     ratio: f64,
     solver: Solver,
@@ -51,7 +51,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
                     let timing = time(effort, || scene.run(solver, run.steps));
                     (run, timing)
                 });
-                costs.push(Cost {
+                costs.push(CheapestRun {
                     by,
                     ratio: scene.ratio,
                     solver,
@@ -88,13 +88,13 @@ fn cheapest(
     None
 }
 
-fn section(making: &mut Making<'_>, costs: &[Cost], uncertainty: f64) -> Section {
+fn section(making: &mut Making<'_>, costs: &[CheapestRun], uncertainty: f64) -> Section {
     let mut csv = Csv::new(
         "stiffened_by,ratio,solver,steps,evaluations,error_rad,time_s,fewest_stable_steps",
     );
     for cost in costs {
         csv.row(&[
-            told(cost.by).into(),
+            words(cost.by).into(),
             cost.ratio.into(),
             cost.solver.name().into(),
             cost.run.map(|run| run.0.steps).into(),
@@ -114,21 +114,21 @@ fn section(making: &mut Making<'_>, costs: &[Cost], uncertainty: f64) -> Section
     }
 }
 
-fn told(by: By) -> &'static str {
+fn words(by: By) -> &'static str {
     FAMILIES
         .iter()
         .find(|family| family.0 == by)
         .map_or("", |family| family.1)
 }
 
-fn of(costs: &[Cost], by: By, solver: Solver) -> impl Iterator<Item = &Cost> {
+fn of(costs: &[CheapestRun], by: By, solver: Solver) -> impl Iterator<Item = &CheapestRun> {
     costs
         .iter()
         .filter(move |cost| cost.by == by && cost.solver == solver)
 }
 
 /// The stiffness from which a baseline takes less time than every explicit method.
-fn ends(costs: &[Cost], by: By) -> Option<f64> {
+fn ends(costs: &[CheapestRun], by: By) -> Option<f64> {
     let fastest = |ratio: f64, baseline: bool| {
         costs
             .iter()
@@ -142,13 +142,15 @@ fn ends(costs: &[Cost], by: By) -> Option<f64> {
         .find(|&ratio| fastest(ratio, true) < fastest(ratio, false))
 }
 
-fn finding(costs: &[Cost], ends: Option<f64>) -> Option<String> {
+fn finding(costs: &[CheapestRun], ends: Option<f64>) -> Option<String> {
     let last = |solver| of(costs, By::Gains, solver).last();
     let implicit = last(Solver::Rodas3)?.run?;
     let rk4 = last(Solver::Explicit(Method::Rk4))?;
     Some(format!(
-        "**An explicit method pays for stiffness, an implicit one does not**: for {} rad on a swing of {DURATION} s with a brake at the elbow, Rodas3 (a baseline of this report) takes {} evaluations at a \
-         stiffness ratio of {}, where RK4 would need {} steps to be stable at all. From a ratio of {} on an implicit method is the faster one.",
+        "**An explicit method pays for stiffness, an implicit one does not**: for {} rad on a swing of {DURATION} s \
+         with a brake at the elbow, Rodas3 (a baseline of this report) takes {} evaluations at a \
+         stiffness ratio of {}, where RK4 would need {} steps to be stable at all. From a ratio of {} on an implicit \
+         method is the faster one.",
         power(TARGET.log10().round()),
         implicit.0.evaluations,
         power(rk4.ratio.log10().round()),
@@ -157,7 +159,7 @@ fn finding(costs: &[Cost], ends: Option<f64>) -> Option<String> {
     ))
 }
 
-fn verdicts(costs: &[Cost], uncertainty: f64) -> Vec<Verdict> {
+fn verdicts(costs: &[CheapestRun], uncertainty: f64) -> Vec<Verdict> {
     let flat = FAMILIES.into_iter().all(|(by, _)| {
         let all: Vec<_> = of(costs, by, Solver::Rodas3).map(|cost| cost.run).collect();
         let most = all.iter().flatten().map(|run| run.0.evaluations).max();
@@ -185,7 +187,8 @@ fn verdicts(costs: &[Cost], uncertainty: f64) -> Vec<Verdict> {
             holds: flat,
         },
         Verdict {
-            claim: "No explicit method keeps the error with fewer than 0.7 of the steps that its predicted limit asks for, which is that of the hanging pose".to_owned(),
+            claim: "No explicit method keeps the error with fewer than 0.7 of the steps that its predicted limit asks \
+             for, which is that of the hanging pose".to_owned(),
             seen: format!("{} of them at least", number(least)),
             holds: least > 0.7,
         },
@@ -205,9 +208,9 @@ fn class(solver: Solver) -> (&'static str, Marker) {
     }
 }
 
-fn figure(costs: &[Cost]) -> Figure {
+fn figure(costs: &[CheapestRun]) -> Figure {
     let mut plots = Vec::new();
-    for (by, told) in FAMILIES {
+    for (by, words) in FAMILIES {
         let x = || {
             Axis::log_between(
                 "stiffness ratio: the elbow's rate per the swing's",
@@ -217,12 +220,12 @@ fn figure(costs: &[Cost]) -> Figure {
             )
         };
         let mut evaluations = Plot::new(
-            format!("Stiff by {told}: evaluations"),
+            format!("Stiff by {words}: evaluations"),
             x(),
             Axis::log_between("evaluations of the dynamics", Unit::Number, 10.0, 1e10),
         );
         let mut times = Plot::new(
-            format!("Stiff by {told}: run time"),
+            format!("Stiff by {words}: run time"),
             x(),
             Axis::log_between("run time", Unit::Seconds, 1e-6, 1.0),
         );
@@ -236,14 +239,14 @@ fn figure(costs: &[Cost]) -> Figure {
                 points,
             };
             let run = |value: &dyn Fn(&(StiffRun, Timing)) -> f64,
-                       told: &dyn Fn(f64) -> String|
+                       words: &dyn Fn(f64) -> String|
              -> Vec<Point> {
                 let points = of(costs, by, solver).filter_map(|cost| {
                     let value = value(cost.run.as_ref()?);
                     Some(Point::new(
                         cost.ratio,
                         value,
-                        format!("{}: {}", solver.name(), told(value)),
+                        format!("{}: {}", solver.name(), words(value)),
                     ))
                 });
                 points.collect()
@@ -286,19 +289,21 @@ fn figure(costs: &[Cost]) -> Figure {
     Figure::new(
         "stiff",
         format!(
-            "Cost of {} rad as the arm gets stiffer",
+            "CheapestRun of {} rad as the arm gets stiffer",
             power(TARGET.log10().round())
         ),
         format!(
-            "2 links let go from (0.4, -0.3) for {DURATION} s with a brake at the elbow, law in every stage. Run time is that of the run whose evaluations are shown. Implicit midpoint and Rodas3 are baselines \
-             of this report and cannot be chosen on the live arm; their Jacobians are taken by differences, and counted. Lines end where more than half a million steps would be needed."
+            "2 links let go from (0.4, -0.3) for {DURATION} s with a brake at the elbow, law in every stage. Run time \
+             is that of the run whose evaluations are shown. Implicit midpoint and Rodas3 are baselines \
+             of this report and cannot be chosen on the live arm; their Jacobians are taken by differences, and \
+             counted. Lines end where more than half a million steps would be needed."
         ),
         &keys,
         &plots,
     )
 }
 
-fn table(costs: &[Cost]) -> Table {
+fn table(costs: &[CheapestRun]) -> Table {
     let mut head = vec!["Stiff by", "Ratio"];
     head.extend(Solver::ALL.map(Solver::name));
     let mut table = Table::new(
@@ -310,12 +315,12 @@ fn table(costs: &[Cost]) -> Table {
         "The first run within the error, of ever twice as many steps.",
         &head,
     );
-    for (by, told) in FAMILIES {
+    for (by, words) in FAMILIES {
         let ratios: Vec<f64> = of(costs, by, Solver::Rodas3)
             .map(|cost| cost.ratio)
             .collect();
         for ratio in ratios {
-            let mut row = vec![Cell::new(told), Cell::new(scientific(ratio))];
+            let mut row = vec![Cell::new(words), Cell::new(scientific(ratio))];
             for cost in costs
                 .iter()
                 .filter(|cost| cost.by == by && cost.ratio.to_bits() == ratio.to_bits())

@@ -76,7 +76,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let periods = periods(making, &mut meter);
     let (radius, csv) = radius_figure(&lines);
     making.keep("spectral-radius", csv);
-    let (regions, csv) = regions_figure();
+    let (regions, csv) = regions_figure(&stiffened(1.0));
     making.keep("regions", csv);
     let growth = growth(making, &mut meter);
     making.keep("control-period", growth.csv.clone());

@@ -4,10 +4,10 @@
 
 use std::f64::consts::TAU;
 
-use super::stiffened;
 use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
+use crate::math::simulation::Simulation;
 use crate::report::csv::Csv;
 use crate::report::section::Figure;
 use crate::report::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, seconds};
@@ -30,11 +30,12 @@ const DURATION: f64 = 3.0;
 /// How far a run begins from the setpoint \[rad\].
 const NUDGE: f64 = 1e-6;
 
-pub(super) fn regions_figure() -> (Figure, Csv) {
+/// The figure and its numbers, of a loop at its setpoint.
+pub(super) fn regions_figure(control: &ControlLoop<2>) -> (Figure, Csv) {
     let mut csv = Csv::new("kind,method,dt,x,y");
     let (mut regions, mut runs) = (Vec::new(), Vec::new());
     for method in Method::ALL {
-        let control = stiffened(1.0).with_method(method);
+        let control = control.with_method(method);
         let Some(limit) = limit_held(&control) else {
             continue;
         };
@@ -46,7 +47,8 @@ pub(super) fn regions_figure() -> (Figure, Csv) {
         "regions",
         "Why: beyond the limit one eigenvalue leaves the unit circle, and the arm flips at every step",
         format!(
-            "2 links held at (0.4, 0.8) with the shipped gains. Top: the eigenvalues of one step of the linearised loop in the circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they \
+            "2 links held at (0.4, 0.8) with the shipped gains. Top: the eigenvalues of one step of the linearised \
+             loop in the circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they \
              begin near 1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
             PARTS.0, PARTS.1, RUNS[0].0, RUNS[1].0
         ),
@@ -92,8 +94,8 @@ fn region(control: &ControlLoop<2>, limit: f64, csv: &mut Csv) -> Plot {
                 value.re.into(),
                 value.im.into(),
             ]);
-            let told = format!("{}: {:.3} {:+.3} i", seconds(h), value.re, value.im);
-            let point = Point::new(value.re, value.im, told);
+            let words = format!("{}: {:.3} {:+.3} i", seconds(h), value.re, value.im);
+            let point = Point::new(value.re, value.im, words);
             if part <= 1.0 {
                 inside.push(point);
             } else {
@@ -158,7 +160,7 @@ fn traces(control: &ControlLoop<2>, limit: f64, csv: &mut Csv) -> Plot {
 }
 
 /// The loop at rest at its setpoint, its integral carrying the load, brought there with short steps.
-fn settled(control: &ControlLoop<2>) -> crate::math::simulation::Simulation<2> {
+fn settled(control: &ControlLoop<2>) -> Simulation<2> {
     let quiet = ControlLoop {
         method: Method::Rk4,
         ..*control

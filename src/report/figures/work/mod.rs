@@ -305,7 +305,8 @@ fn findings(counts: &Counts) -> Vec<String> {
         server::encoded(counts, "server-11-subscribers"),
     ) {
         findings.push(format!(
-            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} instructions each, for eleven {} at {}.",
+            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} \
+             instructions each, for eleven {} at {}.",
             number(none),
             number(one),
             number(each.round()),
@@ -315,7 +316,8 @@ fn findings(counts: &Counts) -> Vec<String> {
     }
     if let (Some(off), Some(on)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid")) {
         findings.push(format!(
-            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} instructions instead of {}.",
+            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} \
+             instructions instead of {}.",
             number(off.round()),
             number(on.round())
         ));
