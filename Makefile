@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -53,9 +53,9 @@ simulate-faults: ## Put faults into a copy of the sources and see at which seed 
 	@echo "make simulate-faults: up to $(or $(SEEDS),1000) seeds each, after a build of some minutes"
 	@SEEDS="$(SEEDS)" FROM="$(FROM)" python3 tests/simulate/faults.py $(ARGS)
 
-fuzz: ## Run every fuzz target for TIME=60 seconds; ARGS="frame op" picks some; needs cargo-fuzz
-	@echo "make fuzz: $(or $(TIME),60) s each, after a build of some minutes"
-	@CARGO="$(CARGO)" TIME="$(TIME)" bash scripts/fuzz.sh $(ARGS)
+fuzz: ## Search with every fuzz target for TIME=60 seconds (needs cargo-fuzz), or repeat RUNS=1000 times its share; ARGS="frame op" picks some
+	@echo "make fuzz: $(if $(RUNS),the same executions everywhere,$(or $(TIME),60) s each), after a build of some minutes"
+	@CARGO="$(CARGO)" TIME="$(TIME)" RUNS="$(RUNS)" bash scripts/fuzz.sh $(ARGS)
 
 fuzz-faults: ## Put faults into a copy of the sources and see each found by its fuzz target; ARGS="3 7" picks some; needs cargo-fuzz
 	@echo "make fuzz-faults: up to $(or $(TIME),60) s each, after a build of some minutes"
@@ -65,6 +65,7 @@ lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check --all
 	$(CARGO) fmt --check --manifest-path fuzz/Cargo.toml
+	$(CARGO) fmt --check --manifest-path python/Cargo.toml
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
@@ -92,6 +93,12 @@ picture: build ## Take the README's picture of the page: docs/page.png; needs ch
 features: ## Build with and without each feature and print size, crates and build time; KEEP=1 puts them into the README
 	@echo "make features: five release builds from nothing, some minutes"
 	@CARGO="$(CARGO)" python3 scripts/features.py $(if $(KEEP),--keep) $(ARGS)
+
+wheel: build ## Build the Python wheel with the program in it: python/target/wheels/
+	@bash scripts/wheel.sh "$(TARGET_DIR)/release/pendularm"
+
+test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" picks tests
+	@bash scripts/test-python.sh $(ARGS)
 
 mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"

@@ -1,3 +1,4 @@
+// @ts-check
 // A rosbridge client over WebSocket: calls as promises, subscriptions that outlive a lost connection.
 // Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason where there is no answer.
 

@@ -1,15 +1,22 @@
 #!/usr/bin/env bash
-# Builds the fuzz targets and runs each for TIME seconds (60); arguments pick targets. Stops at the first failure.
+# `make fuzz`: builds the fuzz targets and runs each; arguments pick targets. Stops at the first failure.
+#
+# A search, for TIME seconds each (60): coverage leads it, no two are alike. What the fuzzer finds interesting is kept in
+# the target folder, and the next search goes on from there. It needs cargo-fuzz.
+#
+# With RUNS=n a repetition: mutations of the kept seeds, RUNS times as many as the target's share, drawn from fixed numbers
+# and led by nothing. Hash tables have other keys in every process and processors have other instructions, so what coverage
+# leads differs from run to run; this does the same executions on every machine, slow or fast. CI does it. It needs a C++
+# compiler, no cargo-fuzz.
 #
 # No sanitizer: our own code has no unsafe in it, which is all that one would look into, and it would cost half of the
 # speed and a nightly compiler. Debug assertions and overflow checks are on instead (fuzz/Cargo.toml): they fail where our
 # own reasoning does.
-#
-# What the fuzzer finds interesting is kept in the target folder, and the next run goes on from there.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
 seconds=${TIME:-60}
+runs=${RUNS:-}
 folder=${CARGO_TARGET_DIR:-target}/fuzz
 all="frame series op fields expression inverse_kinematics simulation study outbox cbor http connection websocket runtime"
 
@@ -17,45 +24,102 @@ say() { echo "fuzz: $*"; }
 fail() { echo "fuzz: $*" >&2; exit 1; }
 
 [[ "$seconds" =~ ^[1-9][0-9]*$ ]] || fail "TIME must be a number of seconds, got '$seconds'"
-cargo fuzz --version >/dev/null 2>&1 || fail "cargo-fuzz is missing: cargo install cargo-fuzz --locked"
+[[ "$runs" =~ ^([1-9][0-9]*)?$ ]] || fail "RUNS must be a number of executions, got '$runs'"
 for target in "$@"; do
     [[ " $all " == *" $target "* ]] || fail "no target '$target': there are $all"
 done
 
 say "building"
-cargo fuzz build --sanitizer none --target-dir "$folder/build"
-host=$(rustc -vV | sed -n 's/^host: //p')
+if [ -n "$runs" ]; then
+    # A build without the counters of coverage.
+    "${CARGO:-cargo}" build --release --locked --manifest-path fuzz/Cargo.toml --target-dir "$folder/plain"
+    programs=$folder/plain/release
+else
+    cargo fuzz --version >/dev/null 2>&1 || fail "cargo-fuzz is missing: cargo install cargo-fuzz --locked"
+    cargo fuzz build --sanitizer none --target-dir "$folder/build"
+    programs=$folder/build/$(rustc -vV | sed -n 's/^host: //p')/release
+fi
 table=$folder/table.txt
 : >"$table"
 
-for target in ${*:-$all}; do
-    mkdir -p "$folder/corpus/$target" "$folder/failures/$target"
-    log=$folder/$target.log
-    case $target in
-        inverse_kinematics | simulation | study | outbox) words=() ;;
-        expression | http) words=(-dict="fuzz/dictionaries/$target.dict") ;;
-        *) words=(-dict="fuzz/dictionaries/json.dict") ;;
+# The words that a target's inputs are made of, where they are text.
+dictionary() {
+    case $1 in
+        inverse_kinematics | simulation | study | outbox) ;;
+        expression | http) echo "-dict=fuzz/dictionaries/$1.dict" ;;
+        *) echo "-dict=fuzz/dictionaries/json.dict" ;;
     esac
-    say "$target: $seconds s"
-    # No input may take 20 s; none of these needs 2 GB; inputs grow quickly from short to long.
-    if ! "$folder/build/$host/release/$target" "$folder/corpus/$target" "fuzz/seeds/$target" \
-        "${words[@]}" -max_total_time="$seconds" -timeout=20 -rss_limit_mb=2048 -len_control=10 \
-        -print_final_stats=1 -artifact_prefix="$folder/failures/$target/" >"$log" 2>&1; then
+}
+
+# Runs a target with what follows its name; the log grows.
+run() {
+    local target=$1 words
+    shift
+    words=$(dictionary "$target")
+    # None of these needs 2 GB.
+    "$programs/$target" "$@" ${words:+"$words"} -rss_limit_mb=2048 -print_final_stats=1 \
+        -artifact_prefix="$folder/failures/$target/" >>"$log" 2>&1
+}
+
+# No input may take 20 s; inputs grow quickly from short to long.
+search() {
+    mkdir -p "$folder/corpus/$1"
+    run "$1" "$folder/corpus/$1" "fuzz/seeds/$1" -max_total_time="$seconds" -timeout=20 -len_control=10
+}
+
+# Mutates each kept seed by itself, in the order of their names: where nothing tells which input is worth how much, the
+# fuzzer would take the first one alone. How long an input takes is asked in processor time by the targets themselves: the
+# wall's says nothing here.
+repeat() {
+    local seeds seed number=0 each
+    mapfile -t seeds < <(LC_ALL=C ls "fuzz/seeds/$1")
+    each=$((runs * $(share "$1") / ${#seeds[@]}))
+    for seed in "${seeds[@]}"; do
+        number=$((number + 1))
+        run "$1" -seed_inputs="fuzz/seeds/$1/$seed" -keep_seed=1 -cross_over=0 -seed="$number" -runs="$each" \
+            -timeout=600 -len_control=0 || return 1
+    done
+}
+
+# Executions of a target for each of RUNS: about what it does in five milliseconds.
+share() {
+    case $1 in
+        study) echo 2 ;;
+        runtime) echo 5 ;;
+        connection | websocket) echo 10 ;;
+        http) echo 50 ;;
+        *) echo 100 ;;
+    esac
+}
+
+for target in ${*:-$all}; do
+    mkdir -p "$folder/failures/$target"
+    log=$folder/$target.log
+    : >"$log"
+    if [ -n "$runs" ]; then
+        say "$target: $((runs * $(share "$target"))) executions"
+        how=repeat
+    else
+        say "$target: $seconds s"
+        how=search
+    fi
+    began=$SECONDS
+    if ! "$how" "$target"; then
         grep -a -A 3 'panicked at\|ERROR: libFuzzer' "$log" >&2 || tail -n 20 "$log" >&2
         input=$(sed -n 's/.*Test unit written to //p' "$log")
         cat >&2 <<TEXT
 fuzz: $target failed; the log is $log, the input $input
-fuzz: see it again:  $folder/build/$host/release/$target $input
+fuzz: see it again:  $programs/$target $input
 fuzz: make it small: cargo fuzz tmin --sanitizer none --target-dir $folder/build $target $input
 fuzz: then write what it does as a test in tests/, with the input in it as source, and mend the code
 TEXT
         exit 1
     fi
-    awk -v target="$target" '/^stat::number_of_executed_units:/ { runs = $2 } /^stat::average_exec_per_sec:/ { rate = $2 }
+    awk -v target="$target" -v took="$((SECONDS - began))" '/^stat::number_of_executed_units:/ { runs += $2 }
         / cov: / { for (i = 1; i < NF; i++) if ($i == "cov:") edges = $(i + 1) }
-        END { printf "%-20s %12d %10d %8d\n", target, runs, rate, edges }' "$log" >>"$table"
+        END { printf "%-20s %12d %8d %8d\n", target, runs, took, edges }' "$log" >>"$table"
 done
 
 say "no failure"
-printf '%-20s %12s %10s %8s\n' target executions per_s edges
+printf '%-20s %12s %8s %8s\n' target executions seconds edges
 cat "$table"

@@ -90,6 +90,12 @@ impl Client {
 
     /// Sends a frame; `style` says how: with which line end, or in which pieces.
     pub fn send(&self, frame: &str, style: u8) {
+        self.send_bytes(self.encode(frame, style));
+    }
+
+    /// The bytes of a frame in that style.
+    #[must_use]
+    pub fn encode(&self, frame: &str, style: u8) -> Vec<u8> {
         let mut bytes = Vec::with_capacity(frame.len() + 16);
         match self.door {
             Door::Plain => {
@@ -108,7 +114,7 @@ impl Client {
                 append_message(&mut bytes, kind, mask, piece, frame.as_bytes());
             }
         }
-        self.send_bytes(bytes);
+        bytes
     }
 
     /// Says that nothing more will come: by the stream's end, or by a close frame.

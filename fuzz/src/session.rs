@@ -17,7 +17,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use arbitrary::Arbitrary;
-use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::gateway::connection::gate::Gate;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
@@ -243,7 +243,7 @@ struct Player {
     /// It has broken a rule, or left: the runtime owes it nothing and may end it.
     is_excused: bool,
     has_ended: bool,
-    /// How long it has not been reading.
+    /// How long it has not been reading, in a row.
     idle: Duration,
 }
 
@@ -399,6 +399,12 @@ impl Session {
                 }
             }
             self.hear();
+            // Whoever reads again has taken all there was by now, and given its signs of life: it has not stalled.
+            for player in &mut self.players {
+                if !player.client.is_paused() {
+                    player.idle = Duration::ZERO;
+                }
+            }
         }
     }
 
@@ -610,6 +616,8 @@ impl Session {
         for player in &self.players {
             player.client.pause(false);
         }
+        // Whoever has not been reading for long finds here that it was given up; from then on it is owed nothing.
+        self.pass(Duration::from_millis(5)).await;
         self.stage.release_all();
         let mut waited = Duration::ZERO;
         while waited < LONGEST_TIMEOUT + Duration::from_secs(5) && !self.all_answered() {

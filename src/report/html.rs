@@ -209,14 +209,11 @@ fn making(out: &mut String, sections: &[Section], machine: &Machine) {
         );
     }
     out.push_str("</dl><p>Sections are made side by side on the cores there are, those that measure times one after \
-     the other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
+         the other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
          quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of \
-         the same \
-         steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and not \
-         from the arm's \
-         own kernel; their own uncertainty is the distance to a second series of other order and tolerance. Nothing \
-         is tuned per \
-         method.</p><ul class=\"sections\">");
+         the same steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and \
+         not from the arm's own kernel; their own uncertainty is the distance to a second series of other order and \
+         tolerance. Nothing is tuned per method.</p><ul class=\"sections\">");
     for section in sections {
         let quick = if section.quick { ", quick" } else { "" };
         append(

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
 use super::csv::Csv;
-use super::progress::Progress;
+use super::progress::ProgressBar;
 
 /// The tools at hand while a section is made.
 #[derive(Debug)]
@@ -14,9 +14,9 @@ pub(crate) struct Making<'a> {
     pub(super) quick: bool,
     /// Where the report is written, and counts from outside are looked for.
     pub(super) out: &'a Path,
-    /// The section's name, and where it tells how far it is.
+    /// The section's name, and where it says how far it is.
     pub(super) section: &'static str,
-    pub(super) progress: &'a Mutex<Progress>,
+    pub(super) progress: &'a Mutex<ProgressBar>,
     /// Stems and contents of `.csv` files.
     pub(super) tables: Vec<(String, Csv)>,
 }

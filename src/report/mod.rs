@@ -1,8 +1,9 @@
 //! The study as a page to look at: `pendularm report --out report/`.
 //!
-//! Runs the sections in `figures` side by side, keeps each in a file of its own, and writes `index.html`, `report.json`, and one `.csv` and
-//! `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their files. What is
-//! measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the drawing are.
+//! Runs the sections in `figures` side by side, keeps each in a file of its own, and writes `index.html`,
+//! `report.json`, and one `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others
+//! are taken from their files. What is measured is in [`experiments`], on `math` and `study`; this is where the clock,
+//! the files and the drawing are.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 
@@ -27,7 +28,7 @@ use std::time::Instant;
 use figures::{Maker, SECTIONS};
 use machine::Machine;
 use making::Making;
-use progress::Progress;
+use progress::ProgressBar;
 use section::{Block, Section, Table};
 use serde_json::{Value, json};
 
@@ -87,7 +88,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         |name: &str| options.only.is_empty() || options.only.iter().any(|only| only == name);
     let weight = |maker: &Maker| if options.quick { 1.0 } else { maker.weight };
     let makers = || SECTIONS.iter().filter(|maker| wanted(maker.name));
-    let progress = Mutex::new(Progress::new(makers().map(weight).sum()));
+    let progress = Mutex::new(ProgressBar::new(makers().map(weight).sum()));
     let made = side_by_side(makers().collect(), |maker| {
         lock(&progress).begin(maker.name, weight(maker));
         let section = make(maker, options, &machine, &progress)?;
@@ -162,7 +163,7 @@ fn make(
     maker: &Maker,
     options: &ReportOptions,
     machine: &Machine,
-    progress: &Mutex<Progress>,
+    progress: &Mutex<ProgressBar>,
 ) -> Result<Section, ReportError> {
     let started = Instant::now();
     let mut making = Making {

@@ -17,7 +17,7 @@ const CELLS: usize = 30;
 ///
 /// Work is measured in weights, which are about seconds on the machine they were chosen on.
 #[derive(Debug)]
-pub(crate) struct Progress {
+pub(crate) struct ProgressBar {
     terminal: bool,
     started: Instant,
     shown: Option<Instant>,
@@ -27,7 +27,7 @@ pub(crate) struct Progress {
     total: f64,
 }
 
-impl Progress {
+impl ProgressBar {
     pub(crate) fn new(total: f64) -> Self {
         Self {
             terminal: io::stderr().is_terminal(),

@@ -30,3 +30,4 @@ for client in roslib2 roslib1 lichtblick; do
     against node "node/$client.mjs"
 done
 against roslibrust/target/debug/pendularm-client-roslibrust
+timeout 300 .venv/bin/python python/record_readers.py "$program"

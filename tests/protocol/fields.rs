@@ -4,7 +4,7 @@
 
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
-use pendularm::protocol::op::fields::{Bound, Fields, Reason, Rejection};
+use pendularm::protocol::op::fields::{Bound, Fields, Reason, RejectedField};
 use proptest::prelude::*;
 use serde_json::value::RawValue;
 
@@ -370,7 +370,7 @@ fn another_layer_may_refuse_a_field_in_its_own_words() {
     assert_eq!(fields.status(), "method is not to be trusted");
     assert_eq!(
         fields.rejections(),
-        [Rejection {
+        [RejectedField {
             field: "method".to_owned(),
             reason: Reason::Refused("is not to be trusted".to_owned()),
         }]

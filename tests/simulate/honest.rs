@@ -62,6 +62,8 @@ pub struct Call {
     pub is_light: bool,
     /// The client's frames before it.
     pub order: u64,
+    /// It is a goal whose end this client has asked for.
+    pub is_cancelled: bool,
 }
 
 impl Call {
@@ -91,6 +93,7 @@ pub struct Subscription {
     pub phase: Phase,
     pub throttle: Option<Duration>,
     pub is_binary: bool,
+    pub is_in_pieces: bool,
     /// By publisher: messages that may come, in order, and whether each has to.
     pub pending: BTreeMap<u64, VecDeque<(u64, bool)>>,
     /// The last message that came, and when.
@@ -116,6 +119,8 @@ pub struct Honest {
     pub advertised: BTreeSet<String>,
     /// Messages that it has published: each with the number of its frame.
     pub published: BTreeMap<u64, u64>,
+    /// Bytes of frames that go out with the next one, in one write.
+    together: Vec<u8>,
     /// Frames that it has sent, and up to which they are known to have been handled.
     pub frames: u64,
     pub handled: u64,
@@ -154,6 +159,7 @@ impl Honest {
             watched: BTreeSet::new(),
             advertised: BTreeSet::new(),
             published: BTreeMap::new(),
+            together: Vec::new(),
             frames: 0,
             handled: 0,
             owed: Vec::new(),
@@ -180,7 +186,21 @@ impl Honest {
         } else {
             style
         };
+        self.flush();
         self.client.send(frame, style);
+    }
+
+    /// Sends a frame in one write with those behind it, once that is over.
+    pub fn send_with_next(&mut self, frame: &str) {
+        self.frames += 1;
+        self.together.extend(self.client.encode(frame, 0));
+    }
+
+    /// Nothing comes behind those frames.
+    pub fn flush(&mut self) {
+        if !self.together.is_empty() {
+            self.client.send_bytes(std::mem::take(&mut self.together));
+        }
     }
 
     /// Sends a frame as fragments of about `size` bytes.
@@ -238,6 +258,7 @@ impl Honest {
             turns: court.turns.get(),
             is_light,
             order: self.frames,
+            is_cancelled: false,
         };
         self.calls.insert(id.to_owned(), call);
     }
@@ -252,8 +273,10 @@ impl Honest {
     /// An answer has come: all frames before its call have been handled.
     pub fn handled_before(&mut self, order: u64) {
         self.handled = self.handled.max(order);
-        let handled = self.handled;
-        self.subscriptions
-            .retain(|_, one| !matches!(one.phase, Phase::Leaving(left) if left < handled));
+        // What waits to be encoded for somebody who does not read comes behind later answers.
+        let (handled, is_late) = (self.handled, self.is_hampered);
+        self.subscriptions.retain(
+            |_, one| !matches!(one.phase, Phase::Leaving(left) if left < handled && !is_late),
+        );
     }
 }

@@ -26,6 +26,9 @@ const LOOKS_APART: Duration = Duration::from_millis(25);
 /// What a client is told that held the most when all together held too much.
 const HELD_MOST: &str = "memory: this connection held the most";
 
+/// The status of a goal that ended because somebody asked for it.
+const CANCELED: &str = "5";
+
 /// A frame, as far as all of them are alike.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -118,6 +121,8 @@ pub struct Model {
     pub is_scarce: bool,
     /// Whether somebody has changed, or may have changed, the lengths of the arm's links.
     pub is_reshaped: bool,
+    /// Whether somebody has ended goals without saying whose.
+    pub ends_any_goal: bool,
     pub links: usize,
 }
 
@@ -165,7 +170,7 @@ impl Model {
             "status" => self.hear_status(court, honest, &frame, text),
             "call_service" => self.hear_call(court, honest, &frame, text),
             "fragment" => self.hear_piece(court, honest, frame),
-            "action_feedback" | "action_result" => hear_goal(court, honest, &frame, text),
+            "action_feedback" | "action_result" => self.hear_goal(court, honest, &frame, text),
             _ => court.wrong(format!("client {} heard {text:.200}", honest.who)),
         }
     }
@@ -385,6 +390,39 @@ impl Model {
         }
     }
 
+    fn hear_goal(&self, court: &Court, honest: &mut Honest, frame: &Heard<'_>, text: &str) {
+        let id = frame.id.map_or("", RawValue::get);
+        let who = honest.who;
+        let goal = honest.calls.get(id);
+        let Some((Expect::Goal { has_feedback }, is_cancelled)) =
+            goal.map(|call| (call.expect.clone(), call.is_cancelled))
+        else {
+            if !honest.is_excused {
+                court.wrong(format!(
+                    "client {who} has no such goal under way: {text:.300}"
+                ));
+            }
+            return;
+        };
+        if frame.action.as_deref() != Some("/ik_action") || frame.values.is_none() {
+            court.wrong(format!("news of a goal lack something: {text:.300}"));
+        }
+        if frame.op == "action_result" {
+            honest.calls.remove(id);
+            court.count("goals ended");
+            let is_canceled = frame.status.map(RawValue::get) == Some(CANCELED);
+            if is_canceled && !is_cancelled && !self.ends_any_goal {
+                court.wrong(format!(
+                    "client {who} has not asked for the end of its goal: {text:.300}"
+                ));
+            }
+        } else if !has_feedback {
+            court.wrong(format!(
+                "client {who} did not ask for feedback: {text:.300}"
+            ));
+        }
+    }
+
     fn solution(&self, values: &RawValue, result: bool, x: f64, y: f64) -> Option<String> {
         if self.is_reshaped {
             return None;
@@ -542,32 +580,6 @@ fn arm_answer(
     let should = is_good && is_done;
     (value != expected || result != should)
         .then(|| format!("the arm's double has {should} {expected}"))
-}
-
-fn hear_goal(court: &Court, honest: &mut Honest, frame: &Heard<'_>, text: &str) {
-    let id = frame.id.map_or("", RawValue::get);
-    let Some(Expect::Goal { has_feedback }) = honest.calls.get(id).map(|call| call.expect.clone())
-    else {
-        if !honest.is_excused {
-            court.wrong(format!(
-                "client {} has no such goal under way: {text:.300}",
-                honest.who
-            ));
-        }
-        return;
-    };
-    if frame.action.as_deref() != Some("/ik_action") || frame.values.is_none() {
-        court.wrong(format!("news of a goal lack something: {text:.300}"));
-    }
-    if frame.op == "action_result" {
-        honest.calls.remove(id);
-        court.count("goals ended");
-    } else if !has_feedback {
-        court.wrong(format!(
-            "client {} did not ask for feedback: {text:.300}",
-            honest.who
-        ));
-    }
 }
 
 /// The offline computation, against what came.

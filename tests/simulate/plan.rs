@@ -38,6 +38,11 @@ named! {
     }
 }
 
+named! {
+    /// What honest clients do together, or at length.
+    Burst { Stream, Flood, LongComputation, CancelAnothers }
+}
+
 /// Virtual time, room and probabilities of one seed.
 pub struct Plan {
     pub links: usize,
@@ -58,6 +63,11 @@ pub struct Plan {
     /// How likely a step is a fault, or a hostile deed.
     pub fault: f64,
     pub hostility: f64,
+    pub bursts: Vec<(Burst, f64)>,
+    /// How likely a step is a burst.
+    pub burst: f64,
+    /// Whether messages that a client publishes one behind the other go out in one write.
+    pub together: bool,
 }
 
 impl Plan {
@@ -94,7 +104,18 @@ impl Plan {
             } else {
                 0.0
             },
+            bursts: Vec::new(),
+            burst: 0.0,
+            together: false,
         }
+    }
+
+    /// Draws what the first of the kept seeds did not know; without it they stay what they were.
+    pub fn with_bursts(mut self, court: &Court) -> Self {
+        self.bursts = swarm(court, Burst::ALL, 0.4);
+        self.burst = 0.01 + 0.05 * court.fraction();
+        self.together = court.chance(0.5);
+        self
     }
 }
 
@@ -128,12 +149,13 @@ impl fmt::Display for Plan {
             room,
             piece,
             scarce,
+            together,
             ..
         } = self;
         write!(
             f,
             "links {links}, honest {honest}, hostile {hostile}, steps {steps}, socket {socket}, room {room}, piece {piece}, \
-             scarce {scarce}, fault {:.3}, hostility {:.3};",
+             scarce {scarce}, together {together}, fault {:.3}, hostility {:.3};",
             self.fault, self.hostility
         )?;
         for (one, weight) in &self.features {
@@ -145,6 +167,10 @@ impl fmt::Display for Plan {
         }
         write!(f, "; hostile:")?;
         for (one, weight) in &self.hostilities {
+            write!(f, " {one:?} {weight:.2}")?;
+        }
+        write!(f, "; bursts {:.3}:", self.burst)?;
+        for (one, weight) in &self.bursts {
             write!(f, " {one:?} {weight:.2}")?;
         }
         Ok(())

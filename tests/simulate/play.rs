@@ -4,7 +4,7 @@
 use std::rc::Rc;
 use std::time::Duration;
 
-use pendularm::actors::gateway::budget::MODEST;
+use pendularm::actors::resources::budget::MODEST;
 use tokio::time::Instant;
 
 use crate::client::{Client, Door};
@@ -13,7 +13,7 @@ use crate::honest::{Expect, Honest, Phase};
 use crate::hostile::Hostile;
 use crate::model::{Model, Provided};
 use crate::pipe::Fate;
-use crate::plan::{Fault, Feature, Plan};
+use crate::plan::{Burst, Fault, Feature, Plan};
 use crate::workload::{Desk, Numbers, waits};
 use crate::world::{SCARCE, World, in_virtual_time};
 
@@ -28,6 +28,8 @@ const LIGHT_TIME: Duration = Duration::from_secs(1);
 const LIVENESS: Duration = Duration::from_secs(40);
 /// When all have left, nothing is held for anybody after so much virtual time.
 const EMPTY: Duration = Duration::from_secs(100);
+/// Bytes in a pipe without which what a flood brings would be hours on its way.
+const FLOODED_ROOM: usize = 4096;
 /// Processor time that everybody's turns after one deed may take, however slow the machine is.
 const STANDSTILL: Duration = Duration::from_secs(2);
 /// How much more than the limit clients hold at most until whoever gives way is gone.
@@ -42,11 +44,14 @@ pub struct Outcome {
     pub tally: std::collections::BTreeMap<&'static str, u64>,
 }
 
-/// Plays one seed.
-pub fn play(seed: u64, keeps_log: bool) -> Outcome {
+/// Plays one seed; with bursts, if it is no older than they are.
+pub fn play(seed: u64, is_newest: bool, keeps_log: bool) -> Outcome {
     in_virtual_time(async {
         let court = Rc::new(Court::new(seed, keeps_log));
-        let plan = Plan::draw(&court);
+        let mut plan = Plan::draw(&court);
+        if is_newest {
+            plan = plan.with_bursts(&court);
+        }
         let text = plan.to_string();
         let mut course = Course::new(&court, plan, seed).await;
         course.run().await;
@@ -188,6 +193,11 @@ impl Course {
                 self.hostile[at] = self.intrude();
             }
             self.hostile[at].perform(deed, &self.court, &self.honest);
+        } else if !self.plan.bursts.is_empty() && self.court.chance(self.plan.burst) {
+            if let Some(burst) = self.court.weighed(&self.plan.bursts) {
+                self.court.count("bursts");
+                self.burst(burst).await;
+            }
         } else if let Some(feature) = self.court.weighed(&self.plan.features) {
             self.feature(feature).await;
         }
@@ -214,11 +224,56 @@ impl Course {
             let time = self.court.among(&[1, 5, 20, 100, 400, 1500]);
             return self.pass(Duration::from_millis(time)).await;
         }
+        let at = self.somebody();
+        self.desk(at).perform(feature);
+    }
+
+    /// A client that can do something, by its place.
+    fn somebody(&mut self) -> usize {
         let at = self.court.below(self.honest.len());
         if !self.honest[at].is_active() {
             self.honest[at] = self.replace(at);
         }
-        self.desk(at).perform(feature);
+        at
+    }
+
+    async fn burst(&mut self, burst: Burst) {
+        self.court.note("burst", format!("{burst:?}").as_bytes());
+        let at = self.somebody();
+        match burst {
+            // A message every few milliseconds: what a throttle lets through too early is offered to it.
+            Burst::Stream => {
+                let who = self.honest[at].who;
+                let (count, apart) = (10 + self.court.below(40), 5 + self.court.below(30));
+                for _ in 0..count {
+                    if self.honest[at].who != who || !self.honest[at].is_active() {
+                        return;
+                    }
+                    self.desk(at).stream();
+                    self.pass(Duration::from_millis(apart as u64)).await;
+                }
+            }
+            // More than an outbox holds, while somebody does not read.
+            Burst::Flood => {
+                if self.plan.scarce || self.plan.room < FLOODED_ROOM {
+                    return;
+                }
+                if let Some(deaf) = self.desk(at).flood() {
+                    self.stall(deaf);
+                }
+            }
+            Burst::LongComputation => self.desk(at).compute_long(),
+            Burst::CancelAnothers => self.desk(at).cancel_anothers(),
+        }
+    }
+
+    /// A client reads nothing for a while.
+    fn stall(&mut self, at: usize) {
+        let time = Duration::from_millis(100 + self.court.below(12_000) as u64);
+        let one = &mut self.honest[at];
+        one.client.pause(true);
+        one.is_hampered = true;
+        one.stalled_until = Some(Instant::now() + time);
     }
 
     fn desk(&mut self, at: usize) -> Desk<'_> {
@@ -290,13 +345,7 @@ impl Course {
         self.court.note("fault", format!("{fault:?}").as_bytes());
         let at = self.court.below(self.honest.len());
         match fault {
-            Fault::Stall => {
-                let time = Duration::from_millis(100 + self.court.below(12_000) as u64);
-                let one = &mut self.honest[at];
-                one.client.pause(true);
-                one.is_hampered = true;
-                one.stalled_until = Some(Instant::now() + time);
-            }
+            Fault::Stall => self.stall(at),
             Fault::Vanish => self.honest[at] = self.replace(at),
             Fault::ResetMidFrame => {
                 self.abandon(at);

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
+use pendularm::protocol::outbox::MAX_TOPIC_BYTES;
 use serde_json::Value;
 use tokio::time::Instant;
 
@@ -34,6 +35,8 @@ const FUNCTIONS: [&str; 4] = ["sin(t)", "-9.81", "t^2 / (1 + t)", "exp(-t) * cos
 const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Turns after which what was sent has been handled, through the narrowest pipe.
 const SETTLED: u64 = 1000;
+/// Bytes of a message in a flood: as many as are read where they come.
+const FLOODING: usize = 60_000;
 const DAY: Duration = Duration::from_secs(24 * 3600);
 
 /// Numbers that tell all calls and messages of a seed apart.
@@ -283,15 +286,25 @@ impl Desk<'_> {
 
     fn publish(&mut self) {
         let topic = self.court.among(&TOPICS);
-        let (who, link) = (self.me().who, self.me().is_active());
+        self.advertise(topic);
+        let count = self.court.among(&[1, 2, 6, 40]);
+        self.publish_on(topic, count, |desk| desk.payload(0));
+    }
+
+    fn advertise(&mut self, topic: &str) {
         if self.me().advertised.insert(topic.to_owned()) {
             let spelling = self.spelled(topic);
             self.send(&format!(
                 "{{\"op\":\"advertise\",\"topic\":\"{spelling}\"}}"
             ));
         }
-        for _ in 0..self.court.among(&[1, 2, 6, 40]) {
-            let (number, more) = (self.numbers.next(), self.payload(0));
+    }
+
+    /// So many messages on a topic that this client advertises.
+    pub fn publish_on(&mut self, topic: &str, count: usize, payload: impl Fn(&Self) -> String) {
+        let (who, link) = (self.me().who, self.me().is_active());
+        for _ in 0..count {
+            let (number, more) = (self.numbers.next(), payload(self));
             let body = format!("{{\"from\":{who},\"number\":{number},\"more\":{more}}}");
             let spelling = self.spelled(topic);
             let frame = match self.court.below(4) {
@@ -309,9 +322,13 @@ impl Desk<'_> {
                 let style = self.style();
                 self.me().send_pieces(&frame, 150, style);
             } else {
-                // Line behind line they go through as one.
                 self.court.note("sends", frame.as_bytes());
-                self.me().send(&frame, 0);
+                if self.plan.together {
+                    // Line behind line they go through as one.
+                    self.me().send_with_next(&frame);
+                } else {
+                    self.me().send(&frame, 0);
+                }
             }
             let message = Message {
                 topic: topic.to_owned(),
@@ -340,6 +357,39 @@ impl Desk<'_> {
                 }
             }
         }
+        self.me().flush();
+    }
+
+    /// One message, on a topic whose messages are throttled for somebody, if there is such.
+    pub fn stream(&mut self) {
+        let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
+        let throttled = subscriptions.filter(|one| one.throttle.is_some());
+        let topic = throttled.map(|one| one.topic.clone()).min();
+        let topic = topic.unwrap_or_else(|| TOPICS[0].to_owned());
+        self.advertise(&topic);
+        self.publish_on(&topic, 1, |desk| desk.payload(0));
+    }
+
+    /// More than an outbox holds, for another client that subscribes to it; gives that one's place.
+    pub fn flood(&mut self) -> Option<usize> {
+        let at = self.at;
+        let listens = |(place, one): (usize, &Honest)| {
+            let mut all = one.subscriptions.values();
+            let plain = all.find(|one| one.phase == Phase::On && one.throttle.is_none())?;
+            (place != at && one.is_active()).then(|| (place, plain.topic.clone()))
+        };
+        let (deaf, topic) = self.all.iter().enumerate().find_map(listens)?;
+        // A thousand pieces of each of its messages would take all the time there is. Hostile clients ask for them on one topic.
+        let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
+        let are_pieces = |one: &Subscription| one.is_in_pieces && one.topic == topic;
+        if topic == TOPICS[1] || subscriptions.into_iter().any(are_pieces) {
+            return None;
+        }
+        self.advertise(&topic);
+        self.court.count("floods");
+        let long = format!("\"{}\"", "x".repeat(FLOODING));
+        self.publish_on(&topic, 3 * MAX_TOPIC_BYTES / 2 / FLOODING, |_| long.clone());
+        Some(deaf)
     }
 
     fn subscribe(&mut self, feature: Feature) {
@@ -382,6 +432,7 @@ impl Desk<'_> {
             phase: Phase::Asked,
             throttle,
             is_binary,
+            is_in_pieces: feature == Feature::Pieces,
             pending,
             last: None,
             is_last_from_before: false,
@@ -512,16 +563,7 @@ impl Desk<'_> {
         let method = self.court.below(Method::ALL.len());
         let name = Method::ALL[method].name();
         match self.court.below(40) {
-            // It takes the processor as long as all else together.
-            0 => {
-                let args = "{\"params\":{\"gravity\":9.81}}";
-                self.call(
-                    "/study/stability",
-                    args,
-                    Expect::Member("advised_timestep"),
-                    false,
-                );
-            }
+            0 => self.compute_long(),
             1..16 => {
                 let q0: Vec<f64> = (0..self.plan.links)
                     .map(|_| self.number(-1.0, 1.0))
@@ -576,6 +618,13 @@ impl Desk<'_> {
         }
     }
 
+    /// What takes longer than all else that clients compute: others' computations have their turns beside it.
+    pub fn compute_long(&mut self) {
+        let args = "{\"params\":{\"gravity\":9.81}}";
+        let expect = Expect::Member("advised_timestep");
+        self.call("/study/stability", args, expect, false);
+    }
+
     fn target(&self) -> String {
         let reach = self.plan.links as f64 * 0.7;
         let (y, x) = self.number(0.0, 6.0).sin_cos();
@@ -591,11 +640,10 @@ impl Desk<'_> {
             .collect();
         if !goals.is_empty() && self.court.chance(0.4) {
             let id = self.court.among(&goals);
-            // It may have ended meanwhile.
-            self.me().mistakes += 1;
-            return self.send(&format!(
-                "{{\"op\":\"cancel_action_goal\",\"action\":\"/ik_action\",\"id\":{id}}}"
-            ));
+            if let Some(goal) = self.me().calls.get_mut(&id) {
+                goal.is_cancelled = true;
+            }
+            return self.cancel(&id);
         }
         let (id, args, has_feedback) = (self.id(), self.target(), self.court.chance(0.5));
         self.send(&format!(
@@ -608,8 +656,33 @@ impl Desk<'_> {
             .note_call(&id, &format!("/ik_action {args}"), expect, false, court);
     }
 
+    fn cancel(&mut self, id: &str) {
+        // It may have ended meanwhile.
+        self.me().mistakes += 1;
+        self.send(&format!(
+            "{{\"op\":\"cancel_action_goal\",\"action\":\"/ik_action\",\"id\":{id}}}"
+        ));
+    }
+
+    /// Asks for the end of a goal that another client has sent, which must not end it.
+    pub fn cancel_anothers(&mut self) {
+        let who = self.me().who;
+        let others = self.all.iter().filter(|one| one.who != who);
+        let goals: Vec<String> = others
+            .flat_map(|one| &one.calls)
+            .filter(|(_, call)| matches!(call.expect, Expect::Goal { .. }))
+            .map(|(id, _)| id.clone())
+            .collect();
+        if !goals.is_empty() {
+            let id = self.court.among(&goals);
+            self.cancel(&id);
+        }
+    }
+
     fn goal(&mut self) {
         if self.court.chance(0.3) {
+            // Whoever asks for that ends whosever goal is active.
+            self.model.ends_any_goal = true;
             return self.call("/ik_action/cancel_goal", "{}", Expect::Anything, true);
         }
         let args = self.target();

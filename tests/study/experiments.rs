@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::step_under;
-use pendularm::report::experiments::conditioning::{Pose, digits_lost};
+use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::forcing::{COARSEST, DURATION, FORCES};
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, arrives, is_carried, move_of, spun,
@@ -157,7 +157,7 @@ fn moves_and_swings_are_lost_at_long_steps_only() {
 /// A link folded back onto the one before, under a tip a billion times heavier: what is lost lies in the angles' last bits.
 #[test]
 fn folded_arms_with_a_heavy_tip_lose_what_the_angles_have_lost() {
-    let lost = digits_lost(1e9, Pose::Folded, 200).unwrap();
+    let lost = digits_lost(1e9, PoseShape::Folded, 200).unwrap();
     println!("{lost:?}");
     assert!(lost.inherent.1 > 6.0, "{lost:?}");
     assert!(lost.recursion.1 < lost.inherent.1 + 2.5, "{lost:?}");

@@ -11,7 +11,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::report::experiments::measure::{STEPS, growth};
-use pendularm::report::experiments::reference::{Law, Reference};
+use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::gains::{GainsSearch, MOVES, SETTLED, Wish};
 use pendularm::study::linear::{Linear, equilibrium};
@@ -318,7 +318,7 @@ fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
         let steps = (duration / candidate.timestep).round() as usize;
         let every = (steps / 10).max(1);
         let spacing = candidate.timestep * every as f64;
-        let truth = Reference::of(&arm, &start, &Law::FREE, spacing, steps / every);
+        let truth = ReferenceMotion::of(&arm, &start, &Law::FREE, spacing, steps / every);
         let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
         for index in 0..truth.len() {
             live.advance(every as u64);
@@ -357,7 +357,7 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
         .iter()
         .map(|time| time - std::mem::replace(&mut before, *time))
         .collect();
-    let truth = Reference::between(&arm, &start, &Law::FREE, &intervals);
+    let truth = ReferenceMotion::between(&arm, &start, &Law::FREE, &intervals);
     let off = (0..truth.len()).map(|index| {
         let position = &rollout.positions()[index + 1];
         truth.angle_error(index, position).unwrap()

@@ -58,6 +58,8 @@ mod order;
 mod pause_reset;
 mod pid;
 mod readme;
+#[cfg(feature = "record")]
+mod record;
 mod rosapi;
 mod series;
 mod services;

@@ -8,12 +8,11 @@
 
 use std::hint::black_box;
 
-use pendularm::math::arm::{Arm, State};
 use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
-use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
+use pendularm::math::pid::Gains;
+use pendularm::report::experiments::step_scene::{ready, undamped};
 
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
@@ -21,28 +20,11 @@ where
 {
     let has = |word: &str| what.split('-').any(|part| part == word);
     let gravity = if has("weightless") { 0.0 } else { 9.81 };
-    let arm = Arm::<N>::new([1.0; N], [1.0; N], gravity).expect("an arm");
-    let mut gains = Gains::<N>::default();
-    if has("pd") {
-        gains.ki = [0.0; N];
-    }
+    let control = ["pd", "pi", "pid", "pushed"].iter().any(|law| has(law));
+    let mut simulation = ready::<N>(gravity, !has("pd"), control, method);
     if has("pi") {
-        gains.kd = [0.0; N];
-        // Undamped, an integral would drive it away.
-        gains.ki = gains.ki.map(|ki| 1e-3 * ki);
+        simulation.set_gains(undamped());
     }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    // Angles stay small enough for one path through sine and cosine.
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(["pd", "pi", "pid", "pushed"].iter().any(|law| has(law)));
     if has("pushed") {
         simulation.disturb([0.0; N], 1e9);
     }

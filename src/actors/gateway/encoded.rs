@@ -10,8 +10,8 @@ use bytes::Bytes;
 use serde_json::Value;
 use tokio::sync::OnceCell;
 
-use super::aside::{Errand, aside};
-use super::budget::Memory;
+use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::resources::budget::Memory;
 use crate::protocol::messages;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::ros::cbor;

@@ -11,11 +11,11 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::{Notify, oneshot};
 
-use super::budget::Account;
 use super::encoded::Encoded;
 use crate::actors::ConnectionId;
 pub use crate::actors::node::{Feedback, Publish, Respond};
-use crate::protocol::catalog::Service;
+use crate::actors::resources::budget::Account;
+use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::op::Op;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::payload::Payload;
@@ -138,6 +138,43 @@ impl Handled {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Census")]
 pub struct TakeCensus;
+
+/// Something that passes the registry, for whoever overhears it.
+pub enum Overheard<'a> {
+    /// A message of the runtime, as the whole `publish` frame.
+    Published(Topic, &'a Bytes),
+    /// A client's message on a topic that the runtime listens to.
+    Heard(Topic, &'a Payload),
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client.
+        from: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, if there is one.
+        id: Option<&'a Payload>,
+        /// The arguments.
+        args: &'a Payload,
+    },
+    /// The answer to such a call, as the whole frame.
+    Answered {
+        /// The client.
+        to: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The frame.
+        frame: &'a Bytes,
+    },
+}
+
+/// Overhears what passes, on the registry's thread, and may not wait.
+pub type Eavesdropper = Box<dyn FnMut(Overheard<'_>) + Send>;
+
+/// From now on this one overhears what passes, or nobody does; every topic of the runtime counts as subscribed to
+/// meanwhile. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Overhear(pub Option<Eavesdropper>);
 
 /// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
 #[derive(Message)]

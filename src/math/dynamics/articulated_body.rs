@@ -56,8 +56,8 @@ pub fn forward_dynamics<const N: usize>(
     recursion(arm, arm.gravity(), q, qd, tau)
 }
 
-/// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero, for
-/// fewer instructions. The first angle is not looked at, not even whether it is finite.
+/// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
+/// for fewer instructions. The first angle is not looked at, not even whether it is finite.
 #[must_use]
 #[inline(always)]
 pub fn weightless_dynamics<const N: usize>(

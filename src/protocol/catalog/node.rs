@@ -21,6 +21,8 @@ table! {
         Gateway = "gateway",
         /// Tells what there is.
         Rosapi = "rosapi",
+        /// Runs on record.
+        Recorder if "record" = "recorder",
     }
 }
 

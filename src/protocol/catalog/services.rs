@@ -197,6 +197,21 @@ table! {
             ])
             .computation()
             .all_or_nothing(),
+        /// Begins a record.
+        RecorderStart if "record" =
+            service("/recorder/start", "pendularm_interfaces/srv/RecorderStart", Node::Recorder)
+            .request(fields![optional("name", "string", "")])
+            .response(fields![required("file", "string", "")])
+            .all_or_nothing(),
+        /// Ends the record.
+        RecorderStop if "record" =
+            service("/recorder/stop", "pendularm_interfaces/srv/RecorderStop", Node::Recorder)
+            .response(fields![
+                required("file", "string", ""),
+                required("messages", "uint64", ""),
+                required("bytes", "uint64", ""),
+                required("dropped", "uint64", ""),
+            ]),
     }
     /// A question of rosapi, under either of its prefixes.
     Rosapi(Rosapi),

@@ -44,8 +44,14 @@ pub fn with_parts(first: Type) -> Vec<Type> {
 /// The text that defines a type and all types in it, as `.msg` files have it, units in comments.
 #[must_use]
 pub fn full_text(name: &str) -> Option<String> {
+    find(name).map(definition)
+}
+
+/// The same for a type that need not be of the catalog.
+#[must_use]
+pub fn definition(first: Type) -> String {
     let mut text = String::new();
-    for (index, one) in with_parts(find(name)?).into_iter().enumerate() {
+    for (index, one) in with_parts(first).into_iter().enumerate() {
         if index > 0 {
             text.push_str(&SEPARATOR.repeat(80));
             text.push_str("\nMSG: ");
@@ -54,7 +60,7 @@ pub fn full_text(name: &str) -> Option<String> {
         }
         text.push_str(&own_text(one));
     }
-    Some(text)
+    text
 }
 
 fn own_text(one: Type) -> String {

@@ -11,7 +11,7 @@ use std::fmt;
 
 use serde_json::value::RawValue;
 
-pub use super::rejections::{Bound, Reason, Rejection, Rejections};
+pub use super::rejections::{Bound, Reason, RejectedField, Rejections};
 
 use crate::protocol::catalog::{Field, Service};
 use crate::protocol::op::Arguments;
@@ -37,10 +37,10 @@ impl<'a> Fields<'a> {
     ///
     /// # Errors
     /// Where a positional array has more entries than the service has fields.
-    pub fn read(args: &'a Arguments, service: Service) -> Result<Self, Rejection> {
+    pub fn read(args: &'a Arguments, service: Service) -> Result<Self, RejectedField> {
         let mut read = Self::of(service);
         let (fields, values) = (read.fields, &mut read.values);
-        let refused = |reason| Rejection {
+        let refused = |reason| RejectedField {
             field: "args".to_owned(),
             reason,
         };
@@ -75,7 +75,8 @@ impl<'a> Fields<'a> {
         Ok(read)
     }
 
-    /// The same; arguments that are rejected as a whole count as none, so that the answer can echo the values as they are.
+    /// The same; arguments that are rejected as a whole count as none, so that the answer can echo the values as they
+    /// are.
     #[must_use]
     pub fn read_or_none(args: &'a Arguments, service: Service) -> Self {
         Self::read(args, service).unwrap_or_else(|rejection| Self {
@@ -237,7 +238,7 @@ impl<'a> Fields<'a> {
 
     /// Returns the rejections so far, in the order of reading.
     #[must_use]
-    pub fn rejections(&self) -> &[Rejection] {
+    pub fn rejections(&self) -> &[RejectedField] {
         self.rejections.as_slice()
     }
 
@@ -288,7 +289,7 @@ impl<'a> Fields<'a> {
     }
 
     fn rejected_as<T>(&mut self, name: &str, reason: Reason) -> Option<T> {
-        self.rejections.push(Rejection {
+        self.rejections.push(RejectedField {
             field: format!("{}{name}", self.prefix),
             reason,
         });

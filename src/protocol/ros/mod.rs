@@ -4,6 +4,7 @@
 
 pub mod cbor;
 pub mod cdr;
+pub mod cdr_reader;
 pub mod parameters;
 pub mod rosapi;
 pub mod urdf;

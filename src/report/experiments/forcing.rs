@@ -5,11 +5,12 @@
 //! | smooth | nothing: every method has its order |
 //! | kink | the order: at `|t - c|` no derivative beyond the first exists, and what is left is order 2 |
 //! | jump | the order: at a step of the force what is left is order 1 |
-//! | fast | nothing but patience: it looks stiff, but nothing feeds back, so that every timestep is stable and only short ones are right |
+//! | fast | nothing but patience: it looks stiff, but nothing feeds back, and no timestep is unstable |
 //! | aliased | the sampling: where a period falls on whole steps every step sees the same force |
 //! | growing | nothing, in parts of what it has grown to |
 //!
-//! Where a kink lies within its step decides about its error, so several kinks are tried and the mean of squares is taken.
+//! Where a kink lies within its step decides about its error, so several kinks are tried and the mean of squares is
+//! taken.
 //!
 //! **Invariant:** what is run is the service's own computation, expression and all.
 
@@ -115,8 +116,8 @@ pub const FORCES: [Force; 6] = [
 ];
 
 impl Force {
-    /// The largest error over a run of `steps` steps, in parts of the farthest that the particle truly comes; `None` if it
-    /// cannot be run.
+    /// The largest error over a run of `steps` steps, in parts of the farthest that the particle truly comes; `None`
+    /// if it cannot be run.
     #[must_use]
     pub fn error(&self, method: Method, steps: u64) -> Option<f64> {
         let tries = if self.varied { TRIES } else { 1 };

@@ -1,9 +1,11 @@
-//! Stability beyond small deviations: moves of any amplitude, swings of any speed, and deviations from a periodic swing.
+//! Stability beyond small deviations: moves of any amplitude, swings of any speed, and deviations from a periodic
+//! swing.
 //!
-//! A move or a swing is run and judged by what becomes of it. Deviations from a periodic swing are followed by the method's own
-//! derivative, step after step around the swing: the eigenvalues of the product are the method's Floquet multipliers. Two of
-//! the true ones are 1 (along the swing, and to the swing of a little more energy); the other pair says whether what is beside the
-//! swing stays there. Source: Guckenheimer and Holmes, *Nonlinear Oscillations* (1983), ch. 1.5.
+//! A move or a swing is run and judged by what becomes of it. Deviations from a periodic swing are followed by the
+//! method's own derivative, step after step around the swing: the eigenvalues of the product are the method's Floquet
+//! multipliers. Two of the true ones are 1 (along the swing, and to the swing of a little more energy); the other
+//! pair says whether what is beside the swing stays there. Source: Guckenheimer and Holmes, *Nonlinear Oscillations*
+//! (1983), ch. 1.5.
 //!
 //! **Invariant:** no prediction enters a measurement.
 
@@ -31,7 +33,8 @@ const ARRIVED: f64 = 0.02;
 /// Time of a swing \[s\].
 const SWING: f64 = 4.0;
 
-/// The move of a 2-link arm from the starting pose, whose first joint turns by `amplitude` \[rad\], under the default gains.
+/// The move of a 2-link arm from the starting pose, whose first joint turns by `amplitude` \[rad\], under the default
+/// gains.
 #[must_use]
 pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> {
     let setpoint = Setpoint::at([amplitude, -0.75 * amplitude]);
@@ -78,8 +81,8 @@ pub fn is_carried(start: &State<2>, method: Method, timestep: f64) -> bool {
     true
 }
 
-/// A swing of the free default arm that comes back to where it began: from rest, both links to one side, through the hanging
-/// pose to rest on the other side, and back.
+/// A swing of the free default arm that comes back to where it began: from rest, both links to one side, through the
+/// hanging pose to rest on the other side, and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeriodicSwing {
     /// Where it is at rest.
@@ -92,8 +95,8 @@ pub struct PeriodicSwing {
 const FINE: f64 = 1e-3;
 
 impl PeriodicSwing {
-    /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest; none if none is found near the one of
-    /// small amplitude.
+    /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest; none if none is found near
+    /// the one of small amplitude.
     #[must_use]
     pub fn of(amplitude: f64) -> Option<Self> {
         // Of the slow mode of two equal rods: q₂ per q₁.

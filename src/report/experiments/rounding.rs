@@ -1,8 +1,8 @@
 //! What rounding makes of energy over very many steps, with the rounding of sums carried along and without.
 //!
 //! A regular swing keeps its energy, so all that changes it is the method's truncation and rounding. With small steps
-//! truncation is out of sight, and rounding alone is left: errors that have no sign on average add up like a random walk,
-//! with the root of the number of steps; a rounding that leans to one side adds up in proportion to it.
+//! truncation is out of sight, and rounding alone is left: errors that have no sign on average add up like a random
+//! walk, with the root of the number of steps; a rounding that leans to one side adds up in proportion to it.
 //!
 //! **Invariant:** both ways take the same increments; only how they are added differs.
 

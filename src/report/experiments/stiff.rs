@@ -1,17 +1,17 @@
 //! Where explicit methods end: the cost of an error as the arm gets stiffer, beside two implicit methods.
 //!
-//! The arm is let go from a bent pose, with a brake at its elbow: an effort `-d q̇₂` at every instant. The stronger the brake,
-//! or the lighter the link that it brakes, the faster the elbow's own rate `d (M⁻¹)₂₂` beside that of the swing; the motion
-//! hardly changes. An explicit method has to follow that rate, an implicit one has not.
+//! The arm is let go from a bent pose, with a brake at its elbow: an effort `-d q̇₂` at every instant. The stronger
+//! the brake, or the lighter the link that it brakes, the faster the elbow's own rate `d (M⁻¹)₂₂` beside that of the
+//! swing; the motion hardly changes. An explicit method has to follow that rate, an implicit one has not.
 //!
 //! | baseline | order | stable | evaluations of a step, with `2 N` for a Jacobian by differences |
 //! | --- | --- | --- | --- |
 //! | implicit midpoint | 2 | for every rate that decays | 1 for the start, one for each iteration |
 //! | Rodas3 | 3 | for every rate that decays; what is infinitely fast is gone after a step | 3 |
 //!
-//! The baselines are here for the report alone: none can be selected on the live arm. Source: Hairer and Wanner, *Solving
-//! Ordinary Differential Equations II* (1996), ch. IV.3 and IV.7; for Rodas3, Sandu et al., *Atmospheric Environment* 31
-//! (1997).
+//! The baselines are here for the report alone: none can be selected on the live arm. Source: Hairer and Wanner,
+//! *Solving Ordinary Differential Equations II* (1996), ch. IV.3 and IV.7; for Rodas3, Sandu et al., *Atmospheric
+//! Environment* 31 (1997).
 //!
 //! **Invariant:** every evaluation is counted, those for Jacobians too.
 

@@ -3,10 +3,10 @@
 //! **Invariant:** the truth behind the digits is known to at least ten more of them.
 
 use crate::report::csv::Csv;
-use crate::report::experiments::conditioning::{Lost, Pose, digits_lost};
+use crate::report::experiments::conditioning::{Lost, PoseShape, digits_lost};
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
-use crate::report::svg::{Axis, Key, Marker, Plot, Point, Series, Unit, number, power};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, power};
 
 /// Digits that the recursion may lose at worst.
 const ALLOWED: f64 = 2.5;
@@ -23,9 +23,9 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     );
     let mut panels: Vec<(&str, Vec<Column>)> = Vec::new();
     for (title, pose) in [
-        ("3 links, bent", Pose::Bent),
-        ("3 links, stretched", Pose::Stretched),
-        (FOLDED, Pose::Folded),
+        ("3 links, bent", PoseShape::Bent),
+        ("3 links, stretched", PoseShape::Stretched),
+        (FOLDED, PoseShape::Folded),
     ] {
         let mut columns = Vec::new();
         for exponent in -9..=9 {
@@ -141,7 +141,7 @@ fn figure(panels: &[(&str, Vec<Column>)], worst: f64) -> Figure {
                         ),
                     )
                 });
-                plot.series.push(Series {
+                plot.series.push(Curve {
                     class,
                     marker,
                     line: true,
@@ -164,8 +164,8 @@ fn figure(panels: &[(&str, Vec<Column>)], worst: f64) -> Figure {
     Figure::new(
         "conditioning",
         format!(
-            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most \
-             of them",
+            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most of \
+             them",
             number(worst)
         ),
         "Worst of all sampled states. The dashed line is what the last bit of an angle changes by itself: no way of \

@@ -1,6 +1,7 @@
 //! Orders under forces that are hard on a method.
 //!
-//! **Invariant:** an order is fitted where truncation is all there is, and not where nothing is to be seen but rounding.
+//! **Invariant:** an order is fitted where truncation is all there is, and not where nothing is to be seen but
+//! rounding.
 
 use super::slope::slope;
 use crate::math::count::in_f64;
@@ -9,7 +10,7 @@ use crate::report::csv::Csv;
 use crate::report::experiments::forcing::{COARSEST, DURATION, FORCES, Force};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Key, Plot, Point, Series, Unit, number, power, seconds};
+use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, power, seconds};
 
 /// Errors below this are rounding as much as truncation.
 const ROUNDING: f64 = 1e-12;
@@ -127,7 +128,7 @@ fn figure(lines: &[Convergence]) -> Figure {
                     let words = format!("{}, {}: {}", line.method, seconds(dt), number(error));
                     Point::new(dt, error.max(1e-16), words)
                 });
-                plot.series.push(Series::of(line.method, points.collect()));
+                plot.series.push(Curve::of(line.method, points.collect()));
             }
             plot
         })

@@ -6,6 +6,7 @@ mod budget;
 mod conditioning;
 mod drift;
 mod error;
+mod floquet;
 mod forcing;
 mod horizon;
 mod nonlinear;

@@ -1,15 +1,16 @@
-//! Stability beyond small deviations: by amplitude of a move, by speed of a swing, and beside a periodic swing.
+//! Stability beyond small deviations: by amplitude of a move and by speed of a swing.
 //!
 //! **Invariant:** every cell is measured; predictions are drawn over them and nothing is filled in.
 
+use super::floquet::Floquet;
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
-use crate::report::experiments::nonlinear::{PeriodicSwing, arrives, is_carried, move_of, spun};
+use crate::report::experiments::nonlinear::{arrives, is_carried, move_of, spun};
 use crate::report::making::Making;
-use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Heat, Key, Plot, Point, Series, Unit, number, scientific, seconds};
+use crate::report::section::{Block, Figure, Section, Verdict};
+use crate::report::svg::{Axis, Curve, Heat, Key, Plot, Unit};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::Motion;
 use crate::study::stability::{limit_held, limits};
@@ -19,13 +20,6 @@ const MOVE_STEPS: (f64, f64) = (5e-4, 2e-2);
 const AMPLITUDES: (f64, f64) = (0.1, 100.0);
 const SWING_STEPS: (f64, f64) = (1e-3, 0.5);
 const SPINS: (f64, f64) = (0.3, 300.0);
-
-/// Amplitudes of the periodic swings \[rad\], and steps of a method in one of their periods.
-const SWINGS: [f64; 7] = [0.1, 0.3, 0.6, 0.9, 1.2, 1.5, 1.8];
-const PER_PERIOD: [u32; 7] = [16, 32, 64, 128, 256, 512, 1024];
-
-/// The swing whose multipliers are shown by timestep.
-const SHOWN: f64 = 0.6;
 
 /// A map of one method: cells that fail, and the predicted line.
 struct MotionMap {
@@ -74,7 +68,8 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         }
     }
     making.keep("nonlinear-map", csv);
-    let floquet = Floquet::of(making);
+    let floquet = Floquet::of_swings();
+    making.at(9, 9);
     making.keep("floquet", floquet.csv());
     let advised = within(&moves, MOVE_STEPS, columns, 0.8);
     let carried = within(&swings, SWING_STEPS, columns, 0.8);
@@ -142,8 +137,8 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
     maps
 }
 
-/// Free swings: limited by the frequency of small ones, and by their speed. A method that lets small swings grow at every
-/// timestep is limited by the speed alone here, for in four seconds little comes of that.
+/// Free swings: limited by the frequency of small ones, and by their speed. A method that lets small swings grow at
+/// every timestep is limited by the speed alone here, for in four seconds little comes of that.
 fn spins(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
     let mut maps = Vec::new();
     for method in Method::ALL {
@@ -204,7 +199,7 @@ fn map_figure(moves: &[MotionMap], swings: &[MotionMap], columns: usize) -> Figu
                 .zip(&map.rows)
                 .map(|(value, (limit, _))| (*limit, value))
                 .filter(|(limit, _)| *limit <= steps.1);
-            plot.series.push(Series::line("ink", line));
+            plot.series.push(Curve::line("ink", line));
             plots.push(plot);
         }
     }
@@ -220,190 +215,4 @@ fn map_figure(moves: &[MotionMap], swings: &[MotionMap], columns: usize) -> Figu
         &[Key::line("ink", "predicted limit")],
         &plots,
     )
-}
-
-/// Multipliers of the methods, by amplitude and by timestep.
-struct Floquet {
-    /// Amplitude, period, and the true multiplier's modulus.
-    true_ones: Vec<(f64, f64, f64)>,
-    /// Method, amplitude, timestep, modulus.
-    of_methods: Vec<(Method, f64, f64, f64)>,
-}
-
-impl Floquet {
-    fn of(making: &mut Making<'_>) -> Self {
-        let mut floquet = Self {
-            true_ones: vec![],
-            of_methods: vec![],
-        };
-        for amplitude in SWINGS {
-            let Some(swing) = PeriodicSwing::of(amplitude) else {
-                continue;
-            };
-            // So many steps of order 4 are the truth.
-            let truth = swing.transverse(Method::Rk4, 4096);
-            floquet.true_ones.push((amplitude, swing.period, truth));
-            for method in Method::ALL {
-                for steps in PER_PERIOD {
-                    let modulus = swing.transverse(method, steps);
-                    let h = swing.period / f64::from(steps);
-                    floquet.of_methods.push((method, amplitude, h, modulus));
-                }
-            }
-        }
-        making.at(9, 9);
-        floquet
-    }
-
-    fn csv(&self) -> Csv {
-        let mut csv = Csv::new("method,amplitude,dt,modulus");
-        for (amplitude, _, modulus) in &self.true_ones {
-            csv.row(&[
-                "true".into(),
-                (*amplitude).into(),
-                0.0.into(),
-                (*modulus).into(),
-            ]);
-        }
-        for (method, amplitude, h, modulus) in &self.of_methods {
-            csv.row(&[
-                method.name().into(),
-                (*amplitude).into(),
-                (*h).into(),
-                (*modulus).into(),
-            ]);
-        }
-        csv
-    }
-
-    fn shown(&self, method: Method) -> impl Iterator<Item = (f64, f64)> {
-        self.of_methods
-            .iter()
-            .filter(move |run| run.0 == method && run.1.to_bits() == SHOWN.to_bits())
-            .map(|run| (run.2, run.3))
-    }
-
-    fn finding(&self) -> String {
-        let first_unstable = self.true_ones.iter().find(|swing| swing.2 > 1.001);
-        let words = first_unstable.map_or_else(
-            || "none of these swings is unstable by itself".to_owned(),
-            |(amplitude, _, modulus)| {
-                format!(
-                    "from an amplitude of {} rad on the swing itself is unstable (multiplier {}), and no method can \
-                     follow it for long",
-                    number(*amplitude),
-                    number(*modulus)
-                )
-            },
-        );
-        format!(
-            "**Beside a periodic swing of 2 links deviations stay small only while the swing is small**: {words}."
-        )
-    }
-
-    /// Where the true multipliers lie on the unit circle, a method's come to it with its order; Euler's and midpoint's from
-    /// outside.
-    fn verdict(&self) -> Verdict {
-        let off = |method: Method| -> Vec<f64> {
-            self.shown(method)
-                .map(|(_, modulus)| modulus - 1.0)
-                .collect()
-        };
-        let grows = [Method::Euler, Method::Midpoint]
-            .iter()
-            .all(|method| !off(*method).is_empty() && off(*method).iter().all(|off| *off > -1e-9));
-        let seen: Vec<String> = Method::ALL
-            .iter()
-            .map(|method| {
-                let at = off(*method).get(3).copied().unwrap_or(f64::NAN);
-                format!(
-                    "{method} 1 {} {}",
-                    if at < 0.0 { "-" } else { "+" },
-                    scientific(at.abs())
-                )
-            })
-            .collect();
-        Verdict {
-            claim: format!(
-                "Beside the swing of {SHOWN} rad, whose own multipliers are on the unit circle, deviations grow under \
-                 Euler and midpoint at every timestep"
-            ),
-            seen: format!("at 128 steps a period: {}", seen.join(", ")),
-            holds: grows,
-        }
-    }
-
-    fn figure(&self) -> Figure {
-        let mut by_amplitude = Plot::new(
-            "The swing itself",
-            Axis::linear("amplitude of the first joint [rad]", 0.0, 2.0),
-            Axis::log_between("largest multiplier of a period", Unit::Number, 0.5, 1e3),
-        );
-        let points = self.true_ones.iter().map(|(amplitude, period, modulus)| {
-            let told = format!(
-                "period {}, multiplier {}",
-                seconds(*period),
-                number(*modulus)
-            );
-            Point::new(*amplitude, *modulus, words)
-        });
-        by_amplitude.series.push(Series {
-            class: "ink",
-            marker: crate::report::svg::Marker::Circle,
-            line: true,
-            dashed: false,
-            points: points.collect(),
-        });
-        let mut by_timestep = Plot::new(
-            format!("Methods, amplitude {SHOWN} rad"),
-            Axis::log_between("timestep", Unit::Seconds, 1e-3, 0.3),
-            Axis::log_between("| multiplier - 1 |", Unit::Number, 1e-13, 10.0),
-        );
-        for method in Method::ALL {
-            let points = self.shown(method).map(|(h, modulus)| {
-                let sign = if modulus > 1.0 { "grows" } else { "dies out" };
-                let off = (modulus - 1.0).abs();
-                Point::new(
-                    h,
-                    off.max(1e-13),
-                    format!("{method}: {sign}, {}", scientific(off)),
-                )
-            });
-            by_timestep
-                .series
-                .push(Series::of(method, points.collect()));
-        }
-        Figure::new(
-            "floquet",
-            "Floquet multipliers along a periodic swing",
-            "2 links swing from rest on one side through the hanging pose to rest on the other and back, without \
-             control. Left: the true multiplier of the pair beside the swing; above 1 the swing is unstable \
-             by itself. Right: how far from the unit circle a method puts it, by timestep; the table says to which \
-             side.",
-            &Key::methods(),
-            &[by_amplitude, by_timestep],
-        )
-    }
-
-    fn table(&self) -> Table {
-        let mut head = vec!["Method".to_owned()];
-        let steps: Vec<f64> = self.shown(Method::Euler).map(|(h, _)| h).collect();
-        head.extend(steps.iter().map(|h| seconds(*h)));
-        let head: Vec<&str> = head.iter().map(String::as_str).collect();
-        let mut table = Table::new(
-            "floquet",
-            format!("Multiplier less 1 beside the swing of {SHOWN} rad"),
-            "Positive: deviations grow; negative: they die out, where in truth they neither grow nor die out.",
-            &head,
-        );
-        for method in Method::ALL {
-            let mut row = vec![Cell::method(method)];
-            row.extend(
-                self.shown(method)
-                    .map(|(_, modulus)| Cell::new(scientific(modulus - 1.0))),
-            );
-            table.rows.push(row);
-        }
-        table
-    }
 }

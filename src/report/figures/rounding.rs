@@ -7,7 +7,7 @@ use crate::report::csv::Csv;
 use crate::report::experiments::rounding::{Adding, energy_error, law};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Key, Plot, Series, Unit, number, power, scientific, seconds};
+use crate::report::svg::{Axis, Curve, Key, Plot, Unit, number, power, scientific, seconds};
 
 /// Timestep \[s\]: so short that truncation of Runge-Kutta 4 is out of sight for 1e8 steps.
 const TIMESTEP: f64 = 2e-5;
@@ -124,14 +124,14 @@ fn figure(runs: &[EnergyRun]) -> Figure {
             );
             for run in runs.iter().filter(|run| run.adding == *adding) {
                 let points = run.points.iter().filter(|point| point.1 > 0.0).copied();
-                plot.series.push(Series::line(run.method.name(), points));
+                plot.series.push(Curve::line(run.method.name(), points));
             }
             // Two laws to hold the lines against.
             for (power, from) in [(0.5, 1e-15), (1.0, 1e-15)] {
                 let ends = [1e2, 1e8].map(|steps: f64| (steps, from * (steps / 1e2).powf(power)));
-                plot.series.push(Series {
+                plot.series.push(Curve {
                     dashed: true,
-                    ..Series::line("soft", ends)
+                    ..Curve::line("soft", ends)
                 });
             }
             plot

@@ -8,7 +8,7 @@ use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun,
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
 use crate::report::svg::{
-    Axis, Key, Marker, Plot, Point, Series, Unit, number, power, scientific, seconds,
+    Axis, Curve, Key, Marker, Plot, Point, Unit, number, power, scientific, seconds,
 };
 use crate::report::timing::{Effort, Timing, time};
 
@@ -65,8 +65,8 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     section(making, &costs, uncertainty)
 }
 
-/// The first run within the error, of ever twice as many steps. One that stability forbids for all that may be taken is not
-/// begun.
+/// The first run within the error, of ever twice as many steps. One that stability forbids for all that may be taken
+/// is not begun.
 fn cheapest(
     scene: &StiffScene,
     solver: Solver,
@@ -231,7 +231,7 @@ fn figure(costs: &[CheapestRun]) -> Figure {
         );
         for solver in Solver::ALL {
             let (class, marker) = class(solver);
-            let line = |points: Vec<Point>, dashed| Series {
+            let line = |points: Vec<Point>, dashed| Curve {
                 class,
                 marker: if dashed { Marker::None } else { marker },
                 line: true,

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** nothing is made for a topic that nobody subscribes to.
 
-use super::ArmSim;
+use super::node::ArmSim;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
 use crate::protocol::messages::scene::{StringMessage, fixed_frames, moving_frames};

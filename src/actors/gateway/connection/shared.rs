@@ -14,11 +14,11 @@ use tokio::sync::Notify;
 
 use super::outgoing::Outgoing;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::{Account, Share};
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::limits::{MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING};
 use crate::actors::gateway::messages::Request;
 use crate::actors::gateway::registry::Registry;
+use crate::actors::resources::budget::{Account, Share};
+use crate::actors::resources::gauges::Gauges;
 
 /// The state that the actor, its writer and the reading task share; one thread, so plain cells do.
 pub(super) struct Shared {

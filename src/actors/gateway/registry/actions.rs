@@ -12,8 +12,8 @@ use super::state::Registry;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Frames, Handled};
 use crate::actors::node::Feedback;
-use crate::actors::ros::follower::{ActionRequest, Canceller, Follower};
 use crate::actors::wire::Route;
+use crate::actors::wire::follower::{ActionRequest, Canceller, GoalFollower};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::Level;
 use crate::protocol::names;
@@ -36,8 +36,8 @@ impl Registry {
         let share = client
             .outlets
             .account
-            .take(size_of::<Follower>() + goal.action.len() + id_bytes);
-        let follower = Follower {
+            .take(size_of::<GoalFollower>() + goal.action.len() + id_bytes);
+        let follower = GoalFollower {
             respond: ctx.address().recipient(),
             feedback: ctx.address().recipient(),
             connection: from,

@@ -11,11 +11,11 @@ use super::census::Use;
 use super::fan_out::Pace;
 use super::refusal::Refusal;
 use super::services::Provider;
-use super::state::{Origin, Registry};
+use super::state::{FrameOrigin, Registry};
 use super::topics::{Subscription, throttle_of};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS};
-use crate::actors::gateway::messages::{Configure, Handled, Request};
+use crate::actors::gateway::messages::{Configure, Handled, Overheard, Request};
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::limits::MAX_NAME;
@@ -28,7 +28,7 @@ use crate::protocol::wire::series::Series;
 impl Registry {
     /// Performs one op of a client that is known.
     pub(super) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
-        let origin = Origin {
+        let origin = FrameOrigin {
             from: request.from,
             id: request.id,
         };
@@ -94,7 +94,7 @@ impl Registry {
 
     fn advertise(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         topic: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -122,7 +122,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unadvertise(&mut self, origin: &Origin, topic: &str) {
+    fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
@@ -138,7 +138,7 @@ impl Registry {
     /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
     fn publish(
         &mut self,
-        origin: Origin,
+        origin: FrameOrigin,
         topic: &str,
         msg: &Payload,
         heard: Option<Payload>,
@@ -170,6 +170,9 @@ impl Registry {
         let Some(listener) = listener else {
             return Handled::at_once().and_by_subscribers(pace.end());
         };
+        if let Some(topic) = Topic::from_name(topic) {
+            self.ear.hear(Overheard::Heard(topic, msg));
+        }
         let (done, ended) = oneshot::channel();
         listener(TopicMessage {
             msg: heard.unwrap_or_else(|| msg.clone()),
@@ -194,7 +197,7 @@ impl Registry {
         Handled::at_once().and_by_subscribers(pace.end())
     }
 
-    fn subscribe(&mut self, origin: &Origin, subscribe: &Subscribe) -> Result<(), Refusal> {
+    fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
@@ -227,11 +230,11 @@ impl Registry {
             }
             None => None,
         };
+        let first = !self.is_wanted(&absolute);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
         let share = client.register(topic.len() + bytes);
-        let first = !self.topics.has_subscribers(&absolute);
         let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());
@@ -267,7 +270,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
+    fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
@@ -295,7 +298,7 @@ impl Registry {
 
     fn advertise_service(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         spelling: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -334,7 +337,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unadvertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
+    fn unadvertise_service(&mut self, origin: &FrameOrigin, service: &str) -> Result<(), Refusal> {
         let name = &*names::absolute(service);
         if !self.withdraw_service(name, origin.from) {
             return Err(Refusal::NotProvider(service.to_owned()));

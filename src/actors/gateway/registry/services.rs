@@ -10,7 +10,7 @@ use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
+use crate::actors::resources::budget::Share;
 use crate::protocol::names;
 use crate::protocol::wire::payload::Payload;
 

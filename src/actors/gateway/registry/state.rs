@@ -10,16 +10,17 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use super::census::{Tally, Use};
+use super::ear::Ear;
 use super::nodes::Nodes;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
 use super::topics::{Subscription, Topics};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::limits::{MAX_CONNECTIONS, REGISTRATION_BYTES};
 use crate::actors::gateway::messages::{Outlets, Response};
 use crate::actors::node::Interest;
+use crate::actors::resources::budget::Share;
+use crate::actors::resources::gauges::Gauges;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::{self as frames, Level};
 use crate::protocol::names;
@@ -44,6 +45,8 @@ pub struct Registry {
     /// Clients at once.
     pub(super) max_connections: usize,
     pub(super) connections_made: u64,
+    /// Overhears what passes, if anybody does.
+    pub(super) ear: Ear,
     /// Why no call is taken any more, once the runtime is ending.
     pub(super) closed: Option<&'static str>,
 }
@@ -81,6 +84,7 @@ impl Registry {
             ended: BTreeSet::new(),
             max_connections: MAX_CONNECTIONS,
             connections_made: 0,
+            ear: Ear::default(),
             closed: None,
         }
     }
@@ -187,11 +191,10 @@ impl Registry {
         self.topics.remove(topic, connection);
         self.tally.remove(&name, Use::Subscribed);
         if !self.topics.has_subscribers(&name) {
-            if let Some(topic) = Topic::from_name(topic) {
-                self.latched.remove(&topic);
-            }
             self.topics.forget_sizes(&name);
-            self.tell_owner(topic, false);
+        }
+        if !self.is_wanted(&name) {
+            self.let_rest(&name);
         }
     }
 
@@ -202,6 +205,19 @@ impl Registry {
             self.tally.withdraw(service);
         }
         provided
+    }
+
+    /// Whether messages on the topic of that absolute name are to be made.
+    pub(super) fn is_wanted(&self, topic: &str) -> bool {
+        self.ear.is_open() || self.topics.has_subscribers(topic)
+    }
+
+    /// Nobody wants messages on that topic any more.
+    pub(super) fn let_rest(&mut self, topic: &str) {
+        if let Some(topic) = Topic::from_name(topic) {
+            self.latched.remove(&topic);
+        }
+        self.tell_owner(topic, false);
     }
 
     pub(super) fn tell_owner(&self, topic: &str, wanted: bool) {
@@ -260,7 +276,7 @@ impl Registry {
 }
 
 /// Who sent the frame that is being performed, and its `id`.
-pub(super) struct Origin {
+pub(super) struct FrameOrigin {
     pub(super) from: ConnectionId,
     pub(super) id: Option<Payload>,
 }

@@ -10,7 +10,7 @@ use crate::math::integrator::Method;
 use crate::math::simulation::Simulation;
 use crate::report::csv::Csv;
 use crate::report::section::Figure;
-use crate::report::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Marker, Plot, Point, Unit, seconds};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, limit_held, step_matrix};
@@ -79,7 +79,7 @@ fn region(control: &ControlLoop<2>, limit: f64, csv: &mut Csv) -> Plot {
         let angle = TAU * f64::from(part) / 120.0;
         (angle.cos(), angle.sin())
     });
-    plot.series.push(Series::line("ink", circle));
+    plot.series.push(Curve::line("ink", circle));
     let linear = Linear::at_setpoint(control);
     let (mut inside, mut beyond) = (Vec::new(), Vec::new());
     for index in 0..SHOWN {
@@ -107,7 +107,7 @@ fn region(control: &ControlLoop<2>, limit: f64, csv: &mut Csv) -> Plot {
         ("c1", Marker::Circle, inside),
         ("c2", Marker::Square, beyond),
     ] {
-        plot.series.push(Series {
+        plot.series.push(Curve {
             class,
             marker,
             line: false,
@@ -148,7 +148,7 @@ fn traces(control: &ControlLoop<2>, limit: f64, csv: &mut Csv) -> Plot {
             ]);
             points.push((in_f64(step) * h, off.max(1e-12)));
         }
-        plot.series.push(Series::line(class, points));
+        plot.series.push(Curve::line(class, points));
     }
     plot.marks.push(Mark::Horizontal {
         y: NUDGE,

@@ -1,50 +1,35 @@
 //! Work that a scene does not need, and whether it is left out.
 //!
 //! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
-//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be unmeasured.
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be
+//! unmeasured.
 //!
 //! **Invariant:** no number in here that was not measured for this report.
 
 mod cells;
+mod counts;
 mod server;
 mod tables;
 
-use std::collections::HashMap;
 use std::hint::black_box;
 
+use counts::{Counts, Kind, STEPS, read};
 use tables::{steps_table, table};
 
-use crate::math::arm::{Arm, State};
+use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::dynamics::forward_dynamics;
 use crate::math::expression::Expression;
 use crate::math::integrator::{Method, increment};
 use crate::math::particle::Particle;
-use crate::math::pid::{Gains, Setpoint};
+use crate::math::pid::Gains;
 use crate::math::simulation::{Simulation, step_under};
 use crate::report::csv::Csv;
+use crate::report::experiments::step_scene::{ready, undamped};
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Bars, number};
-use crate::report::timing::{Effort, Timing, time};
-
-const STEPS: u64 = 20_000;
-
-/// One kind of step, by the name that `benches/src/bin/work.rs` knows it by.
-struct Kind {
-    name: &'static str,
-    timing: Timing,
-}
-
-impl Kind {
-    /// Time of one step \[s\].
-    fn step_time(&self) -> f64 {
-        self.timing.minimum / in_f64(STEPS)
-    }
-}
-
-/// Counts by name, as the script left them.
-type Counts = HashMap<String, f64>;
+use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let counts = read(making);
@@ -78,46 +63,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-fn read(making: &Making<'_>) -> Counts {
-    let text = std::fs::read_to_string(making.out.join("work.csv")).unwrap_or_default();
-    text.lines()
-        .skip(1)
-        .filter_map(|line| {
-            let mut fields = line.split(',');
-            let name = fields.next()?.to_owned();
-            Some((name, fields.next()?.parse().ok()?))
-        })
-        .collect()
-}
-
-fn start<const N: usize>(
-    gravity: f64,
-    integral: bool,
-    control: bool,
-    method: Method,
-) -> Simulation<N>
-where
-    Gains<N>: Default,
-{
-    let arm = Arm::new([1.0; N], [1.0; N], gravity).unwrap_or_default();
-    let mut gains = Gains::default();
-    if !integral {
-        gains.ki = [0.0; N];
-    }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(control);
-    simulation
-}
-
 fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
     let effort = making.choose(
         Effort {
@@ -140,11 +85,11 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
         making.at(kinds.len(), 14);
     };
     let two = |gravity, integral, control, method| {
-        let ready = start::<2>(gravity, integral, control, method);
+        let ready = ready::<2>(gravity, integral, control, method);
         move || run(&ready)
     };
     let three = |gravity, control| {
-        let ready = start::<3>(gravity, true, control, Method::Rk4);
+        let ready = ready::<3>(gravity, true, control, Method::Rk4);
         move || run(&ready)
     };
     add(
@@ -165,16 +110,10 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
         &mut two(0.0, true, false, Method::Rk4),
     );
     add("step-2-rk4-pd", &mut two(9.81, false, true, Method::Rk4));
-    let mut undamped = start::<2>(9.81, true, true, Method::Rk4);
-    let Gains { kp, ki, .. } = Gains::<2>::default();
-    undamped.set_gains(Gains {
-        kp,
-        // Undamped, an integral would drive it away.
-        ki: ki.map(|ki| 1e-3 * ki),
-        kd: [0.0; 2],
-    });
-    add("step-2-rk4-pi", &mut || run(&undamped));
-    let mut pushed = start::<2>(9.81, true, true, Method::Rk4);
+    let mut without_damping = ready::<2>(9.81, true, true, Method::Rk4);
+    without_damping.set_gains(undamped());
+    add("step-2-rk4-pi", &mut || run(&without_damping));
+    let mut pushed = ready::<2>(9.81, true, true, Method::Rk4);
     pushed.disturb([0.0; 2], 1e9);
     add("step-2-rk4-pushed", &mut || run(&pushed));
     add("step-2-rk4-pid", &mut two(9.81, true, true, Method::Rk4));
@@ -209,8 +148,8 @@ where
     Gains<N>: Default,
 {
     Method::ALL.into_iter().all(|method| {
-        let mut off = start::<N>(9.81, true, false, method);
-        let mut zero = start::<N>(9.81, true, true, method);
+        let mut off = ready::<N>(9.81, true, false, method);
+        let mut zero = ready::<N>(9.81, true, true, method);
         zero.set_gains(Gains {
             kp: [0.0; N],
             ki: [0.0; N],
@@ -229,7 +168,7 @@ where
     Gains<N>: Default,
 {
     Method::ALL.into_iter().all(|method| {
-        let mut live = start::<N>(0.0, true, false, method);
+        let mut live = ready::<N>(0.0, true, false, method);
         let mut state = State {
             position: [0.4; N],
             velocity: [1.5; N],

@@ -3,8 +3,9 @@
 //! **Invariant:** what was not counted for this report is called not measured.
 
 use super::cells::{UNMEASURED, percent_saved, unmeasured};
+use super::counts::{Counts, Kind, STEPS};
 use super::server;
-use super::{Counts, Kind, STEPS, in_f64};
+use crate::math::count::in_f64;
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, seconds};
 
@@ -25,8 +26,8 @@ const ROWS: [Row; 7] = [
     },
     Row {
         work: "Integral with ki = 0",
-        place: "kept: what gathers at ki = 0 acts as soon as ki is set, so it must gather; one product and one clamp \
-         a joint",
+        place: "kept: what gathers at ki = 0 acts as soon as ki is set, so it must gather; one product and one clamp a \
+                joint",
         with: "step-2-rk4-pid",
         without: "step-2-rk4-pd",
     },
@@ -67,11 +68,9 @@ pub(super) fn table(kinds: &[Kind], counts: &Counts, same_bits: [bool; 2]) -> Ta
     let mut table = Table::new(
         "left-out",
         "What is left out, and the proof",
-        "Instructions are counted by callgrind over the same number of steps on both sides, start of the program \
-         taken off; times are \
-         the minimum of repeats on this machine and follow the instructions only loosely, since a step is one chain \
-         of dependent \
-         operations.",
+        "Instructions are counted by callgrind over the same number of steps on both sides, start of the program taken \
+         off; times are the minimum of repeats on this machine and follow the instructions only loosely, since a step \
+         is one chain of dependent operations.",
         &[
             "Work",
             "Where it is left out",
