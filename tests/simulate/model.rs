@@ -417,7 +417,9 @@ impl Model {
                 ));
             }
         } else if !has_feedback {
-            court.wrong(format!("client {who} did not ask for feedback: {text:.300}"));
+            court.wrong(format!(
+                "client {who} did not ask for feedback: {text:.300}"
+            ));
         }
     }
 
