@@ -1,6 +1,7 @@
-//! What one step adds to a state, and how it is added.
+//! The increments of one step, and how they are added to a state.
 //!
-//! **Invariant:** an arm without gravity moves by the same bits, whichever of the two ways through the dynamics it takes.
+//! **Invariant:** an arm without gravity moves by the same bits, whichever of the two ways through the dynamics it
+//! takes.
 
 #![allow(
     clippy::indexing_slicing,
