@@ -11,7 +11,7 @@ use crate::protocol::messages::Stamp;
 
 /// Where a frame is in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct LinkPose {
+struct FramePose {
     /// \[m\].
     x: f64,
     /// \[m\].
@@ -20,7 +20,7 @@ struct LinkPose {
     angle: f64,
 }
 
-impl LinkPose {
+impl FramePose {
     /// The same as seen from `other`.
     fn seen_from(self, other: Self) -> Self {
         let (sin, cos) = other.angle.sin_cos();
@@ -51,8 +51,8 @@ impl LinkPose {
 }
 
 /// Every frame of an arm with these lengths \[m\] at these joint positions \[rad\], and where it is in the world.
-fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, LinkPose)> {
-    let mut at = LinkPose {
+fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, FramePose)> {
+    let mut at = FramePose {
         x: 0.0,
         y: 0.0,
         angle: 0.0,
