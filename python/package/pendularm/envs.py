@@ -1,10 +1,10 @@
-"""Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many arms
-``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
+"""Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many
+arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
 
-The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has a random
-stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number. They truncate
-themselves, and reset an arm in the call after its end, whose action is ignored (`AutoresetMode.NEXT_STEP`). All arrays that are
-returned are fresh.
+The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has
+a random stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number.
+They truncate themselves, and reset an arm in the call after its end, whose action is ignored
+(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh.
 """
 
 from collections.abc import Sequence
@@ -222,11 +222,11 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._ended = self._ended & ~mask
 
 
-_SWING_UP = """An arm that hangs is to swing up and stay there, with efforts half as strong as would hold it stretched out.
+_SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as strong as would hold it stretched out.
 
     ## Action
-    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of half of what holds the stretched arm there:
-    9.81 and 2.4525 N m for 2 links.
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of half of what holds the stretched arm
+    there: 9.81 and 2.4525 N m for 2 links.
 
     ## Observation
     | index (2 links) | meaning | bounds | unit |
@@ -241,8 +241,8 @@ _SWING_UP = """An arm that hangs is to swing up and stay there, with efforts hal
     `(1 + y / reach) / 2` with the height y of the end effector: 0 hanging, 1 upright.
 
     ## Start and end
-    Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25 rad/s; truncated
-    after 200 steps (10 s).
+    Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25
+    rad/s; truncated after 200 steps (10 s).
 
     ## Arguments
     `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
@@ -251,11 +251,11 @@ _SWING_UP = """An arm that hangs is to swing up and stay there, with efforts hal
     v0: the first.
     """
 
-_REACH = """The end effector is to come to a target and stay there, with efforts twice as strong as hold the arm stretched out.
+_REACH = """The end effector is to come to a target and stay, with efforts twice as strong as hold the arm stretched.
 
     ## Action
-    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of twice of what holds the stretched arm there:
-    39.24 and 9.81 N m for 2 links.
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of twice of what holds the stretched arm
+    there: 39.24 and 9.81 N m for 2 links.
 
     ## Observation
     | index (2 links) | meaning | bounds | unit |
@@ -272,8 +272,8 @@ _REACH = """The end effector is to come to a target and stay there, with efforts
     `1 - d / (2 reach)` with the distance d of the end effector from the target: 1 there.
 
     ## Start and end
-    At rest in any pose; the target is anywhere within 0.95 of the reach, evenly by area. Terminated when a joint turns faster than
-    25 rad/s; truncated after 100 steps (5 s).
+    At rest in any pose; the target is anywhere within 0.95 of the reach, evenly by area. Terminated when a joint turns
+    faster than 25 rad/s; truncated after 100 steps (5 s).
 
     ## Arguments
     `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
