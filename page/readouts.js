@@ -17,7 +17,7 @@ const LOW_RATE = 50;
 /** Below this real-time factor the runtime lags. */
 const LAGS = 0.95;
 /** Estimates that are shown as one: two seconds of them. */
-const ESTIMATES = 20;
+const ESTIMATES = 10;
 /** A local error below this is rounding, whatever its digits [rad/s]. */
 const ROUNDING = 1e-12;
 
@@ -35,8 +35,6 @@ export function startReadouts() {
   watch("estimate", (estimate) => {
     if (!estimate) estimates.clear();
     else estimates.add(estimate.error_per_second);
-    const { value } = estimates;
-    setText(byId("out-error"), value < ROUNDING ? "rounding" : Number.isFinite(value) ? `${significant(value, 2)} rad` : "–");
   });
 }
 
@@ -46,6 +44,8 @@ export function showReadouts() {
   setText(byId("sim-time"), fixed(shown.time, 2));
   setText(byId("run-state"), runState());
   setAttribute(byId("run-state"), "class", `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`);
+  const { value } = estimates;
+  setText(byId("out-error"), value < ROUNDING ? "rounding" : Number.isFinite(value) ? `${significant(value, 2)} rad` : "–");
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
   byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < LAGS);

@@ -22,6 +22,8 @@ const STILL_MS = 1000;
 const HIDDEN_MS = 100;
 /** But what was done to a paused arm here is seen at once: so long all of them come [ms]. */
 const TOUCHED_MS = 300;
+/** Estimates of the error are shown as the median of two seconds of them. */
+const ESTIMATE_MS = 200;
 /** What is reckoned or searched may take its time. */
 const LONG_CALL_MS = 120000;
 /** A joint state is as old as this at most when it arrives. */
@@ -55,7 +57,8 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_action/result", goalResult);
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   bridge.subscribe("/arm_sim/error_estimate", (msg) => set("estimate", msg));
-  setInterval(poll, POLL_MS);
+  pace();
+  setInterval(tick, POLL_MS);
   for (const key of ["integrator", "gains", "params", "enabled", "setpoint", "links"]) {
     watch(key, () => { if (!state.stabilityMissing) askStability(); });
   }
@@ -72,7 +75,7 @@ export function start(whenReset, whenChanging) {
 /** As many joint states as are drawn or recorded: all of a moving arm in sight, a few of one that is paused or hidden. */
 function pace() {
   bridge.throttle("/joint_states", rests() ? STILL_MS : document.hidden ? HIDDEN_MS : 0);
-  bridge.throttle("/arm_sim/error_estimate", isStill() ? STILL_MS : 0);
+  bridge.throttle("/arm_sim/error_estimate", isStill() ? STILL_MS : ESTIMATE_MS);
 }
 
 export function isStill() {
@@ -221,12 +224,16 @@ function goalResult(msg) {
 
 // Settings: each call asks or changes, and stores what is now in force.
 
-function poll() {
+function tick() {
   const now = performance.now();
   const rate = (arrived * 1000) / Math.max(1, now - counted);
   set("rate", state.rate > 0 && arrived > 0 ? (state.rate + rate) / 2 : rate); // timers come and go by some milliseconds
   arrived = 0;
   counted = now;
+  poll();
+}
+
+function poll() {
   if (!bridge.open || document.hidden) return;
   setParams({});
   setIntegrator({});

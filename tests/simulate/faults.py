@@ -70,7 +70,7 @@ FAULTS = [
     ("a step is not counted by the pacer, one in 1000", "src/math/pacer.rs",
      "        self.taken = self.taken.saturating_add(steps);",
      "        self.taken = self.taken.saturating_add(steps.saturating_sub(u64::from(R(1000))));"),
-    ("a setpoint is taken with a bit changed, one in 50", "src/math/simulation.rs",
+    ("a setpoint is taken with a bit changed, one in 50", "src/math/simulation/mod.rs",
      "    pub fn set_setpoint(&mut self, setpoint: Setpoint<N>) {",
      "    pub fn set_setpoint(&mut self, mut setpoint: Setpoint<N>) {\n"
      "        if R(50) { setpoint.position[0] = f64::from_bits(setpoint.position[0].to_bits() ^ 1); }"),
@@ -145,7 +145,7 @@ def find(number, program):
 
 def main():
     chosen = [int(word) for word in sys.argv[1:]] or list(range(1, len(FAULTS) + 1))
-    parts = ("src", "page", "tests", "fuzz/src", "Cargo.toml", "Cargo.lock", "README.md", "benches/Cargo.toml")
+    parts = ("src", "page", "tests", "client", "fuzz/src", "Cargo.toml", "Cargo.lock", "README.md")
     missing = plant(ROOT, COPY, parts, FAULTS)
     lost = [number for number in missing if number in chosen]
     program = build()

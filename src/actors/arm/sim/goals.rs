@@ -16,6 +16,7 @@ use super::state::goals::{Tracked, pose};
 use crate::math::goal::{Cadence, Goal};
 use crate::math::kinematics::nearest_turn;
 use crate::math::pid::Setpoint;
+use crate::math::simulation::ArmInput;
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
@@ -60,10 +61,7 @@ impl<const N: usize> Handler<CommandGoal<N>> for ArmSim<N> {
             let (target, criteria) = (tracked.goal.target(), tracked.goal.criteria());
             tracked.goal = Goal::new(target, criteria, time);
             tracked.commanded = true;
-            self.simulation.set_setpoint(Setpoint {
-                position: command.positions,
-                velocity: [0.0; N],
-            });
+            self.change(ArmInput::Setpoint(Setpoint::at(command.positions)));
         }
     }
 }

@@ -10,17 +10,20 @@
 mod goals;
 mod limit;
 mod messages;
+mod motion;
 mod node;
 mod scene;
 mod services;
 mod state;
 mod telemetry;
+mod tell;
 
 pub use self::limit::LEAST_PAUSE;
 pub use self::messages::{
     ArmPose, ArmSettings, CommandGoal, Consult, EndGoal, GoalJudged, HeldLimit, Pose, Present,
     RefuseSteps, SimulationTime, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
+pub use self::motion::{ArmMotion, JointMotion, MoveSetpoint};
 pub use self::node::{ArmSim, BREATHER, PUBLISH_RATE, WAKE_UP_BUDGET, joint_names};
 pub use self::services::disturb::{Disturb, Push};
 pub use self::services::field_by_field::{Echo, FieldByField};
@@ -31,5 +34,6 @@ pub use self::services::reset::Reset;
 pub use self::services::setpoint::SetSetpoint;
 pub use self::services::step::{MAX_STEPS, STEPS_IN_A_ROW, Step};
 pub use self::services::switches::{Enable, Pause};
+pub use self::state::journal::{ArmEvent, ArmListener, ArmNews, Tell};
 pub use self::state::steps::{Stepped, StepsEnd};
 pub use self::state::turn::{TURN, TURN_MESSAGES};

@@ -16,6 +16,7 @@ use tokio::time::Instant;
 
 use super::messages::{SimulationTime, Snapshot, TakeSnapshot};
 use super::state::goals::Goals;
+use super::state::journal::Journal;
 use super::state::limit::LimitWatch;
 use super::state::steps::Steps;
 use super::state::telemetry::Telemetry;
@@ -68,6 +69,8 @@ pub struct ArmSim<const N: usize> {
     /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next
     /// turn is on its way.
     pub(super) steps: VecDeque<Steps>,
+    /// Who hears of everything that the steps depend on, if anybody does.
+    pub(super) journal: Option<Journal<N>>,
 }
 
 impl<const N: usize> ArmSim<N> {
@@ -93,6 +96,7 @@ impl<const N: usize> ArmSim<N> {
             limit: LimitWatch::default(),
             turn: Turn::new(),
             steps: VecDeque::new(),
+            journal: None,
         }
     }
 }
@@ -153,6 +157,7 @@ impl<const N: usize> ArmSim<N> {
             arm.advance_to_now(ctx);
             arm.watch_limit(ctx);
             arm.publish_state();
+            arm.tell_state();
             arm.schedule_tick(ctx);
         });
     }
@@ -225,6 +230,7 @@ impl<const N: usize> ArmSim<N> {
 
     /// Tells of a divergence that has just happened.
     pub(super) fn note_divergence(&mut self) {
+        self.tell_divergence();
         self.telemetry.owes(0, 0.0);
         if let Some(divergence) = self.simulation.divergence() {
             tracing::warn!(

@@ -12,7 +12,7 @@ use super::refusal::Refusal;
 use super::services::{Forwarded, Services, TimedOut};
 use super::state::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{CALL_BYTES, DEFAULT_TIMEOUT, MAX_BACKLOG, MAX_WAITING_CALLS};
-use crate::actors::gateway::messages::Handled;
+use crate::actors::gateway::messages::{Handled, Overheard};
 use crate::actors::wire::{Caller, ServiceCall};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages;
@@ -37,6 +37,12 @@ impl Registry {
         } else if let Some(service) = own {
             match self.nodes.services.get(&service) {
                 Some(node) => {
+                    self.ear.hear(Overheard::Called {
+                        from: origin.from,
+                        service,
+                        id: origin.id.as_ref(),
+                        args: call.args.payload(),
+                    });
                     let name = call.service.into_boxed_str();
                     let registry = ctx.address().recipient();
                     let (caller, ended) = Caller::new(
@@ -50,7 +56,9 @@ impl Registry {
                     node(ServiceCall {
                         service,
                         arguments: call.args,
-                        caller: caller.within(Arc::clone(&client.outlets.account)),
+                        caller: caller
+                            .within(Arc::clone(&client.outlets.account))
+                            .with_errors(client.outlets.error_form()),
                     });
                     return Handled::by_node(ended);
                 }

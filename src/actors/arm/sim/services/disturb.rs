@@ -10,6 +10,7 @@ use super::field_by_field::FieldByField;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -58,7 +59,7 @@ impl<const N: usize> Handler<Call<Disturb<N>>> for ArmSim<N> {
         }
         match (ask.effort, ask.duration) {
             (Some(effort), Some(duration)) if rejected.is_empty() => {
-                self.simulation.disturb(effort, duration);
+                self.change(ArmInput::Disturbance { effort, duration });
                 reply.conclude(Ok(Push { effort, duration }));
             }
             _ => reply.conclude(Err(rejected)),

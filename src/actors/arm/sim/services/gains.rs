@@ -11,6 +11,7 @@ use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::pid::Gains;
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -60,7 +61,9 @@ impl<const N: usize> Handler<Call<SetGains<N>>> for ArmSim<N> {
 impl<const N: usize> ArmSim<N> {
     fn set_gains(&mut self, ask: SetGains<N>) -> Echo<Gains<N>> {
         let gains = ask.applied_to(self.simulation.pid().gains());
-        self.simulation.set_gains(gains);
+        if [ask.kp, ask.ki, ask.kd].iter().any(Option::is_some) {
+            self.change(ArmInput::Gains(gains));
+        }
         Echo {
             values: *self.simulation.pid().gains(),
             rejected: ask.rejected,

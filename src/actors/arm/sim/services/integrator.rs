@@ -11,6 +11,7 @@ use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::integrator::Method;
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -55,13 +56,13 @@ impl<const N: usize> Handler<Call<SetIntegrator>> for ArmSim<N> {
 impl<const N: usize> ArmSim<N> {
     fn set_integrator(&mut self, ask: SetIntegrator) -> Echo<Integrator> {
         if let Some(method) = ask.method {
-            self.simulation.set_method(method);
+            self.change(ArmInput::Method(method));
         }
         // Setting the timestep that is in force already must not cost the unfinished fraction of a step.
         if let Some(timestep) = ask.timestep
             && timestep.to_bits() != self.simulation.timestep().to_bits()
         {
-            self.simulation.set_timestep(timestep);
+            self.change(ArmInput::Timestep(timestep));
             self.restart_pacer();
         }
         Echo {

@@ -11,6 +11,7 @@ use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::arm::{Arm, ArmError};
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
@@ -66,7 +67,7 @@ impl<const N: usize> ArmSim<N> {
         let mut rejected = ask.rejected;
         match changed {
             Ok(changed) if changed != *arm => {
-                self.simulation.set_arm(changed);
+                self.change(ArmInput::Arm(changed));
                 self.restart_energy_drift();
                 self.publish_description();
             }

@@ -12,6 +12,7 @@ use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call, Reply};
 use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::arm::State;
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{Fields, Rejections};
 
@@ -50,7 +51,7 @@ impl<const N: usize> ArmSim<N> {
     fn reset(&mut self) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
         let ended = self.end_goal_for_reset();
         let diverged = self.simulation.divergence().is_some();
-        self.simulation.reset();
+        self.change(ArmInput::Reset);
         self.restart_pacer();
         self.restart_energy_drift();
         if diverged {

@@ -8,6 +8,7 @@ use crate::actors::arm::sim::node::{ArmSim, joint_names};
 use crate::actors::node::{Done, Respond};
 use crate::actors::wire::{Nodes, Route, TopicMessage};
 use crate::math::pid::Setpoint;
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::trajectory::{TrajectoryError, joint_trajectory};
 use crate::protocol::messages::{self, Level};
@@ -33,7 +34,7 @@ impl<const N: usize> Handler<SetSetpoint<N>> for ArmSim<N> {
 
     fn handle(&mut self, message: SetSetpoint<N>, ctx: &mut Context<Self>) {
         self.attend(ctx);
-        self.simulation.set_setpoint(message.setpoint);
+        self.change(ArmInput::Setpoint(message.setpoint));
     }
 }
 

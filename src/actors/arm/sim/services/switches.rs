@@ -10,6 +10,7 @@ use super::field_by_field::{Echo, FieldByField};
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
+use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Service;
 use crate::protocol::op::fields::{Fields, Rejections};
 
@@ -113,7 +114,7 @@ impl<const N: usize> ArmSim<N> {
         if let Some(on) = ask.enabled
             && on != self.simulation.pid().is_enabled()
         {
-            self.simulation.enable(on);
+            self.change(ArmInput::Enabled(on));
             self.restart_energy_drift();
         }
         Echo {

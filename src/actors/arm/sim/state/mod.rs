@@ -3,6 +3,7 @@
 //! **Invariant:** plain values: none of them knows the actor.
 
 pub(crate) mod goals;
+pub(crate) mod journal;
 pub(crate) mod limit;
 pub(crate) mod steps;
 pub(crate) mod telemetry;
