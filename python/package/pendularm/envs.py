@@ -104,6 +104,8 @@ class _Reach(_Task):
     def __init__(self, arms: int, links: int, threads: int | None) -> None:
         super().__init__(arms, links, threads)
         self.targets = np.zeros((arms, 2))
+        # Target less end effector, looked at twice a step.
+        self.away = np.zeros((arms, 2))
 
     def further_bounds(self) -> list[float]:
         reach = float(Arm(self.links).reach)
@@ -117,13 +119,17 @@ class _Reach(_Task):
         self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
         self.batch.reset(list(arms))
         self.batch.set_state(np.pi * (2 * drawn[:, 2:] - 1), None, list(arms))
+        self.away = self.targets - self.batch.end_effector
+
+    def go_on(self, actions: Action) -> None:
+        super().go_on(actions)
+        self.away = self.targets - self.batch.end_effector
 
     def further(self) -> list[Floats]:
-        return [self.targets, self.targets - self.batch.end_effector]
+        return [self.targets, self.away]
 
     def reward(self) -> Floats:
-        away = self.targets - self.batch.end_effector
-        return 1.0 - np.hypot(away[:, 0], away[:, 1]) / (2 * self.reach)
+        return 1.0 - np.hypot(self.away[:, 0], self.away[:, 1]) / (2 * self.reach)
 
 
 class _Single(gymnasium.Env[Observation, Action]):
