@@ -70,9 +70,9 @@ pub(crate) const NAMESAKES: &[&str] = &[
 /// Files that are too long.
 pub(crate) const LONG_FILES: &[&str] = &["actors/compute/workers/mod.rs", "actors/wire.rs"];
 /// How many lines are too long.
-pub(crate) const LONG_LINES: usize = 246;
+pub(crate) const LONG_LINES: usize = 244;
 /// How many comments begin with a word that leaves their subject open.
-pub(crate) const DANGLING_COMMENTS: usize = 30;
+pub(crate) const DANGLING_COMMENTS: usize = 29;
 /// How many comments call the end effector a hand or a tip.
 pub(crate) const HANDS_IN_COMMENTS: usize = 3;
 /// Names for which the field or the house has a better one, and how often each stands in the code.

@@ -1,5 +1,6 @@
-//! What work costs is measured on this clock: the slices of computations, the arm's wake-ups. How long it may take is elapsed time,
-//! what somebody is charged for it the processor time of the thread that did it: a machine that does something else is nobody's debt.
+//! What work costs is measured on this clock: the slices of computations, the arm's wake-ups. A slice lasts for elapsed
+//! time; whoever it is for is charged the processor time of the thread that did it, and nothing for what a busy machine
+//! did meanwhile.
 //!
 //! It is the machine's own, unless a simulation counts instead: there each look costs the same, so that the work done between two
 //! looks, and all that follows from it, is the same in every run.
@@ -13,20 +14,20 @@ use rustix::time::{ClockId, clock_gettime};
 
 thread_local! {
     /// How looks are counted on this thread; none where the machine's clocks count.
-    static COUNTED: Cell<Option<Counted>> = const { Cell::new(None) };
+    static COUNTED: Cell<Option<Looks>> = const { Cell::new(None) };
 }
 
 /// Time that passes with looks at it alone.
 #[derive(Clone, Copy)]
-struct Counted {
+struct Looks {
     began: Instant,
-    /// What a look costs.
+    /// The time that a look costs.
     cost: Duration,
-    /// What all of them have cost so far.
+    /// The time that all of them have cost so far.
     spent: Duration,
 }
 
-impl Counted {
+impl Looks {
     /// Looks once more.
     fn look(mut self) -> Self {
         self.spent += self.cost;
@@ -58,7 +59,7 @@ pub fn spent() -> Duration {
 
 /// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time pass.
 pub fn count(cost: Duration) {
-    COUNTED.set(Some(Counted {
+    COUNTED.set(Some(Looks {
         began: Instant::now(),
         cost,
         spent: Duration::ZERO,

@@ -1,7 +1,8 @@
 //! A few threads that do the heavy requests in turns, so that no client waits for another's million steps.
 //!
-//! A computation is advanced for one slice and waits for its next turn, which goes to whoever has had least of the workers'
-//! processor time (`workers/turns.rs`): what a busy machine keeps a worker from is charged to nobody. A connection has at most one computation here at a time (the rest wait in the connection), so each
+//! A computation is advanced for one slice and waits for its next turn, which goes to whoever has had least of the
+//! workers' processor time (`workers/turns.rs`): a worker that a busy machine keeps waiting is charged to nobody. A
+//! connection has at most one computation here at a time (the rest wait in the connection), so each
 //! connection gets the same share, and one that asks for little waits for nobody who asks for much. What they hold together is
 //! counted when room is taken for its answer ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
 //!
