@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -15,7 +15,10 @@ build: ## Build the program (release); needs no network once the dependencies ar
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
 
-run: build ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3"
+run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3". Without cargo a program that is there runs
+	@if command -v "$(firstword $(CARGO))" > /dev/null; then $(MAKE) --no-print-directory build; \
+	elif [ -x "$(TARGET_DIR)/release/pendularm" ]; then echo "make run: no cargo here; the program that is built already runs"; \
+	else echo "make run: needs cargo, or a program that is built already: $(TARGET_DIR)/release/pendularm" >&2; exit 1; fi
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
@@ -40,7 +43,7 @@ test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS
 	@echo "make test-browser: the page in headless Chromium"
 	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
-test-clients: build ## Run clients that nobody here wrote against it: roslibpy, roslib 1 and 2, Lichtblick's packages, roslibrust
+test-clients: build ## Run clients that nobody here wrote against it: roslibpy, compas_fab, roslib 1 and 2, Lichtblick's packages, roslibrust
 	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
@@ -65,6 +68,7 @@ lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check --all
 	$(CARGO) fmt --check --manifest-path fuzz/Cargo.toml
+	$(CARGO) fmt --check --manifest-path python/Cargo.toml
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
@@ -92,6 +96,12 @@ picture: build ## Take the README's picture of the page: docs/page.png; needs ch
 features: ## Build with and without each feature and print size, crates and build time; KEEP=1 puts them into the README
 	@echo "make features: five release builds from nothing, some minutes"
 	@CARGO="$(CARGO)" python3 scripts/features.py $(if $(KEEP),--keep) $(ARGS)
+
+wheel: build ## Build the Python wheel with the program in it: python/target/wheels/
+	@bash scripts/wheel.sh "$(TARGET_DIR)/release/pendularm"
+
+test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" picks tests
+	@bash scripts/test-python.sh $(ARGS)
 
 mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"

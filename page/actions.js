@@ -1,3 +1,4 @@
+// @ts-check
 // What the page does with all settings at once: applies them, undoes the last change, goes back to the defaults, starts a
 // lesson; and the reset that belongs to it.
 // Invariant: every change can be undone, and what the runtime refused is said.
@@ -91,10 +92,14 @@ export async function resetArm() {
 
 /** The way out of a blow-up in one click: a smaller timestep, then the reset; everything else stays, the setpoint too. */
 export async function recover(timestep) {
+  const set = await setIntegrator({ timestep });
+  return set.result ? beginAnew() : set;
+}
+
+/** From the starting pose with all settings as they are, those of a lesson or not; the setpoint stays too. */
+export async function beginAnew() {
   goLive();
   const setpoint = state.setpointKnown ? Array.from(state.setpoint.subarray(0, state.links)) : null;
-  const set = await setIntegrator({ timestep });
-  if (!set.result) return set;
   const answer = await reset();
   if (answer.result && setpoint) sendSetpoint(setpoint);
   return answer;

@@ -1,3 +1,4 @@
+// @ts-check
 // Pointing at the arm's canvas: a drag sends goals for the tip, with shift it places the setpoint directly.
 // Arrow keys do the same for those who use no pointer.
 // Invariant: at most ten requests a second leave while aiming, and the last place is always sent.

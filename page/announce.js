@@ -1,3 +1,4 @@
+// @ts-check
 // Says aloud, to screen readers, what others see happen: goals reached, refusals, a lost connection.
 // Invariant: only events are announced; what changes all the time is in texts that are read when asked for.
 

@@ -1,3 +1,4 @@
+// @ts-check
 // The arm on its canvas: grid, reach, trail of the tip, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
 // Invariant: a frame allocates nothing, and nothing is drawn while nothing is seen to change.
@@ -53,7 +54,7 @@ export function startArmView(canvas) {
   watch("links", resized);
   watch("setpoint", () => { follow(); redraw(); });
   watch("playback", redraw);
-  watch("joint", redraw);
+  for (const key of ["joint", "enabled"]) watch(key, redraw);
   let diverged = false;
   watch("diagnostics", ({ state: now }) => {
     if ((now === "diverged") !== diverged) redraw();
@@ -153,14 +154,13 @@ function drawArm(now) {
   context.lineCap = "round";
   context.lineJoin = "round";
   drawLatest(context, n, lengths(), px, py, behindTime, shown.time);
-  if (shown.setpointKnown) drawGhost(n);
   drawTarget(n, ripple ? (now - reachedAt) / RIPPLE_MS : 1);
   drawLinks(n);
   return ripple;
 }
 
-/** What lies behind the arm: the backdrop and the trail up to now. Between two paintings the trail's latest piece is
- * drawn on each frame. */
+/** What lies behind the arm: the backdrop, the trail up to now and the setpoint's ghost. Between two paintings the trail's
+ * latest piece is drawn on each frame. */
 function paintBehind(n) {
   behindStale = false;
   const paint = behind.getContext("2d", { alpha: false });
@@ -169,26 +169,29 @@ function paintBehind(n) {
   paint.drawImage(backdrop, 0, 0);
   paint.setTransform(context.getTransform());
   drawTrail(paint, n, lengths(), px, py, shown.time);
+  if (shown.setpointKnown) drawGhost(paint, n);
   behindTime = shown.time;
 }
 
-function drawGhost(n) {
+function drawGhost(paint, n) {
   joints(n, shown.setpoint, lengths(), x, y);
-  context.strokeStyle = colors.muted;
-  context.lineWidth = 2;
-  context.globalAlpha = state.enabled ? 0.9 : 0.5;
-  context.setLineDash(GHOST_DASH);
-  context.beginPath();
-  context.moveTo(px(0), py(0));
-  for (let i = 1; i <= n; i += 1) context.lineTo(px(x[i]), py(y[i]));
-  context.stroke();
-  context.setLineDash(NO_DASH);
+  paint.lineCap = "round";
+  paint.lineJoin = "round";
+  paint.strokeStyle = colors.muted;
+  paint.lineWidth = 2;
+  paint.globalAlpha = state.enabled ? 0.9 : 0.5;
+  paint.setLineDash(GHOST_DASH);
+  paint.beginPath();
+  paint.moveTo(px(0), py(0));
+  for (let i = 1; i <= n; i += 1) paint.lineTo(px(x[i]), py(y[i]));
+  paint.stroke();
+  paint.setLineDash(NO_DASH);
   for (let i = 1; i <= n; i += 1) {
-    context.beginPath();
-    context.arc(px(x[i]), py(y[i]), 4, 0, 2 * Math.PI);
-    context.stroke();
+    paint.beginPath();
+    paint.arc(px(x[i]), py(y[i]), 4, 0, 2 * Math.PI);
+    paint.stroke();
   }
-  context.globalAlpha = 1;
+  paint.globalAlpha = 1;
 }
 
 function drawTarget(n, ripple) {

@@ -1,3 +1,4 @@
+// @ts-check
 // Arrows on the arm: how fast the end of each link moves.
 // Invariant: a frame allocates nothing.
 

@@ -1,3 +1,4 @@
+// @ts-check
 // What stands still behind the arm: metric grid, axes with metres, the circles of reach, the direction of gravity.
 // Invariant: drawn once per size, parameters and theme, and then copied.
 

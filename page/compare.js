@@ -1,3 +1,4 @@
+// @ts-check
 // Any number of integrators and timesteps against a reference: the same arm, from the same state, reckoned offline by the
 // runtime, drawn over one another and played back together.
 // Invariant: what is compared is what the runtime answered; the live arm is not touched.
@@ -6,7 +7,7 @@ import { announce } from "./announce.js";
 import { CompareView } from "./compare_view.js";
 import { byId, el, setText } from "./dom.js";
 import { option, refusal } from "./field.js";
-import { METHODS, duration, fixed } from "./format.js";
+import { METHODS, duration, fixed, shortName } from "./format.js";
 import { commonSamples } from "./resample.js";
 import { nobodyProvides } from "./rosbridge.js";
 import { rollout } from "./runtime.js";
@@ -35,14 +36,15 @@ export function startCompare() {
   add = el("button", { type: "button", class: "small", onclick: () => addRow("rk4", 0.001) }, "Add a run");
   said = refusal(go);
   byId("compare-form").append(
-    el("div", { id: "compare-rows", class: "compare-rows" }),
-    el("div", { class: "compare-row" }, add, seconds.element, from.element, servo.element, go), said.element,
+    el("div", { class: "compare-rows" }, el("div", { id: "compare-rows", class: "as-parts" }), add),
+    el("div", { class: "compare-row" }, seconds.element, from.element, servo.element, go), said.element,
   );
   addRow("euler", 0.01);
   addRow("rk4", 0.01);
   byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
   view = new CompareView();
   watch("links", () => { byId("compare-result").hidden = true; });
+  watch("connection", () => said.show(""));
   watch("lesson", (lesson) => { if (lesson?.runs) showLesson(lesson); });
 }
 
@@ -53,7 +55,7 @@ function select(label, choices) {
 
 function addRow(method, timestep) {
   if (rows.length >= MOST_RUNS) return;
-  const choice = el("select", { "aria-label": "integrator" }, ...METHODS.map(([value, text]) => el("option", { value }, text.replace("Runge–Kutta 4", "RK 4"))));
+  const choice = el("select", { "aria-label": "integrator" }, ...METHODS.map(([value]) => el("option", { value }, shortName(value))));
   choice.value = method;
   const step = el("input", { type: "number", step: "any", inputmode: "decimal", "aria-label": "timestep", value: timestep });
   const remove = el("button", { type: "button", class: "small", "aria-label": "remove this run", onclick: () => drop(row) }, "✕");

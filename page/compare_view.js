@@ -1,3 +1,4 @@
+// @ts-check
 // Draws a comparison: all arms with their trails over one another, their error, energy and a joint's angle over time, and an
 // instant to scrub.
 // Invariant: all are shown at the same instant; a run that ends early is drawn as far as it goes, its last pose as a ghost.

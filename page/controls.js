@@ -1,9 +1,11 @@
+// @ts-check
 // The settings: integrator and timestep, servo and gains, gravity, masses, lengths, setpoint and pushes.
 // Invariant: a control changes only by what the runtime accepted; what it refused is said beside it.
 
 import { byId, el, setText } from "./dom.js";
 import { numberField, option, refusal } from "./field.js";
-import { METHODS } from "./format.js";
+import { METHODS, shortName } from "./format.js";
+import { limitLabel } from "./limits_view.js";
 import { disturb, enable, sendSetpoint, setGains, setIntegrator, setParams, suggestGains } from "./runtime.js";
 import { set, state, watch } from "./store.js";
 
@@ -46,7 +48,7 @@ function startIntegrator() {
       said.show(answer.result ? "" : answer.status);
       check();
     } });
-    return el("label", { class: "segment", title: `${name} (key ${i + 1})` }, radio, el("span", {}, name));
+    return el("label", { class: "segment", title: `${name} (key ${i + 1}), and the timestep that it bears` }, radio, el("span", {}, `${shortName(method)} `, limitLabel(method)));
   }));
   byId("methods").after(said.element);
   const check = () => {

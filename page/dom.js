@@ -1,3 +1,4 @@
+// @ts-check
 // Makes elements from code: text is always text, never markup, whatever the runtime sends.
 // Invariant: neither `innerHTML` nor a style attribute; the page's policy forbids what they would need.
 
@@ -22,4 +23,9 @@ export function byId(id) {
 /** Writes text only where it differs: most readouts stay as they are from one time to the next. */
 export function setText(element, text) {
   if (element.textContent !== text) element.textContent = text;
+}
+
+/** The same for an attribute, `class` among them. */
+export function setAttribute(element, name, text) {
+  if (element.getAttribute(name) !== text) element.setAttribute(name, text);
 }

@@ -31,6 +31,7 @@ export function duration(seconds) {
   if (size === 0 || size >= 1) return `${significant(seconds, 3)} s`;
   if (size >= 1e-3) return `${significant(seconds * 1e3, 3)} ms`;
   if (size >= 1e-6) return `${significant(seconds * 1e6, 3)} µs`;
+  if (size < 1e-10) return "less than 0.1 ns";
   return `${significant(seconds * 1e9, 3)} ns`;
 }
 
@@ -46,6 +47,11 @@ export function exact(value) {
 
 /** Full names of the integrators, in the order of their keys. */
 export const METHODS = [["euler", "Euler"], ["midpoint", "Midpoint"], ["verlet", "Verlet"], ["rk4", "Runge–Kutta 4"]];
+
+/** The same where there is little room. @param {string | undefined} method */
+export function shortName(method) {
+  return methodName(method).replace("Runge–Kutta 4", "RK 4");
+}
 
 /** @param {string | undefined} method */
 export function methodName(method) {

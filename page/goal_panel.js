@@ -1,3 +1,4 @@
+// @ts-check
 // The goal's panel: a target in numbers, its tolerance, and what became of it. Dragging in the view uses the same options.
 // Invariant: a goal is shown as active only while the runtime says so.
 

@@ -1,7 +1,8 @@
+// @ts-check
 // The recording's controls: scrub, step, replay in slow motion, back to live; and the stopwatch.
 // Invariant: they move what is shown, never the arm.
 
-import { byId, setText } from "./dom.js";
+import { byId, setAttribute, setText } from "./dom.js";
 import { fixed } from "./format.js";
 import { onFrame, wake } from "./frames.js";
 import { advance, goLive, halt, play, seek, shown, span, stepBy } from "./playback.js";
@@ -56,7 +57,7 @@ export function showHistory() {
   const scrub = byId("history-scrub");
   const part = shown.live || !all || all.to === all.from ? 1 : (shown.time - all.from) / (all.to - all.from);
   scrub.value = String(Math.round(part * SCRUB_STEPS));
-  scrub.setAttribute("aria-valuetext", shown.live ? "live" : `${fixed(shown.time, 2)} s, ${fixed(state.time - shown.time, 2)} s ago`);
+  setAttribute(scrub, "aria-valuetext", shown.live ? "live" : `${fixed(shown.time, 2)} s, ${fixed(state.time - shown.time, 2)} s ago`);
   byId("history-live").disabled = shown.live;
   setText(byId("history-play"), shown.playing ? "Hold" : "Replay");
   byId("stage").classList.toggle("recording", !shown.live);

@@ -1,3 +1,4 @@
+// @ts-check
 // Single-key shortcuts, those of the classic pendularm page first, and the overlay that lists them.
 // Invariant: no shortcut acts while somebody types, and all can be switched off.
 
@@ -28,8 +29,8 @@ const shortcuts = [
   ["d", "push the joint clockwise", () => pushNow(-1)],
   ["q", "setpoint of the joint − 0.05 rad", () => nudgeSetpoint(-NUDGE)],
   ["e", "setpoint of the joint + 0.05 rad", () => nudgeSetpoint(NUDGE)],
-  ["c", "servo on", () => switchServo(true)],
-  ["x", "servo on", () => switchServo(true)],
+  ["c", "servo on or off", () => switchServo(!state.enabled)],
+  ["x", "servo on or off", () => switchServo(!state.enabled)],
   ["s", "servo off", () => switchServo(false)],
   ["j", "next joint", () => { chooseJoint(state.joint + 1); announce(`Joint ${state.joint + 1}.`); }],
   [" ", "pause or run", togglePause],

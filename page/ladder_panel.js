@@ -1,3 +1,4 @@
+// @ts-check
 // Error against run time, live: all methods over a ladder of timesteps, from the present state of this arm.
 // Invariant: every point is a run of the runtime's own; what diverged or can't be judged is said, not drawn.
 
@@ -9,7 +10,7 @@ import { wake } from "./frames.js";
 import { TIMESTEPS, cheapest, errorText, read, rungs, uncertaintyOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { LogScale } from "./scale.js";
-import { state } from "./store.js";
+import { state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
@@ -38,6 +39,7 @@ export function startLadder() {
   said = refusal(go);
   byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, el("label", { class: "option" }, el("span", {}, "servo"), servo), go), said.element);
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
+  watch("connection", () => said.show(""));
   setText(byId("ladder-text"), "Runs this arm from its present state with every method at eight timesteps, and compares each with a reference: what does accuracy cost?");
 }
 
@@ -82,7 +84,7 @@ function describe() {
   }
   const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
   const uncertainty = uncertaintyOf(found);
-  const text = `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} at ${duration(cheap.timestep)}. A steeper line gains more from a smaller step: `
+  const text = `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}. A steeper line gains more from a smaller step: `
     + "halving it halves Euler’s error, quarters midpoint’s and Verlet’s, and cuts Runge–Kutta’s to a sixteenth, until rounding ends it."
     + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
   setText(byId("ladder-text"), text);

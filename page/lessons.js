@@ -36,7 +36,7 @@ export const LESSONS = [
   {
     id: "euler",
     name: "Euler gains energy",
-    text: "Nothing drives this swing, so its energy should stay at 0 J, yet Euler at 5 ms adds some at every step. Choose Runge–Kutta 4 (key 4), reset, and the line stays flat.",
+    text: "Nothing drives this swing, so its energy should stay at 0 J, yet Euler at 5 ms adds some at every step. Choose Runge–Kutta 4 (key 4): from then on the line stays flat.",
     panel: "plots",
     settings: (links) => from(links, { integrator: { method: "euler", timestep: 0.005 } }),
   },
@@ -92,7 +92,7 @@ export const LESSONS = [
   {
     id: "own",
     name: "Your own arm",
-    text: "Set masses and lengths of the arm that you have, then gains, and read under the arm which timestep they bear, and where. If no timestep is stable, or the arm is slow, take gains that are suggested, or lower the integral ones and raise the others.",
+    text: "Set masses and lengths of the arm that you have, then gains: each integrator’s button says which timestep they bear at the setpoint, and “Why?” under the arm says what limits it. If no timestep is stable, or the arm is slow, take gains that are suggested, or lower the integral ones and raise the others.",
     panel: "stability",
     settings: (links) => from(links, { servo: true, setpoint: first(links, FOLDED) }),
   },

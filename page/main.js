@@ -1,5 +1,6 @@
+// @ts-check
 // Starts the page: every part takes its place, then the runtime is called; frames are drawn when something has changed.
-// Invariant: while nothing changes nothing is drawn, and no timer does more than compare.
+// Invariant: while nothing changes nothing is drawn, and no timer runs.
 
 import { remember, startActions } from "./actions.js";
 import { startAim } from "./aim.js";
@@ -13,6 +14,7 @@ import { showHistory, startHistory } from "./history_panel.js";
 import { startKeyboard } from "./keyboard.js";
 import { startLadder } from "./ladder_panel.js";
 import { startLessons } from "./lessons_panel.js";
+import { startLimits } from "./limits_view.js";
 import { startMap } from "./map_view.js";
 import { startModes } from "./modes_view.js";
 import { follow, goLive } from "./playback.js";
@@ -22,7 +24,7 @@ import { record, take } from "./recorder.js";
 import { start } from "./runtime.js";
 import { startSave } from "./save.js";
 import { startShare } from "./share.js";
-import { watch } from "./store.js";
+import { watch, watchAll } from "./store.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
@@ -51,6 +53,7 @@ startReadouts();
 startGoalPanel();
 startTrialPanel();
 startMap();
+startLimits();
 startModes();
 startLadder();
 startCompare();
@@ -82,7 +85,12 @@ watch("links", forget);
 start(forget, remember);
 
 let beats = 0;
-setInterval(() => {
+let described = -Infinity;
+let left = 0; // beats still to come, so that the figures are those of the last news
+
+function beat() {
+  left -= 1;
+  if (left > 0) setTimeout(beat, BEAT_MS);
   if (document.hidden) return;
   beats += 1;
   if (beats % FIGURES === 0) {
@@ -90,7 +98,16 @@ setInterval(() => {
     showValues();
     showHistory();
   }
+  const now = performance.now();
+  if (now - described >= SENTENCE_MS) {
+    described = now;
+    describeArm();
+  }
   movePlots();
   redrawTrail();
-}, BEAT_MS);
-setInterval(describeArm, SENTENCE_MS);
+}
+
+watchAll(() => {
+  if (left === 0) setTimeout(beat, BEAT_MS);
+  left = FIGURES;
+});

@@ -1,7 +1,9 @@
+// @ts-check
 // The stability map: gains against timestep, where the held servo is stable and where not, the present point in it.
 // A click goes there; so do the arrow keys.
 // Invariant: the boundary is that of the arm's own settings, drawn as far as it is known; a click sends what it shows.
 
+import { beginAnew } from "./actions.js";
 import { byId, setText } from "./dom.js";
 import { duration, methodName } from "./format.js";
 import { onFrame, wake } from "./frames.js";
@@ -162,8 +164,8 @@ function describe() {
   if (!row || !state.integrator) return;
   const words = (limit) => (limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : `up to ${duration(limit)}`);
   setText(byId("map-value"), `${duration(state.integrator.timestep)}, gains as they are`);
-  setText(byId("map-text"), `With ${methodName(state.integrator.method)} at this setpoint the present gains bear ${words(row.held)} held over each step (solid line), `
-    + `${words(row.continuous)} with control in every stage (dashed); higher gains bear less, and too low ones hold the arm at no timestep. The dot is the arm${state.enabled ? "" : " once the servo is on"}; click to go elsewhere.`);
+  setText(byId("map-text"), `Solid line: ${methodName(state.integrator.method)} with efforts held over each step, ${words(row.held)} with these gains; dashed: with control in every stage, ${words(row.continuous)}. `
+    + `Higher gains bear less, too low ones hold the arm at no timestep. The dot is the arm${state.enabled ? "" : " once the servo is on"}; click to go elsewhere.`);
 }
 
 function goTo(left, top) {
@@ -174,11 +176,15 @@ function goTo(left, top) {
   move(timesteps.value(place), factors.value(rise));
 }
 
-function move(timestep, factor) {
+/** An arm that has diverged begins anew there: it could not be seen otherwise whether the place is a better one. */
+async function move(timestep, factor) {
   const short = (value) => Number(value.toPrecision(3));
   const gains = scaled(state.gains, factor);
-  if (Math.abs(Math.log(factor)) > 0.02) setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) });
-  if (timestep !== state.integrator.timestep) setIntegrator({ timestep: short(timestep) });
+  const changes = [];
+  if (Math.abs(Math.log(factor)) > 0.02) changes.push(setGains({ kp: gains.kp.map(short), ki: gains.ki.map(short), kd: gains.kd.map(short) }));
+  if (timestep !== state.integrator.timestep) changes.push(setIntegrator({ timestep: short(timestep) }));
+  await Promise.all(changes);
+  if (state.diagnostics?.state === "diverged") beginAnew();
 }
 
 function arrows(event) {

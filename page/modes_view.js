@@ -1,3 +1,4 @@
+// @ts-check
 // The loop's modes, twice: by what one step multiplies them (inside the unit circle they die away), and as timestep times
 // eigenvalue in the method's region of stability, as if control acted in every stage.
 // Invariant: both are of the loop in force, and follow the timestep's slider while it is dragged.
@@ -16,7 +17,6 @@ import { colors, onTheme } from "./theme.js";
 const CIRCLE = { re: -0.4, half: 1.5 };
 const REGION = { re: -1.2, half: 3.2 };
 const MARGIN = 4;
-const STRIDE = 2; // pixels of the region that are judged together
 
 let circle;
 let region;
@@ -137,9 +137,9 @@ function paintRegion(method) {
   const context = regionPicture.getContext("2d");
   context.fillStyle = colors.stable;
   const { x, y, scale } = place(region, REGION, { re: 0, im: 0 });
-  for (let px = 0; px < width; px += STRIDE) {
-    for (let py = 0; py < height; py += STRIDE) {
-      if (amplification(method, (px + STRIDE / 2 - x) / scale, (y - py - STRIDE / 2) / scale) <= 1 + 1e-9) context.fillRect(px, py, STRIDE, STRIDE);
+  for (let px = 0; px < width; px += 1) {
+    for (let py = 0; py < height; py += 1) {
+      if (amplification(method, (px + 0.5 - x) / scale, (y - py - 0.5) / scale) <= 1 + 1e-9) context.fillRect(px, py, 1, 1);
     }
   }
 }

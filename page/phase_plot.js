@@ -1,3 +1,4 @@
+// @ts-check
 // The phase plot: velocity over position of each shown joint, through the last seconds; the present state is a dot.
 // Invariant: a frame allocates nothing. It draws on whatever context it is given.
 

@@ -1,3 +1,4 @@
+// @ts-check
 // The plots' panel: four strip charts and the phase plot, what they show, their legends and their common cursor.
 // Invariant: pausing the plots stops only the drawing; recording goes on.
 

@@ -68,12 +68,14 @@ export function limitInForce(/** @type {any} */ state) {
   const named = pose ? `(${Array.from(pose, (q) => fixed(q, 2)).join(", ")}) rad` : "";
   const kinds = { setpoint: `at the setpoint ${named}`, sagging: `where it sags to, ${named}`, hanging: "hanging, small swings", saddle: `where it falls to, ${named}`, unstable: `at ${named}, where the gains themselves are at fault` };
   const place = kinds[/** @type {keyof typeof kinds} */ (answer.equilibrium_kind)] ?? (free ? (state.params.gravity > 0 ? "hanging, small swings" : "without gravity, slow turns") : `at the setpoint ${named}`);
-  const moving = motion < held;
+  // Who has diverged, or shakes beyond the limit where it rests, moves fast because of that: it is no cause.
+  const moving = motion < held && !(state.integrator?.timestep > held) && state.diagnostics?.state !== "diverged";
+  const inForce = moving ? motion : held;
   return {
-    limit: Math.min(held, motion),
+    limit: inForce,
     where: moving ? `moving at ${significant(answer.motion_speed ?? NaN, 3)} rad/s` : place,
-    everyPose: free ? Math.min(held, motion) : Math.min(held, motion, open(answer.minimum_over_poses_held)),
-    advised: free ? answer.advised_timestep ?? NaN : afterReset(answer),
+    everyPose: free ? inForce : Math.min(inForce, open(answer.minimum_over_poses_held)),
+    advised: free ? (moving ? answer.advised_timestep ?? NaN : SHARE * held) : afterReset(answer),
   };
 }
 
@@ -99,9 +101,9 @@ export function verdict(/** @type {any} */ state) {
   if (state.diagnostics?.state === "diverged") {
     return { kind: "diverged", pill: "diverged", sentence: excess(timestep, limit, where), ...known };
   }
-  if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit not known yet", sentence: "", ...known };
+  if (Number.isNaN(limit) || Number.isNaN(timestep)) return { kind: "unknown", pill: "limit unknown", sentence: "", ...known };
   if (timestep > limit) {
-    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "grows at any timestep", sentence: excess(timestep, limit, where), ...known };
+    return { kind: limit > 0 ? "beyond" : "never", pill: limit > 0 ? "beyond the limit" : "never stable", sentence: excess(timestep, limit, where), ...known };
   }
   if (timestep > everyPose) {
     const others = everyPose > 0 ? `other poses bear only ${duration(everyPose)}: on the way there the arm may shake` : "in other poses no timestep is: there the gains themselves are at fault";
@@ -115,8 +117,18 @@ export function verdict(/** @type {any} */ state) {
 function excess(timestep, limit, where) {
   if (!(timestep > limit)) return "";
   return limit > 0
-    ? `Timestep ${duration(timestep)} is above the predicted stability limit ${duration(limit)}, ${where}.`
+    ? `${duration(timestep)} is above the limit ${duration(limit)}, ${where}.`
     : `No timestep is stable, ${where}.`;
+}
+
+/** What the present loop bears, here and everywhere, and what to use; empty while that is not known. */
+export function adviceText(/** @type {any} */ state) {
+  const { limit, where, everyPose, advised } = limitInForce(state);
+  if (!answerInForce(state) || Number.isNaN(limit)) return "";
+  if (limit === 0) return `No timestep is stable, ${where}.`;
+  const elsewhere = everyPose < limit ? `; in every pose ${everyPose > 0 ? `up to ${duration(everyPose)}` : "none is"}` : "";
+  const advice = advised > 0 && advised < Infinity ? ` Advised: ${duration(advised)}.` : "";
+  return `Stable up to ${limitText(limit)}, ${where}${elsewhere}.${advice}`;
 }
 
 /** @param {number} limit */

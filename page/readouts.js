@@ -1,12 +1,13 @@
+// @ts-check
 // Numbers in words and figures: time, real-time factor, timestep and its limit, energy, connection; and the arm in a sentence.
 // Invariant: written a few times a second; only what changed touches the page.
 
-import { byId, setText } from "./dom.js";
-import { duration, fixed, methodName, significant } from "./format.js";
+import { byId, setAttribute, setText } from "./dom.js";
+import { duration, fixed, shortName, significant } from "./format.js";
 import { tip } from "./arm_view.js";
 import { growthOf } from "./growth.js";
 import { shown } from "./playback.js";
-import { answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
+import { adviceText, answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
 import { isStill } from "./runtime.js";
 import { Median } from "./smooth.js";
 import { state, watch } from "./store.js";
@@ -16,7 +17,7 @@ const LOW_RATE = 50;
 /** Below this real-time factor the runtime lags. */
 const LAGS = 0.95;
 /** Estimates that are shown as one: two seconds of them. */
-const ESTIMATES = 20;
+const ESTIMATES = 10;
 /** A local error below this is rounding, whatever its digits [rad/s]. */
 const ROUNDING = 1e-12;
 
@@ -34,8 +35,6 @@ export function startReadouts() {
   watch("estimate", (estimate) => {
     if (!estimate) estimates.clear();
     else estimates.add(estimate.error_per_second);
-    const { value } = estimates;
-    setText(byId("out-error"), value < ROUNDING ? "rounding" : Number.isFinite(value) ? `${significant(value, 2)} rad` : "–");
   });
 }
 
@@ -44,16 +43,18 @@ export function showReadouts() {
   const { diagnostics } = state;
   setText(byId("sim-time"), fixed(shown.time, 2));
   setText(byId("run-state"), runState());
-  byId("run-state").className = `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`;
+  setAttribute(byId("run-state"), "class", `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`);
+  const { value } = estimates;
+  setText(byId("out-error"), value < ROUNDING ? "rounding" : Number.isFinite(value) ? `${significant(value, 2)} rad` : "–");
   const factor = diagnostics?.real_time_factor ?? NaN;
   setText(byId("out-rtf"), state.paused ? "paused" : `${fixed(factor, 2)}×`);
   byId("out-rtf").classList.toggle("warn", !state.paused && diagnostics?.state === "running" && factor < LAGS);
-  setText(byId("out-method"), methodName(state.integrator?.method).replace("Runge–Kutta 4", "RK 4"));
+  setText(byId("out-method"), shortName(state.integrator?.method));
   setText(byId("out-timestep"), duration(state.integrator?.timestep ?? NaN));
   setText(byId("out-servo"), state.enabled == null ? "–" : state.enabled ? "on" : "off");
-  setText(byId("out-steps"), `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
+  setText(byId("out-steps"), state.paused ? "–" : `${significant(diagnostics?.steps_per_second ?? NaN, 3)}/s`);
   setText(byId("out-clients"), fixed(diagnostics?.clients ?? NaN, 0));
-  setText(byId("out-rate"), `${fixed(state.rate, 0)} Hz`);
+  setText(byId("out-rate"), isStill() ? "–" : `${fixed(state.rate, 0)} Hz`);
   byId("out-rate").classList.toggle("warn", state.connection === "open" && !isStill() && state.rate > 0 && state.rate < LOW_RATE);
   setText(byId("out-drops"), fixed(diagnostics?.dropped ?? NaN, 0));
   byId("out-drops").classList.toggle("warn", diagnostics?.dropped > 0);
@@ -61,7 +62,7 @@ export function showReadouts() {
 
 function runState() {
   if (state.connection !== "open") return "no connection";
-  if (!shown.live) return shown.playing && shown.speed !== 1 ? `recording, ${significant(1 / shown.speed, 2)} times slower` : "recording";
+  if (!shown.live) return shown.playing && shown.speed !== 1 ? `recording, 1/${fixed(1 / shown.speed, 0)} speed` : "recording";
   if (state.diagnostics?.state === "diverged") return "diverged";
   return state.paused ? "paused" : "running";
 }
@@ -82,7 +83,7 @@ function showLimit() {
   setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("worst-text"), worstText(answer));
-  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found by search");
+  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "by search");
   byId("out-every").classList.toggle("warn", said.kind === "here");
   const known = Number.isFinite(limit) && limit > 0;
   const bar = byId("limit-bar");
@@ -91,12 +92,7 @@ function showLimit() {
   bar.style.setProperty("--used", `${Math.min(100, 100 * used)}%`);
   bar.className = `limit-bar ${used > 1 ? "bad" : said.kind === "here" || used > 0.7 ? "warn" : "good"}`;
   bar.setAttribute("aria-label", `timestep is ${fixed(100 * used, 0)} percent of the stability limit`);
-  const stability = answerInForce(state);
-  const advice = [];
-  if (stability && !Number.isNaN(limit)) advice.push(limit === 0 ? `No timestep is stable, ${said.where}.` : `Stable up to ${limitText(limit)}, ${said.where}.`);
-  if (stability?.timestep_limit_continuous > 0 && state.enabled) advice.push(`Control in every stage: ${duration(stability.timestep_limit_continuous)}.`);
-  if (stability?.advised_timestep > 0) advice.push(`Advised: ${duration(stability.advised_timestep)}.`);
-  setText(byId("limit-text"), advice.join(" "));
+  setText(byId("limit-text"), adviceText(state));
 }
 
 /** The arm in a sentence, for those who can't see it; read when the view has the focus. */

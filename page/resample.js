@@ -1,3 +1,4 @@
+// @ts-check
 // Two rollouts on one clock: sample counts at which both are on the same instants, and a cubic in between where they are not.
 // The cubic matches positions and velocities at both ends (Hermite), so between samples it is off by the fourth power of their distance.
 // Invariant: where a run has a sample at the very instant, that sample is taken as it is.

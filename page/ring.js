@@ -1,3 +1,4 @@
+// @ts-check
 // A ring of rows of numbers: the newest `capacity` rows are kept, in memory that is taken once.
 // Invariant: nothing is allocated after construction, however long the page stays open.
 

@@ -1,3 +1,4 @@
+// @ts-check
 // A rosbridge client over WebSocket: calls as promises, subscriptions that outlive a lost connection.
 // Invariant: a promise of `call` is always fulfilled, with `result: false` and a reason where there is no answer.
 
@@ -33,7 +34,8 @@ export class Rosbridge {
     socket.onopen = () => {
       this.retryMs = FIRST_RETRY_MS;
       // Errors about what we publish are worth showing; over WebSocket they come only when asked for.
-      this.send({ op: "set_level", level: "error" });
+      // `values` of a refused call are the values as they now are, not the text that `status` has too.
+      this.send({ op: "set_level", level: "error", errors: "object" });
       for (const topic of this.handlers.keys()) this.send(this.subscription(topic));
       this.onState("open");
     };

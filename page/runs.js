@@ -2,7 +2,7 @@
 // What a comparison says of its runs: how far each lies from the reference over time, where it ended, what it gained.
 // Invariant: nothing is computed from what is not there; a run that ended early has figures up to its end, and says when.
 
-import { duration, fixed, methodName, significant } from "./format.js";
+import { duration, fixed, shortName, significant } from "./format.js";
 import { endOf } from "./ladder.js";
 import { resample } from "./resample.js";
 
@@ -55,7 +55,7 @@ export function describeRun(run, away, seconds) {
   const gained = energyGained(run, seconds);
   const known = /** @type {number[]} */ (away.filter((one) => one !== null));
   return {
-    name: `${methodName(run.method)}, ${duration(run.timestep)}`,
+    name: `${shortName(run.method)}, ${duration(run.timestep)}`,
     outcome: ended === null ? "lasts" : `diverged at t = ${fixed(ended, 2)} s`,
     energy: gained === null ? "–" : `${significant(gained, 3)} J`,
     error: ended !== null || known.length === 0 ? "–" : `${significant(Math.max(...known), 3)} rad`,

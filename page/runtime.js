@@ -1,3 +1,4 @@
+// @ts-check
 // The runtime as the page sees it: topics into the store, commands out, settings asked for again now and then.
 // Invariant: every answer's values go into the store, so that what is shown is what the runtime accepted.
 
@@ -15,8 +16,14 @@ const MISSING_POLLS = 15;
 const TRAJECTORY_MS = 400;
 /** So long after our own reset the clock's jump is taken to be its. */
 const OWN_RESET_MS = 2000;
-/** A picture that stands still, or that nobody sees, needs few joint states [ms between two]. */
-const STILL_MS = 100;
+/** A picture that stands still needs few joint states [ms between two]. */
+const STILL_MS = 1000;
+/** One that nobody sees needs more: they are recorded, and a swing must be known by them when somebody looks again. */
+const HIDDEN_MS = 100;
+/** But what was done to a paused arm here is seen at once: so long all of them come [ms]. */
+const TOUCHED_MS = 300;
+/** Estimates of the error are shown as the median of two seconds of them. */
+const ESTIMATE_MS = 200;
 /** What is reckoned or searched may take its time. */
 const LONG_CALL_MS = 120000;
 /** A joint state is as old as this at most when it arrives. */
@@ -32,6 +39,7 @@ let counted = performance.now();
 let missingPolls = 0;
 let lastTrajectory = -Infinity;
 let lastReset = -Infinity;
+let touched = -Infinity;
 let onReset = () => {};
 let beforeChange = () => {};
 
@@ -49,23 +57,40 @@ export function start(whenReset, whenChanging) {
   bridge.subscribe("/ik_action/result", goalResult);
   bridge.subscribe("/ik_trial/status", (msg) => set("trial", msg));
   bridge.subscribe("/arm_sim/error_estimate", (msg) => set("estimate", msg));
-  setInterval(poll, POLL_MS);
+  pace();
+  setInterval(tick, POLL_MS);
   for (const key of ["integrator", "gains", "params", "enabled", "setpoint", "links"]) {
     watch(key, () => { if (!state.stabilityMissing) askStability(); });
   }
-  for (const key of ["params", "enabled"]) watch(key, () => set("pushed", false));
+  for (const key of ["params", "enabled"]) {
+    watch(key, () => {
+      set("pushed", false);
+      if (state.goal?.outcome === "reached") set("goal", null); // the arm is there no longer
+    });
+  }
   watch("paused", pace);
   document.addEventListener("visibilitychange", pace);
 }
 
-/** As many joint states as are drawn: all of a moving arm in sight, a few of one that is paused or hidden. */
+/** As many joint states as are drawn or recorded: all of a moving arm in sight, a few of one that is paused or hidden. */
 function pace() {
-  const ms = isStill() ? STILL_MS : 0;
-  for (const topic of ["/joint_states", "/arm_sim/error_estimate"]) bridge.throttle(topic, ms);
+  bridge.throttle("/joint_states", rests() ? STILL_MS : document.hidden ? HIDDEN_MS : 0);
+  bridge.throttle("/arm_sim/error_estimate", isStill() ? STILL_MS : ESTIMATE_MS);
 }
 
 export function isStill() {
-  return state.paused === true || document.hidden;
+  return document.hidden || rests();
+}
+
+function rests() {
+  return state.paused === true && performance.now() - touched >= TOUCHED_MS;
+}
+
+/** A paused arm is in another pose by what was asked of it here. */
+function touch() {
+  touched = performance.now();
+  pace();
+  setTimeout(pace, TOUCHED_MS);
 }
 
 function connection(now) {
@@ -138,6 +163,7 @@ function trajectory(msg) {
   const positions = new Array(last.length);
   for (let i = 0; i < last.length; i += 1) positions[named ? Number(names[i].slice(5)) - 1 : i] = last[i];
   lastTrajectory = performance.now();
+  if (state.goal?.outcome === "reached") set("goal", null); // the arm is sent elsewhere: its mark is of the past
   keepSetpoint(positions);
 }
 
@@ -173,7 +199,9 @@ function diagnostics(msg) {
   if (report.state !== "diverged") keep("paused", report.state === "paused");
   set("diagnostics", report);
   if (motionHasChanged(state) && question(state)) askNow(question(state));
-  if (before !== report.state && report.state === "diverged") warn(`The simulation has ${report.message}`);
+  if (before === report.state) return;
+  poll(); // another client may have done what led here
+  if (report.state === "diverged") warn(`The simulation has ${report.message}`);
 }
 
 function feedback(msg) {
@@ -196,12 +224,16 @@ function goalResult(msg) {
 
 // Settings: each call asks or changes, and stores what is now in force.
 
-function poll() {
+function tick() {
   const now = performance.now();
   const rate = (arrived * 1000) / Math.max(1, now - counted);
   set("rate", state.rate > 0 && arrived > 0 ? (state.rate + rate) / 2 : rate); // timers come and go by some milliseconds
   arrived = 0;
   counted = now;
+  poll();
+}
+
+function poll() {
   if (!bridge.open || document.hidden) return;
   setParams({});
   setIntegrator({});
@@ -228,7 +260,6 @@ export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args,
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
 export const pause = (data) => settings("/arm_sim/pause", data === undefined ? {} : { data }, (values) => keep("paused", values.data));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
-export const step = (steps) => bridge.call("/arm_sim/step", { steps });
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);
 export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
@@ -246,10 +277,17 @@ export const suggestGains = () => bridge.call("/study/gains", {}, LONG_CALL_MS);
 /** Offline motion of the same arm. */
 export const rollout = (args) => bridge.call("/study/rollout", args, LONG_CALL_MS);
 
+export async function step(steps) {
+  const answer = await bridge.call("/arm_sim/step", { steps });
+  touch();
+  return answer;
+}
+
 export async function reset() {
   const answer = await bridge.call("/arm_sim/reset");
   if (answer.result) {
     lastReset = performance.now();
+    touch();
     keepSetpoint(new Array(state.links).fill(0));
   }
   return answer;

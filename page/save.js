@@ -1,3 +1,4 @@
+// @ts-check
 // Files to keep: what was recorded as CSV, the plots as PNG or SVG.
 // Invariant: the page's memory is not kept: what was made is handed to the browser and let go.
 

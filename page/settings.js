@@ -34,7 +34,7 @@ export const DEFAULTS = {
   3: {
     integrator: { method: "rk4", timestep: 0.001 },
     params: { gravity: 9.81, masses: [1, 1, 1], lengths: [1, 1, 1] },
-    gains: { kp: [1900, 240, 115], ki: [4800, 500, 340], kd: [185, 32, 5] },
+    gains: { kp: [2200, 180, 80], ki: [3500, 300, 185], kd: [160, 38, 4.8] },
     servo: false,
     setpoint: [0, 0, 0],
   },

@@ -1,3 +1,4 @@
+// @ts-check
 // The settings in the page's address, behind the #, to be sent to others.
 // Invariant: opening an address changes nothing; its settings wait for a click. Any page can link here, and a link must not
 // be able to drive the arm.

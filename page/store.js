@@ -1,3 +1,4 @@
+// @ts-check
 // What the page knows about the runtime, in one place; whoever shows a part of it watches that part.
 // Invariant: only what the runtime has said is stored here, never what was merely asked for.
 
@@ -36,6 +37,7 @@ export const state = {
 };
 
 const watchers = new Map(); // key -> functions
+const everything = []; // functions
 
 export function watch(key, react) {
   if (!watchers.has(key)) watchers.set(key, []);
@@ -51,4 +53,10 @@ export function set(key, value) {
 export function tell(key) {
   const reacts = watchers.get(key);
   if (reacts) for (const react of reacts) react(state[key]);
+  for (const react of everything) react();
+}
+
+/** For whoever looks at all of it, and has to know only that something is new. */
+export function watchAll(react) {
+  everything.push(react);
 }

@@ -1,3 +1,4 @@
+// @ts-check
 // A strip chart: quantities over the last seconds of simulation time, one colour per joint.
 // Invariant: rows are read where the recorder wrote them. It draws on whatever context it is given, a canvas or an SVG file.
 

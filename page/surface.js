@@ -1,3 +1,4 @@
+// @ts-check
 // A canvas as sharp as the screen: sized in device pixels, drawn in CSS pixels.
 // Invariant: its size is read when it changes, not at every frame. It is opaque and has a pixel for each of the screen's that it
 // covers, so that a frame of it is copied to the screen, neither blended nor resampled.

@@ -1,3 +1,4 @@
+// @ts-check
 // The panels beside the arm, one at a time, as tabs: arrow keys go from one to the next.
 // Invariant: exactly one panel is shown, and only that one costs anything to draw.
 

@@ -1,5 +1,6 @@
+// @ts-check
 // Light and dark, and the colours that the canvases take from the style sheet.
-// Invariant: colours are spelled in `style.css` only.
+// Invariant: colours are spelled in `colors.css` only.
 
 import { byId } from "./dom.js";
 
@@ -16,8 +17,12 @@ export function onTheme(react) {
 }
 
 function read() {
-  const style = getComputedStyle(document.documentElement);
-  for (const name of NAMES) colors[name] = style.getPropertyValue(`--${name}`).trim();
+  // A variable's own text has both themes in it; as somebody's colour it is one.
+  const probe = byId("probe");
+  for (const name of NAMES) {
+    probe.style.color = `var(--${name})`;
+    colors[name] = getComputedStyle(probe).color;
+  }
   colors.joints = [colors.joint1, colors.joint2, colors.joint3];
   colors.runs = [colors.run1, colors.run2, colors.run3, colors.run4, colors.run5, colors.run6];
   for (const react of listeners) react();

@@ -1,3 +1,4 @@
+// @ts-check
 // The way of the tip through the last seconds: a smooth curve through the recorded states, fading towards the past.
 // Invariant: between two states the curve has the tip's places and velocities at both, so it is no polygon however fast it goes.
 
@@ -12,7 +13,7 @@ const BRIGHTEST = 0.7;
 /** How far joints turn, all together, in one piece of curve: a cubic is as good, and fewer are less work [rad]. */
 const TURN = 0.15;
 /** Tips further apart are joined by straight lines: the velocity says nothing about so long a way [of the reach]. */
-const FAR = 2.5;
+const FAR = 0.75;
 
 /** The trail that ends at `time`; `px` and `py` turn metres into pixels. */
 export function drawTrail(context, n, lengths, px, py, time) {

@@ -1,7 +1,8 @@
+// @ts-check
 // Pause, single step and reset, and what is said under the arm: the verdict on the timestep, warnings, divergence.
 // Invariant: a notice offers what can be done about it, and goes when its cause is gone.
 
-import { recover, resetArm } from "./actions.js";
+import { beginAnew, recover, resetArm } from "./actions.js";
 import { announce } from "./announce.js";
 import { byId, el, setText } from "./dom.js";
 import { switchServo, takeSuggestion } from "./controls.js";
@@ -70,7 +71,7 @@ function showNotice() {
   box.className = notice ? `notice ${notice.kind}` : "notice";
   box.hidden = !notice;
   byId("stage").classList.toggle("diverged", notice?.key === "diverged");
-  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", onclick: act }, text)));
+  if (notice) box.replaceChildren(el("p", {}, notice.text), ...notice.buttons.map(([text, act]) => el("button", { type: "button", class: "small", onclick: act }, text)));
 }
 
 function choose() {
@@ -85,7 +86,7 @@ function choose() {
   // No timestep helps where the gains are at fault.
   const other = state.enabled && state.offersGains && limitInForce(state).everyPose === 0 ? [["Suggest gains", takeSuggestion]] : [];
   if (kind === "diverged") {
-    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Reset", () => report(resetArm())]] };
+    return { key: "diverged", kind: "bad", text: `Diverged${whenOf(diagnostics.message)}. ${sentence}`, buttons: [...smaller, ...other, ["Begin anew", () => report(beginAnew())]] };
   }
   if (kind === "beyond" || (kind === "never" && state.enabled)) return { key: "limit", kind: "bad", text: sentence, buttons: [...smaller, ...other] };
   if (diagnostics?.level === 1 && diagnostics.real_time_factor < SLOW) {

@@ -1,3 +1,4 @@
+// @ts-check
 // The timed trial: start, skip, stop, with its clock and count.
 // Invariant: the clock and the count are those of the runtime, whoever started the trial.
 

@@ -19,7 +19,8 @@ README = ROOT / "README.md"
 MARKS = re.compile(r"(<!-- scripts/features.py -->\n).*?(<!-- end -->)", re.DOTALL)
 BUILDS = (
     ("default", "", "program"),
-    ("without the report", "--no-default-features --features web", "program"),
+    ("without the report", "--no-default-features --features web,record", "program"),
+    ("without the record", "--no-default-features --features web,report", "program"),
     ("without the web", "--no-default-features --features report", "program"),
     ("`runtime` alone", "--no-default-features --features runtime", "program"),
     ("no features: the library", "--no-default-features --lib", "library"),

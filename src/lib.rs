@@ -11,6 +11,7 @@
 //! | `runtime` | yes | `actors`, `protocol`, `options`, `logging`, `plan`, and the program |
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
 //! | `report` | yes | `report`, with its experiments |
+//! | `record` | yes | `record`: runs on record, read back and replayed |
 //!
 //! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs
 //! no more, and compiles `glam` and `thiserror` beside it.
@@ -38,6 +39,8 @@ pub mod options;
 pub mod plan;
 #[cfg(feature = "runtime")]
 pub mod protocol;
+#[cfg(feature = "record")]
+pub mod record;
 #[cfg(feature = "report")]
 pub mod report;
 pub mod study;

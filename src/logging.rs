@@ -114,17 +114,15 @@ impl<S: Subscriber> Layer<S> for Warnings {
     }
 }
 
-/// The folders in which the actors stand; a node has none of their names.
-const FOLDERS: [&str; 4] = ["gateway", "arm", "compute", "ros"];
-
 /// The actor in whose module something was reported: `registry` of `pendularm::actors::gateway::registry::ops`.
 fn node_of(target: &'static str) -> &'static str {
-    let parts = target.split("::").skip_while(|part| *part != "actors");
-    let mut modules = parts.skip(1).skip_while(|part| FOLDERS.contains(part));
-    match modules.next() {
-        Some("sim") => "arm_sim",
-        Some(module) => module,
-        None => "pendularm",
+    let modules = target.split("::").skip_while(|part| *part != "actors");
+    let modules: Vec<&'static str> = modules.skip(1).take(2).collect();
+    match modules[..] {
+        ["arm", "sim"] => "arm_sim",
+        // Folders, in which the actors stand.
+        ["arm" | "compute" | "gateway" | "resources" | "ros", actor] | [actor, ..] => actor,
+        [] => "pendularm",
     }
 }
 

@@ -3,18 +3,27 @@
 //! **Invariant:** nothing here panics, also with standard output or standard error closed, full or broken.
 
 use std::fmt::Display;
+#[cfg(feature = "record")]
+use std::fs::File;
+#[cfg(feature = "record")]
+use std::io::BufReader;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
 use pendularm::actors::{panics, runtime};
 use pendularm::logging;
+#[cfg(feature = "record")]
+use pendularm::options::ReplayOptions;
 use pendularm::options::{Options, Parsed};
 use pendularm::plan;
+#[cfg(feature = "record")]
+use pendularm::record;
 #[cfg(feature = "report")]
 use pendularm::report;
 
-/// Memory that was freed goes back to the system within ten seconds, by a thread that nobody waits for. The C library's allocator
-/// keeps it for ever where the last of it lies behind something small, which after a burst of small messages is the rule.
+/// Memory that was freed goes back to the system within ten seconds, by a thread that nobody waits for. The C library's
+/// allocator keeps it for ever where the last of it lies behind something small, which after a burst of small messages
+/// is the rule.
 #[global_allocator]
 static ALLOCATOR: tikv_jemallocator::Jemalloc = tikv_jemallocator::Jemalloc;
 
@@ -41,6 +50,8 @@ fn main() -> ExitCode {
                 ExitCode::FAILURE
             }
         },
+        #[cfg(feature = "record")]
+        Ok(Parsed::Replay(options)) => replay(&options),
         Ok(Parsed::Show(text)) => show(&text),
         Err(error) => {
             complain(&error);
@@ -54,6 +65,25 @@ fn show(text: &str) -> ExitCode {
     // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
     let _ = io::stdout().write_all(text.as_bytes());
     ExitCode::SUCCESS
+}
+
+/// Says whether the recorded steps can be taken again.
+#[cfg(feature = "record")]
+fn replay(options: &ReplayOptions) -> ExitCode {
+    let file = options.file.display();
+    let verdict = File::open(&options.file)
+        .map_err(|error| error.to_string())
+        .and_then(|file| record::replay(BufReader::new(file)).map_err(|error| error.to_string()));
+    match verdict {
+        Ok(verdict) => {
+            show(&format!("{file}: {verdict}\n"));
+            ExitCode::from(u8::from(verdict.difference.is_some()))
+        }
+        Err(error) => {
+            complain(&format_args!("{file}: {error}"));
+            ExitCode::FAILURE
+        }
+    }
 }
 
 fn serve(options: &Options) -> ExitCode {

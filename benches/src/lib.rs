@@ -1,5 +1,6 @@
-//! What several of these programs share: clients, the program as a process, and the attacks.
+//! The part that several of these programs share: clients, the program as a process, and the attacks.
 
 pub mod attack;
+pub mod process;
 pub mod program;
 pub mod protocol;

@@ -20,7 +20,7 @@ pub struct Program {
     log: Arc<Mutex<Log>>,
 }
 
-/// What it said on standard error.
+/// Its lines on standard error.
 #[derive(Debug, Default, Clone)]
 pub struct Log {
     /// The first lines.
@@ -31,7 +31,7 @@ pub struct Log {
     pub panics: u64,
 }
 
-/// What the system says of a process.
+/// A process as the system sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Vitals {
     /// Resident memory \[kB\].
@@ -113,7 +113,7 @@ impl Program {
         self.child.id()
     }
 
-    /// What it has said so far.
+    /// Its lines so far.
     pub fn log(&self) -> Log {
         self.log.lock().map(|log| log.clone()).unwrap_or_default()
     }
@@ -196,7 +196,7 @@ impl Queues {
     }
 }
 
-/// What the system says of the process with this id; none once it is gone.
+/// The process with this id as the system sees it; none once it is gone.
 pub fn vitals(pid: u32) -> Option<Vitals> {
     let status = fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
     let field = |name: &str| -> Option<f64> {

@@ -13,7 +13,7 @@ pub enum Protocol {
     Mosquitto,
 }
 
-/// What a server has sent.
+/// Something that a server has sent.
 pub enum Event<'a> {
     /// A message on a topic.
     Message(&'a [u8]),
@@ -38,7 +38,7 @@ impl Protocol {
         }
     }
 
-    /// What a new connection says first; `number` tells it from the others.
+    /// Writes the first words of a new connection; `number` tells it from the others.
     pub fn greet(self, number: usize, out: &mut Vec<u8>) {
         if self == Self::Mosquitto {
             let id = format!("load-{number}");
@@ -69,7 +69,7 @@ impl Protocol {
         }
     }
 
-    /// What a publisher says before its first message. Redis is told to answer no `PUBLISH`: nobody else's are answered either.
+    /// Writes the first words of a publisher. Redis is told to answer no `PUBLISH`: nobody else's are answered either.
     pub fn advertise(self, topic: &str, out: &mut Vec<u8>) {
         match self {
             Self::Pendularm => line(

@@ -66,7 +66,7 @@ impl Client {
     /// Connects; everything may take `patience` from then on.
     ///
     /// # Errors
-    /// What the socket says, or a handshake that is refused.
+    /// The socket's error, or a handshake that is refused.
     pub fn connect(
         framing: Framing,
         address: SocketAddr,
@@ -128,7 +128,7 @@ impl Client {
     /// Sends bytes as they are.
     ///
     /// # Errors
-    /// What the socket says.
+    /// The socket's error.
     pub fn write(&mut self, bytes: &[u8]) -> Result<(), Error> {
         self.stream.write_all(bytes).map_err(Error::Socket)
     }

@@ -91,7 +91,7 @@ FAULTS = [
      "                client.pass(frame, respond.service);"),
     ("runtime", "the arm publishes a velocity too few", "src/actors/arm/sim/telemetry.rs",
      "                velocity: &velocity,", "                velocity: &velocity[usize::from(F)..],"),
-    ("simulation", "an advance ends a step early", "src/math/simulation.rs",
+    ("simulation", "an advance ends a step early", "src/math/simulation/mod.rs",
      "for taken in 0..steps {", "for taken in 0..(if F && steps > 3 { steps - 1 } else { steps }) {"),
 ]
 

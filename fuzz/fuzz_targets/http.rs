@@ -11,7 +11,7 @@
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::gateway::connection::gate::{Admission, Gate};
 use pendularm::protocol::op::token::Token;
 use pendularm::web::Door;

@@ -17,7 +17,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use arbitrary::Arbitrary;
-use pendularm::actors::gateway::budget::Memory;
+use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::gateway::connection::gate::Gate;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};

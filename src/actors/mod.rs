@@ -1,45 +1,134 @@
-//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*; what clients
-//! write is read, and what they read written, beside them.
+//! The nodes: one actix actor each, joined by typed messages. They ask `math`, and decide only *who hears what*; what
+//! clients write is read, and what they read written, beside them.
 //!
 //! ```text
-//!              accepts                 Request, Disconnect                  Call of a question, SetSetpoint, Interest
-//!  listener ───────────▶ connection ───────────────────────▶ registry ─ wire ─────────────────────────────────────▶ nodes
-//!                        (one per client)                     (one)                                       arm_sim (own thread)
-//!                            ▲     Deliver, Response, Finish    │ ▲         Publish, Respond             integration, study (worker pool)
-//!                            └──────────────────────────────────┘ └─────────────────────────────────────── ik, ik_action, ik_trial, rosapi
+//!              accepts                 Request, Disconnect              Call of a question, SetSetpoint, Interest
+//!  listener ───────────▶ connection ──────────────────▶ registry ─ wire ────────────────────────────────▶ nodes
+//!                            ▲   Deliver, Response, Finish  │ ▲            Publish, Respond
+//!                            └──────────────────────────────┘ └──────────────────────────────────────── nodes
 //! ```
 //!
-//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read by the `wire` beside the node, or from
-//! another node; the [`node::Reply`] knows the way back.
+//! There is a connection for each client, and one of everything else. The nodes are `arm_sim` on a thread of its own,
+//! `ik`, `ik_action`, `ik_trial`, `rosapi` and `rosout`, and `integration` and `study`, whose work the pool of workers
+//! does.
 //!
-//! | message | from | to | meaning |
-//! | --- | --- | --- | --- |
-//! | [`Connect`](gateway::messages::Connect) / [`Disconnect`](gateway::messages::Disconnect) | connection | registry | a client is there, is gone |
-//! | [`Ended`](gateway::messages::Ended) | connection | registry | the client's stream has ended: it only waits now, and may give way to one that comes |
-//! | [`Retire`](gateway::messages::Retire) | connection | registry | the client has stopped sending: its registrations go, its answers still come |
-//! | [`Request`](gateway::messages::Request) | connection | registry | one rosbridge op of that client |
-//! | [`node::Call`] of [`SetIntegrator`](arm::sim::SetIntegrator), [`SetParams`](arm::sim::SetParams), [`SetGains`](arm::sim::SetGains), [`Pause`](arm::sim::Pause), [`Enable`](arm::sim::Enable), [`Reset`](arm::sim::Reset), [`Step`](arm::sim::Step), [`Disturb`](arm::sim::Disturb) | registry, rosapi | `arm_sim` | changes the arm; the answer echoes the values as they are |
-//! | [`arm::sim::SetSetpoint`] | registry | `arm_sim` | a client's setpoint |
-//! | [`node::Call`] of [`Solve`](arm::ik::Solve) | registry, `ik_action` | ik | joint positions for a target |
-//! | [`node::Call`] of [`SendGoal`](arm::ik_action::SendGoal), [`CancelGoal`](arm::ik_action::CancelGoal) | registry, `ik_trial` | `ik_action` | a goal, by service, action or trial, and its end |
-//! | [`ik_action::CancelFollowed`](arm::ik_action::CancelFollowed) | registry | `ik_action` | the end of a goal of the action |
-//! | [`node::Call`] of [`StartTrial`](arm::ik_trial::StartTrial), [`SkipTarget`](arm::ik_trial::SkipTarget), [`StopTrial`](arm::ik_trial::StopTrial) | registry | `ik_trial` | timed trials |
-//! | [`node::Call`] of [`IntegrationStep`](compute::integration::IntegrationStep), [`PredictStability`](compute::study::PredictStability), [`RunOffline`](compute::study::RunOffline), [`SuggestGains`](compute::study::SuggestGains), [`PlanRun`](compute::study::PlanRun) | registry | integration, study | computations, done by the workers |
-//! | [`node::Call`] of [`Look`](ros::rosapi::Look), [`GetParam`](ros::rosapi::GetParam), [`SetParam`](ros::rosapi::SetParam), ... | registry | rosapi | what there is |
-//! | [`node::Feedback`] | `ik_action` | registry | feedback of a goal, for the client that sent it by the action |
-//! | [`node::Interest`] | registry | the node that publishes | whether anybody subscribes: nothing is made without |
-//! | [`node::Publish`] / [`node::Respond`] | nodes | registry | a topic message; an answer. What the arm says is written by the registry |
-//! | [`arm_sim::ArmPose`](arm::sim::ArmPose) | ik, `ik_trial` | `arm_sim` | lengths, positions and time, asked for every time |
-//! | [`arm_sim::ArmSettings`](arm::sim::ArmSettings) | study | `arm_sim` | method, timestep, arm, gains and setpoint, asked for at every call |
-//! | [`arm_sim::HeldLimit`](arm::sim::HeldLimit) | `arm_sim` | study | the largest stable timestep of a control loop |
-//! | [`arm_sim::Consult`](arm::sim::Consult) | runtime | `arm_sim` | whom to ask for it |
-//! | [`arm_sim::RefuseSteps`](arm::sim::RefuseSteps) | runtime | `arm_sim` | the end: steps that are still to be taken are refused |
-//! | [`arm_sim::TrackGoal`](arm::sim::TrackGoal) / [`arm_sim::CommandGoal`](arm::sim::CommandGoal) / [`arm_sim::EndGoal`](arm::sim::EndGoal) | `ik_action` | `arm_sim` | a goal; its setpoint, from which on it is judged at every step; its end |
-//! | [`arm_sim::GoalJudged`](arm::sim::GoalJudged) | `arm_sim` | `ik_action` | how a goal goes, or how it ended |
-//! | [`ik_action::GoalNews`](arm::ik_action::GoalNews) | `ik_action` | `ik_trial` | the same, for the node that sent it |
-//! | [`TakeCensus`](gateway::messages::TakeCensus) | rosapi | registry | which topics and services clients have |
-//! | [`arm_sim::SimulationTime`](arm::sim::SimulationTime) | rosapi, rosout | `arm_sim` | the time |
-//! | [`Deliver`](gateway::messages::Deliver) / [`Response`](gateway::messages::Response) / [`Finish`](gateway::messages::Finish) | registry | connection | bytes to send; the end |
+//! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read as the question's file says,
+//! or from another node; the [`node::Reply`] knows the way back.
+//!
+//! To the registry, from a connection:
+//!
+//! - [`Connect`], [`Disconnect`]: a client is there, is gone.
+//! - [`Ended`]: the client's stream has ended: it only waits now, and may give way to one that comes.
+//! - [`Retire`]: the client has stopped sending: its registrations go, its answers still come.
+//! - [`Request`]: one rosbridge op of that client.
+//!
+//! To the registry, from nodes:
+//!
+//! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what the arm says.
+//! - [`node::Feedback`], from `ik_action`, `follow` and `tf_web`: feedback of a goal, for the client that sent it.
+//! - [`Overhear`], from `recorder`: who hears all that passes, while it is recorded.
+//! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
+//!
+//! To a connection, from the registry: [`Deliver`], [`Response`], [`Finish`], bytes to send and the end.
+//!
+//! To whoever publishes a topic, from the registry: [`node::Interest`], whether anybody subscribes. Nothing is made
+//! without.
+//!
+//! To `arm_sim`:
+//!
+//! - [`node::Call`] of [`SetIntegrator`], [`SetParams`], [`SetGains`], [`Pause`], [`Enable`], [`Reset`], [`Step`],
+//!   [`Disturb`], from the registry and `rosapi`: changes the arm; the answer echoes the values as they are.
+//! - [`SetSetpoint`], from the registry: a client's setpoint.
+//! - [`ArmPose`], from `ik` and `ik_trial`: lengths, positions and time, asked for every time.
+//! - [`ArmSettings`], from `study`: method, timestep, arm, gains and setpoint, asked for at every call.
+//! - [`TrackGoal`], [`CommandGoal`], [`EndGoal`], from `ik_action`: a goal; its setpoint, from which on it is judged at
+//!   every step; its end.
+//! - [`SimulationTime`], from `rosapi` and `rosout`: the time.
+//! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
+//! - [`Consult`], [`RefuseSteps`], from the runtime: whom to ask for the largest stable timestep; the end, at which
+//!   steps that are still to be taken are refused.
+//! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
+//!
+//! To `follow`: [`FollowPath`], [`StopFollowing`], from the registry: a path, and its end.
+//!
+//! To `parameters`: [`node::Call`] of [`GetParameters`] and its like, from the registry: the arm's, as ROS 2 has them.
+//!
+//! To `tf_web`: [`WishFrames`], [`ForgetFrames`], from the registry: frames for a web viewer, and their end.
+//!
+//! To `ik`: [`node::Call`] of [`Solve`], from the registry and `ik_action`: joint positions for a target.
+//!
+//! To `ik_action`:
+//!
+//! - [`node::Call`] of [`SendGoal`], [`CancelGoal`], from the registry and `ik_trial`: a goal, by service, action or
+//!   trial, and its end.
+//! - [`CancelFollowed`], from the registry: the end of a goal of the action.
+//! - [`GoalJudged`], from `arm_sim`: how a goal goes, or how it ended.
+//!
+//! To `ik_trial`: [`node::Call`] of [`StartTrial`], [`SkipTarget`], [`StopTrial`], from the registry; [`GoalNews`],
+//! from `ik_action`: how a goal goes, or how it ended, for the node that sent it.
+//!
+//! To `integration` and `study`: [`node::Call`] of [`IntegrationStep`], [`PredictStability`], [`RunOffline`],
+//! [`SuggestGains`], [`PlanRun`], from the registry: computations. [`HeldLimit`], from `arm_sim`: the largest stable
+//! timestep of a control loop.
+//!
+//! To `recorder`: [`node::Call`] of `StartRecording` and `StopRecording`, from the registry; `RecordTo` and
+//! `EndRecord`, from the runtime: the beginning and the end of a record.
+//!
+//! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
+//!
+//! [`ArmMotion`]: arm::sim::ArmMotion
+//! [`MoveSetpoint`]: arm::sim::MoveSetpoint
+//! [`FollowPath`]: arm::follow::FollowPath
+//! [`StopFollowing`]: arm::follow::StopFollowing
+//! [`GetParameters`]: ros::parameters::GetParameters
+//! [`WishFrames`]: ros::tf_web::WishFrames
+//! [`ForgetFrames`]: ros::tf_web::ForgetFrames
+//! [`Connect`]: gateway::messages::Connect
+//! [`Disconnect`]: gateway::messages::Disconnect
+//! [`Ended`]: gateway::messages::Ended
+//! [`Retire`]: gateway::messages::Retire
+//! [`Request`]: gateway::messages::Request
+//! [`Overhear`]: gateway::messages::Overhear
+//! [`TakeCensus`]: gateway::messages::TakeCensus
+//! [`Deliver`]: gateway::messages::Deliver
+//! [`Response`]: gateway::messages::Response
+//! [`Finish`]: gateway::messages::Finish
+//! [`SetIntegrator`]: arm::sim::SetIntegrator
+//! [`SetParams`]: arm::sim::SetParams
+//! [`SetGains`]: arm::sim::SetGains
+//! [`Pause`]: arm::sim::Pause
+//! [`Enable`]: arm::sim::Enable
+//! [`Reset`]: arm::sim::Reset
+//! [`Step`]: arm::sim::Step
+//! [`Disturb`]: arm::sim::Disturb
+//! [`SetSetpoint`]: arm::sim::SetSetpoint
+//! [`ArmPose`]: arm::sim::ArmPose
+//! [`ArmSettings`]: arm::sim::ArmSettings
+//! [`TrackGoal`]: arm::sim::TrackGoal
+//! [`CommandGoal`]: arm::sim::CommandGoal
+//! [`EndGoal`]: arm::sim::EndGoal
+//! [`SimulationTime`]: arm::sim::SimulationTime
+//! [`Tell`]: arm::sim::Tell
+//! [`Consult`]: arm::sim::Consult
+//! [`RefuseSteps`]: arm::sim::RefuseSteps
+//! [`GoalJudged`]: arm::sim::GoalJudged
+//! [`HeldLimit`]: arm::sim::HeldLimit
+//! [`Solve`]: arm::ik::Solve
+//! [`SendGoal`]: arm::ik_action::SendGoal
+//! [`CancelGoal`]: arm::ik_action::CancelGoal
+//! [`CancelFollowed`]: arm::ik_action::CancelFollowed
+//! [`GoalNews`]: arm::ik_action::GoalNews
+//! [`StartTrial`]: arm::ik_trial::StartTrial
+//! [`SkipTarget`]: arm::ik_trial::SkipTarget
+//! [`StopTrial`]: arm::ik_trial::StopTrial
+//! [`IntegrationStep`]: compute::integration::IntegrationStep
+//! [`PredictStability`]: compute::study::PredictStability
+//! [`RunOffline`]: compute::study::RunOffline
+//! [`SuggestGains`]: compute::study::SuggestGains
+//! [`PlanRun`]: compute::study::PlanRun
+//! [`Look`]: ros::rosapi::Look
+//! [`GetParam`]: ros::rosapi::GetParam
+//! [`SetParam`]: ros::rosapi::SetParam
 //!
 //! **Invariant:** everything that a node says to a client passes through the registry's one mailbox, so that a client
 //! sees a node's answers and messages in the order in which the node produced them.
@@ -49,6 +138,9 @@ pub mod compute;
 pub mod gateway;
 pub mod node;
 pub mod panics;
+#[cfg(feature = "record")]
+pub mod recorder;
+pub mod resources;
 pub mod ros;
 pub mod runtime;
 pub mod signals;

@@ -1,10 +1,10 @@
 //! The language of the nodes: questions with their one answer, messages on topics, interest.
 //!
-//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. Who asks, a client
-//! or another node, is behind the [`Reply`]: the node does not know.
+//! A service is a question, [`Ask`], and a node serves it by a handler for [`Call`] of that question. Who asks, a
+//! client or another node, is behind the [`Reply`]: the node does not know.
 //!
-//! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that is
-//! dropped unanswered says so itself.
+//! **Invariant:** every [`Call`] is answered exactly once, whatever happens to the node that has it: a [`Reply`] that
+//! is dropped unanswered says so itself.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
-use crate::actors::gateway::budget::NoRoom;
+use crate::actors::resources::budget::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::Level;
 
@@ -80,9 +80,9 @@ pub trait Pieces: Send {
 }
 
 /// An answer that needs no writing: it has been given.
-struct Given;
+struct AlreadyGiven;
 
-impl Pieces for Given {
+impl Pieces for AlreadyGiven {
     fn advance(&mut self) -> bool {
         true
     }
@@ -102,7 +102,7 @@ pub trait Asker<T>: Send {
     /// Takes an answer of megabytes, which is written by whoever has it.
     fn answer_in_pieces(self: Box<Self>, answer: T) -> Box<dyn Pieces> {
         self.answer(Ok(answer), None);
-        Box::new(Given)
+        Box::new(AlreadyGiven)
     }
 
     /// The client that asked; none if it was a node.
@@ -126,8 +126,8 @@ pub trait Asker<T>: Send {
 
 /// The way back to whoever asked: one answer, then the end of the call.
 ///
-/// A client that called is read no further until this value is dropped, so that a call that has effects after its answer
-/// (a goal's setpoint) has had them before the client's next request is looked at.
+/// A client that called is read no further until this value is dropped, so that a call that has effects after its
+/// answer (a goal's setpoint) has had them before the client's next request is looked at.
 pub struct Reply<T> {
     /// None once the answer has been given.
     asker: Option<Box<dyn Asker<T>>>,
@@ -183,7 +183,7 @@ impl<T> Reply<T> {
     pub fn answer_in_pieces(&mut self, answer: T) -> Box<dyn Pieces> {
         match self.take() {
             Some(asker) => asker.answer_in_pieces(answer),
-            None => Box::new(Given),
+            None => Box::new(AlreadyGiven),
         }
     }
 
@@ -250,15 +250,16 @@ pub struct Interest {
     pub wanted: bool,
 }
 
-/// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has not.
-pub enum Frame {
+/// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has
+/// not.
+pub enum FrameOut {
     /// As it goes out.
     Written(Bytes),
     /// Writes it.
     Unwritten(Box<dyn FnOnce() -> Bytes + Send>),
 }
 
-impl Frame {
+impl FrameOut {
     /// A frame that the registry writes.
     #[must_use]
     pub fn unwritten(write: impl FnOnce() -> Bytes + Send + 'static) -> Self {
@@ -275,7 +276,7 @@ impl Frame {
     }
 }
 
-impl From<Bytes> for Frame {
+impl From<Bytes> for FrameOut {
     fn from(frame: Bytes) -> Self {
         Self::Written(frame)
     }
@@ -288,7 +289,7 @@ pub struct Publish {
     /// The topic.
     pub topic: Topic,
     /// The whole `publish` frame, encoded once.
-    pub frame: Frame,
+    pub frame: FrameOut,
 }
 
 /// A frame for one client: an answer or a status. From a node.
@@ -298,7 +299,7 @@ pub struct Respond {
     /// The client.
     pub connection: ConnectionId,
     /// The whole frame.
-    pub frame: Frame,
+    pub frame: FrameOut,
     /// The service that it answers, if it is the runtime's own.
     pub service: Option<Service>,
     /// The level, if it is a status: sent only if the client wants such.
@@ -307,7 +308,8 @@ pub struct Respond {
     pub done: Option<Done>,
 }
 
-/// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the goal.
+/// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the
+/// goal.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Feedback {

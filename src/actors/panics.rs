@@ -1,8 +1,8 @@
-//! What a panic does: it ends what it happened in, or everything.
+//! The end of a panic: it takes along what it happened in, or everything.
 //!
-//! No input is known to cause one. Should one happen all the same: in what serves one client it ends that client, in a computation that
-//! computation. Anywhere else, in a node or the registry, others would wait for ever for what is gone: there the process ends at once, with one
-//! line that says where, so that whoever started it can start it again.
+//! No input is known to cause one. Should one happen all the same: in what serves one client it ends that client, in a
+//! computation that computation. Anywhere else, in a node or the registry, others would wait for ever for what is gone:
+//! there the process ends at once, with one line that says where, so that whoever started it can start it again.
 //!
 //! **Invariant:** a panic is contained by whoever called [`contain`], or it is the last thing that the process does.
 
@@ -28,7 +28,8 @@ thread_local! {
 #[error("{0}")]
 pub struct Contained(String);
 
-/// From now on a panic that nothing contains is told to `end`, on the thread where it happened; `end` should not return.
+/// From now on a panic that nothing contains is told to `end`, on the thread where it happened; `end` should not
+/// return.
 pub fn end_with(end: impl Fn(&str) + Send + Sync + 'static) {
     set_hook(Box::new(move |info| {
         let what = describe(info);

@@ -1,7 +1,8 @@
 //! Starts every node in order, chooses their threads, and ends everything within a second.
 //!
 //! Threads: this one for the gateway (listeners, connections, registry) and the small nodes; one for the arm; a few
-//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that looks at the number of links.
+//! workers for heavy requests; one that waits for signals. The only place that knows threads, and the only one that
+//! looks at the number of links.
 //!
 //! **Invariant:** no client is accepted before every node is attached.
 
@@ -16,6 +17,7 @@ use tokio::runtime::Builder;
 use tokio::time::{Instant, sleep, timeout};
 
 use super::signals::Signals;
+use crate::actors::arm::follow::{PathArm, PathFollower};
 use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
@@ -25,12 +27,16 @@ use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
 use crate::actors::gateway::connection::gate::{Admission, Gate};
 use crate::actors::gateway::files;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
+#[cfg(feature = "record")]
+use crate::actors::recorder::{EndRecord, NotRecorded, RecordTo, Recorder};
+use crate::actors::resources::gauges::Gauges;
+use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
 use crate::actors::ros::rosout::Rosout;
+use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -47,6 +53,9 @@ const SHUTTING_DOWN: &str = "shutting down";
 /// together well within the second that a signal is given.
 const ANSWER_TIME: Duration = Duration::from_millis(250);
 const FLUSH_TIME: Duration = Duration::from_millis(400);
+/// How long the end of a record may take when the runtime ends.
+#[cfg(feature = "record")]
+const RECORD_TIME: Duration = Duration::from_millis(250);
 
 /// Why the runtime could not start.
 #[derive(Debug, thiserror::Error)]
@@ -59,19 +68,23 @@ pub enum RunError {
         /// The operating system's reason.
         source: std::io::Error,
     },
+    /// The run can't be recorded.
+    #[cfg(feature = "record")]
+    #[error("cannot record: {0}")]
+    Record(#[from] NotRecorded),
     /// A thread or a signal handler was refused.
     #[error("cannot start: {0}")]
     Start(#[from] std::io::Error),
 }
 
-/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on another
-/// thread; it should not return.
+/// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on
+/// another thread; it should not return.
 ///
 /// # Errors
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
 pub fn run(options: &Options, last_resort: impl FnOnce() + Send + 'static) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
-    // What clients were owed is dropped here: that, too, is part of the end.
+    // Answers that clients were owed are dropped here, which is part of the end.
     System::new().block_on(serve(options, &mut signals))
 }
 
@@ -92,18 +105,26 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     let arm_thread =
         Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
     let mut nodes = Nodes::default();
-    let rng = options
-        .seed
-        .map_or_else(fastrand::Rng::new, fastrand::Rng::with_seed);
+    let seed = options.seed.unwrap_or_else(|| fastrand::u64(..));
     let start = match options.links {
         Links::Two => start_nodes::<2>,
         Links::Three => start_nodes::<3>,
     };
-    let steps = start(&registry, &gauges, &arm_thread, &workers, rng, &mut nodes);
+    let ends = start(
+        options,
+        seed,
+        &registry,
+        &gauges,
+        &arm_thread,
+        &workers,
+        &mut nodes,
+    );
     let integration = Integration::new(workers.clone()).start();
     Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function: it can't be gone.
     let _ = registry.send(Attach(nodes)).await;
+    #[cfg(feature = "record")]
+    ends.record(options).await?;
 
     let gate = Arc::new(gate(options, room.unauthenticated));
     let listeners: Vec<Addr<Listener>> = sockets
@@ -121,12 +142,14 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     for listener in listeners {
         listener.do_send(StopListening);
     }
-    shut_down(&registry, &steps, &workers, &gauges).await;
+    shut_down(&registry, &ends.steps, &workers, &gauges).await;
+    #[cfg(feature = "record")]
+    ends.finish_record().await;
     arm_thread.stop();
     Ok(())
 }
 
-/// What is asked of clients, and what they find behind it.
+/// The gate: it asks clients for the token, and has the door of the web behind it.
 fn gate(options: &Options, unauthenticated: usize) -> Gate {
     Gate {
         token: options.token.clone(),
@@ -151,15 +174,45 @@ fn gate(options: &Options, unauthenticated: usize) -> Gate {
     }
 }
 
-/// The arm and the nodes that know its number of links; gives the way to refuse the steps that are still to be taken.
+/// The ways by which the nodes that know the number of links are told of the end.
+struct NodeEnds {
+    /// Steps that are still to be taken are refused.
+    steps: Recipient<RefuseSteps>,
+    #[cfg(feature = "record")]
+    record: Recipient<RecordTo>,
+    #[cfg(feature = "record")]
+    end_record: Recipient<EndRecord>,
+}
+
+#[cfg(feature = "record")]
+impl NodeEnds {
+    /// Begins the record that was asked for.
+    async fn record(&self, options: &Options) -> Result<(), RunError> {
+        if let Some(file) = &options.record.file {
+            // The recorder lives as long as the registry: it can't be gone.
+            if let Ok(begun) = self.record.send(RecordTo(file.clone())).await {
+                begun?;
+            }
+        }
+        Ok(())
+    }
+
+    /// NodeEnds the record, if there is one, for a bounded time.
+    async fn finish_record(&self) {
+        let _ = timeout(RECORD_TIME, self.end_record.send(EndRecord)).await;
+    }
+}
+
+/// The arm and the nodes that know its number of links.
 fn start_nodes<const N: usize>(
+    options: &Options,
+    seed: u64,
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,
     arm_thread: &Arbiter,
     workers: &WorkerPool,
-    rng: fastrand::Rng,
     nodes: &mut Nodes,
-) -> Recipient<RefuseSteps>
+) -> NodeEnds
 where
     Gains<N>: Default,
 {
@@ -170,10 +223,18 @@ where
     });
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
+    Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
     let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
     Rosapi::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
+
+    let frames = TfRepublisher::new(
+        arm.clone().recipient(),
+        arm.clone().recipient(),
+        registry.clone().recipient(),
+    );
+    TfRepublisher::attach(&frames.start(), nodes);
 
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
@@ -182,6 +243,7 @@ where
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
+    PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
     let tracker = GoalTracker {
         track: arm.clone().recipient(),
         command: arm.clone().recipient(),
@@ -194,9 +256,26 @@ where
         cancel: action.clone().recipient(),
         settle: action.recipient(),
     };
+    let rng = fastrand::Rng::with_seed(seed);
     let trial = IkTrial::<N>::new(arm.clone().recipient(), goals, publish, rng).start();
     IkTrial::attach(&trial, nodes);
-    arm.recipient()
+    #[cfg(feature = "record")]
+    let recorder = {
+        let folder = options.record.folder.clone();
+        let (arm, registry) = (arm.clone().recipient(), registry.clone().recipient());
+        Recorder::<N>::new(arm, registry, folder, seed).start()
+    };
+    #[cfg(feature = "record")]
+    Recorder::attach(&recorder, nodes);
+    #[cfg(not(feature = "record"))]
+    let _ = options;
+    NodeEnds {
+        steps: arm.recipient(),
+        #[cfg(feature = "record")]
+        record: recorder.clone().recipient(),
+        #[cfg(feature = "record")]
+        end_record: recorder.recipient(),
+    }
 }
 
 /// The address asked for; for the default one also its IPv6 twin, where that is to be had.

@@ -1,7 +1,8 @@
-//! SIGINT and SIGTERM, awaited on a thread that does nothing else, so that they are heard whatever the other threads do.
+//! SIGINT and SIGTERM, awaited on a thread that does nothing else, so that they are heard whatever the other threads
+//! do.
 //!
-//! An orderly end answers what waits, and asks every thread to take part. One that is busy with what a client has sent might not in
-//! time: then the last resort ends the process all the same.
+//! An orderly end answers what waits, and asks every thread to take part. One that is busy with what a client has sent
+//! might not in time: then the last resort ends the process all the same.
 //!
 //! **Invariant:** from a signal on the process lives for [`LAST_RESORT`] at most.
 
@@ -13,7 +14,8 @@ use tokio::runtime::Builder;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::oneshot;
 
-/// How long an orderly end may take: all of the second that a signal is given, but for what the log and the process itself need.
+/// How long an orderly end may take: all of the second that a signal is given, but for what the log and the process
+/// itself need.
 pub const LAST_RESORT: Duration = Duration::from_millis(850);
 
 /// The signals of this process, as long as this value lives.
@@ -25,7 +27,8 @@ pub(super) struct Signals {
 }
 
 impl Signals {
-    /// From now on signals are heard. `last_resort` is called if the end that one asks for takes too long; it should not return.
+    /// From now on signals are heard. `last_resort` is called if the end that one asks for takes too long; it should
+    /// not return.
     ///
     /// # Errors
     /// If the operating system refuses a thread or a signal handler.

@@ -9,6 +9,8 @@
 
 mod links;
 mod plan;
+#[cfg(feature = "record")]
+mod record;
 #[cfg(feature = "report")]
 mod report;
 mod setting;
@@ -26,6 +28,8 @@ use tracing::level_filters::LevelFilter;
 
 pub use self::links::Links;
 pub use self::plan::PlanOptions;
+#[cfg(feature = "record")]
+pub use self::record::{RecordOptions, ReplayOptions};
 use self::setting::{Given, LaunchOption, given};
 pub use self::usage::{Origin, UsageError};
 #[cfg(feature = "web")]
@@ -120,6 +124,10 @@ const SETTINGS: &[&LaunchOption] = &[
     &SEED,
     &LOG,
     &TOKEN,
+    #[cfg(feature = "record")]
+    &record::RECORD,
+    #[cfg(feature = "record")]
+    &record::RECORD_DIR,
     #[cfg(feature = "web")]
     &web::ALLOW_HOST,
     #[cfg(feature = "web")]
@@ -145,6 +153,9 @@ pub struct Options {
     pub log: LevelFilter,
     /// The token that every client has to show, if there is one.
     pub token: Option<Token>,
+    /// About runs on record.
+    #[cfg(feature = "record")]
+    pub record: RecordOptions,
     /// About the web door.
     #[cfg(feature = "web")]
     pub web: WebOptions,
@@ -159,6 +170,8 @@ impl Default for Options {
             seed: None,
             log: LevelFilter::INFO,
             token: None,
+            #[cfg(feature = "record")]
+            record: RecordOptions::default(),
             #[cfg(feature = "web")]
             web: WebOptions::default(),
         }
@@ -172,6 +185,9 @@ pub enum Parsed {
     Serve(Options),
     /// To plan method and timestep for an allowed error.
     Plan(PlanOptions),
+    /// To replay a record.
+    #[cfg(feature = "record")]
+    Replay(ReplayOptions),
     /// To make the study's report.
     #[cfg(feature = "report")]
     Report(ReportOptions),
@@ -204,6 +220,8 @@ impl Options {
             return match name {
                 #[cfg(feature = "report")]
                 report::NAME => Ok(Parsed::Report(report::read(given))),
+                #[cfg(feature = "record")]
+                record::REPLAY => Ok(Parsed::Replay(record::read(given))),
                 _ => plan::read(given).map(Parsed::Plan),
             };
         }
@@ -226,6 +244,8 @@ impl Options {
                 .transpose()?
                 .unwrap_or(LevelFilter::INFO),
             token,
+            #[cfg(feature = "record")]
+            record: RecordOptions::read(given),
             #[cfg(feature = "web")]
             web: WebOptions::read(given)?,
         }))
@@ -267,6 +287,8 @@ fn command() -> Command {
         .subcommand(plan::command());
     #[cfg(feature = "report")]
     let command = command.subcommand(report::command());
+    #[cfg(feature = "record")]
+    let command = command.subcommand(record::command());
     command
 }
 

@@ -45,7 +45,7 @@ pub(super) fn command() -> Command {
         )
 }
 
-/// What it was given.
+/// Reads the options that it was given.
 ///
 /// # Errors
 /// [`UsageError`] for the first value that is not as it should be.

@@ -93,7 +93,7 @@ pub enum UsageError {
     Plan {
         /// The option.
         option: &'static str,
-        /// What it takes.
+        /// The kind of value that it takes.
         needs: &'static str,
         /// The value.
         value: String,

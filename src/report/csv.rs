@@ -12,7 +12,7 @@ pub(crate) struct Csv {
 
 /// One field.
 #[derive(Debug, Clone)]
-pub(crate) enum Field<'a> {
+pub(crate) enum CsvField<'a> {
     Text(&'a str),
     Real(f64),
     Count(u64),
@@ -26,20 +26,20 @@ impl Csv {
         }
     }
 
-    pub(crate) fn row(&mut self, fields: &[Field<'_>]) {
+    pub(crate) fn row(&mut self, fields: &[CsvField<'_>]) {
         for (index, field) in fields.iter().enumerate() {
             if index > 0 {
                 self.text.push(',');
             }
             // Writing to a string cannot fail.
             let _ = match field {
-                Field::Text(text) if text.contains([',', '"', '\n']) => {
+                CsvField::Text(text) if text.contains([',', '"', '\n']) => {
                     write!(self.text, "\"{}\"", text.replace('"', "\"\""))
                 }
-                Field::Text(text) => write!(self.text, "{text}"),
-                Field::Real(value) if value.is_finite() => write!(self.text, "{value:e}"),
-                Field::Count(value) => write!(self.text, "{value}"),
-                Field::Real(_) | Field::Missing => Ok(()),
+                CsvField::Text(text) => write!(self.text, "{text}"),
+                CsvField::Real(value) if value.is_finite() => write!(self.text, "{value:e}"),
+                CsvField::Count(value) => write!(self.text, "{value}"),
+                CsvField::Real(_) | CsvField::Missing => Ok(()),
             };
         }
         self.text.push('\n');
@@ -50,25 +50,25 @@ impl Csv {
     }
 }
 
-impl From<f64> for Field<'_> {
+impl From<f64> for CsvField<'_> {
     fn from(value: f64) -> Self {
         Self::Real(value)
     }
 }
 
-impl From<u64> for Field<'_> {
+impl From<u64> for CsvField<'_> {
     fn from(value: u64) -> Self {
         Self::Count(value)
     }
 }
 
-impl<'a> From<&'a str> for Field<'a> {
+impl<'a> From<&'a str> for CsvField<'a> {
     fn from(text: &'a str) -> Self {
         Self::Text(text)
     }
 }
 
-impl<T: Into<Self>> From<Option<T>> for Field<'_> {
+impl<T: Into<Self>> From<Option<T>> for CsvField<'_> {
     fn from(value: Option<T>) -> Self {
         value.map_or(Self::Missing, Into::into)
     }

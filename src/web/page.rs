@@ -1,15 +1,15 @@
 //! The page: the files of `page/`, in the binary.
 //!
 //! They are served under their own names, never to be kept, and under [`versioned`] ones, which stand for what is in
-//! them and may be kept for ever. The page's document names those, and all scripts as the one file [`SCRIPT`], so that a
-//! browser asks for four files, once per version.
+//! them and may be kept for ever. The page's document names those, all scripts as the one file [`SCRIPT`] and all style
+//! sheets as [`STYLE`], so that a browser asks for four files, once per version.
 //!
 //! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
 
 use std::sync::{LazyLock, OnceLock};
 
 use super::authority::Authority;
-use super::bundle::bundle;
+use super::bundle::{bundle, styles};
 use super::response::HttpResponse;
 
 /// A file of the page.
@@ -49,7 +49,14 @@ const JAVASCRIPT: &str = "text/javascript; charset=utf-8";
 pub const ASSETS: &[Asset] = &[
     asset!("/", "index.html", HTML),
     asset!("icon.svg", SVG),
+    asset!("base.css", CSS),
+    asset!("colors.css", CSS),
+    asset!("frame.css", CSS),
+    asset!("panels.css", CSS),
+    asset!("settings.css", CSS),
+    asset!("small.css", CSS),
     asset!("style.css", CSS),
+    asset!("view.css", CSS),
     asset!("actions.js", JAVASCRIPT),
     asset!("aim.js", JAVASCRIPT),
     asset!("announce.js", JAVASCRIPT),
@@ -76,6 +83,7 @@ pub const ASSETS: &[Asset] = &[
     asset!("latest.js", JAVASCRIPT),
     asset!("lessons.js", JAVASCRIPT),
     asset!("lessons_panel.js", JAVASCRIPT),
+    asset!("limits_view.js", JAVASCRIPT),
     asset!("loop.js", JAVASCRIPT),
     asset!("main.js", JAVASCRIPT),
     asset!("map_view.js", JAVASCRIPT),
@@ -107,27 +115,36 @@ pub const ASSETS: &[Asset] = &[
     asset!("trail.js", JAVASCRIPT),
     asset!("transport.js", JAVASCRIPT),
     asset!("trial_panel.js", JAVASCRIPT),
+    asset!("why.js", JAVASCRIPT),
 ];
 
 /// All scripts in one, served under its versioned name only.
 pub const SCRIPT: &str = "/page.js";
+/// All style sheets in one, likewise.
+pub const STYLE: &str = "/page.css";
 
-static SCRIPTS: LazyLock<Asset> = LazyLock::new(|| {
-    let files = ASSETS.iter().filter(|asset| asset.kind == JAVASCRIPT);
-    let modules: Vec<_> = files
-        .filter_map(|asset| Some((asset.file, std::str::from_utf8(asset.bytes).ok()?)))
-        .collect();
-    Asset {
-        path: SCRIPT,
-        file: "page.js",
-        kind: JAVASCRIPT,
-        bytes: Box::leak(bundle("main.js", &modules).into_bytes().into_boxed_slice()),
-    }
+static BUNDLES: LazyLock<[Asset; 2]> = LazyLock::new(|| {
+    let of = |kind: &str| -> Vec<_> {
+        let files = ASSETS.iter().filter(|asset| asset.kind == kind);
+        files
+            .filter_map(|asset| Some((asset.file, std::str::from_utf8(asset.bytes).ok()?)))
+            .collect()
+    };
+    let asset = |path, kind, text: String| Asset {
+        path,
+        file: "",
+        kind,
+        bytes: Box::leak(text.into_bytes().into_boxed_slice()),
+    };
+    [
+        asset(SCRIPT, JAVASCRIPT, bundle("main.js", &of(JAVASCRIPT))),
+        asset(STYLE, CSS, styles("style.css", &of(CSS))),
+    ]
 });
 
 /// Each file once packed: a fraction of a millisecond, when it is first asked for.
-static PACKED: [OnceLock<Vec<u8>>; ASSETS.len() + 1] =
-    [const { OnceLock::new() }; ASSETS.len() + 1];
+static PACKED: [OnceLock<Vec<u8>>; ASSETS.len() + 2] =
+    [const { OnceLock::new() }; ASSETS.len() + 2];
 
 /// How hard the packing tries: beyond it text gets hardly smaller.
 const LEVEL: u8 = 6;
@@ -159,12 +176,13 @@ pub fn answer(
 ) -> Option<HttpResponse> {
     let kept = path.strip_prefix(VERSION.as_str());
     let wanted = kept.unwrap_or(path);
-    let of_page = ASSETS.iter().position(|asset| asset.path == wanted);
-    let (index, asset) = match of_page {
-        Some(index) => (index, ASSETS.get(index)?),
-        None if kept == Some(SCRIPT) => (ASSETS.len(), &*SCRIPTS),
-        None => return None,
+    let bundles = if kept.is_some() {
+        BUNDLES.as_slice()
+    } else {
+        &[]
     };
+    let mut served = ASSETS.iter().chain(bundles).enumerate();
+    let (index, asset) = served.find(|(_, asset)| asset.path == wanted)?;
     let response = if wanted == "/" {
         let html = document(asset.bytes, has_report);
         HttpResponse::file(asset.kind, policy(own), html)
@@ -184,12 +202,12 @@ pub fn answer(
     })
 }
 
-/// The page's document: its files by their versioned names, its scripts as one.
+/// The page's document: its files by their versioned names, its scripts as one and its style sheets as one.
 fn document(html: &[u8], has_report: bool) -> Vec<u8> {
     let mut html = String::from_utf8_lossy(html).into_owned();
     for (name, path) in [
         ("main.js", SCRIPT),
-        ("style.css", "/style.css"),
+        ("style.css", STYLE),
         ("icon.svg", "/icon.svg"),
     ] {
         html = html.replace(&format!("\"{name}\""), &format!("\"{}\"", versioned(path)));
@@ -246,7 +264,7 @@ mod tests {
 
     #[test]
     fn the_one_script_holds_every_module_once_and_imports_nothing() {
-        let text = std::str::from_utf8(SCRIPTS.bytes).unwrap();
+        let text = std::str::from_utf8(BUNDLES[0].bytes).unwrap();
         for asset in ASSETS.iter().filter(|asset| asset.kind == JAVASCRIPT) {
             let begin = format!("const ${} = (() => {{", asset.file.trim_end_matches(".js"));
             assert_eq!(text.matches(&begin).count(), 1, "{}", asset.file);
@@ -255,6 +273,19 @@ mod tests {
             .lines()
             .find(|line| line.starts_with("import ") || line.starts_with("} from"));
         assert_eq!(line, None);
+    }
+
+    #[test]
+    fn the_one_style_sheet_holds_every_other_once_and_imports_nothing() {
+        let text = std::str::from_utf8(BUNDLES[1].bytes).unwrap();
+        for asset in ASSETS
+            .iter()
+            .filter(|asset| asset.kind == CSS && asset.file != "style.css")
+        {
+            let sheet = std::str::from_utf8(asset.bytes).unwrap();
+            assert_eq!(text.matches(sheet).count(), 1, "{}", asset.file);
+        }
+        assert!(!text.contains("@import"));
     }
 
     #[test]

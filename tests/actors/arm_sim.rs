@@ -1,11 +1,11 @@
 //! The arm's actor in virtual time: exact step counts, what it says and when, and that it is the offline simulation.
 
 use std::cell::RefCell;
-use std::future::Future;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::stage::in_virtual_time;
 use actix::prelude::*;
 use bytes::Bytes;
 use pendularm::actors::ConnectionId;
@@ -13,8 +13,9 @@ use pendularm::actors::arm::sim::{
     ArmSim, Enable, Pause, Reset, SetGains, SetIntegrator, SetParams, SetSetpoint, TakeSnapshot,
     WAKE_UP_BUDGET,
 };
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::node::{Ask, Call, Interest, Publish, Respond, ask};
+use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::work_clock;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
@@ -226,17 +227,6 @@ where
 }
 
 /// Runs `test` in a system of its own whose clock stands, except that it jumps to the next timer when all wait.
-fn in_virtual_time<F: Future<Output = ()> + 'static>(test: impl FnOnce() -> F) {
-    let system = System::with_tokio_rt(|| {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .start_paused(true)
-            .build()
-            .unwrap()
-    });
-    system.block_on(async move { test().await });
-}
-
 fn of_timestep(timestep: f64) -> SetIntegrator {
     SetIntegrator {
         timestep: Some(timestep),
@@ -271,7 +261,9 @@ fn ms(milliseconds: u64) -> Duration {
 
 #[test]
 fn the_steps_after_a_time_are_the_whole_timesteps_in_it() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
+        // Looks at the clock cost the same however busy the machine is, and no wake-up's budget runs out.
+        work_clock::count(Duration::from_micros(1));
         // Each timestep as a fraction of a second, so that the expected count is exact.
         for (numerator, denominator) in [
             (1, 1000),
@@ -316,7 +308,7 @@ fn the_steps_after_a_time_are_the_whole_timesteps_in_it() {
 
 #[test]
 fn a_microsecond_is_followed_step_by_step() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<3>::weightless();
         bench
             .ask(SetIntegrator {
@@ -348,7 +340,7 @@ fn a_microsecond_is_followed_step_by_step() {
 /// would make that 0.06 s in all; a wake-up after every breather of a millisecond (two, by the timer's grain) 0.5 s or more.
 #[test]
 fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<3>::weightless();
         bench.ask(of_timestep(1e-12)).await;
         let began = std::time::Instant::now();
@@ -361,7 +353,7 @@ fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
 
 #[test]
 fn a_new_timestep_a_resume_and_a_reset_discard_the_unfinished_step() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         for change in 0..3 {
             let bench = Bench::<2>::weightless();
 
@@ -392,7 +384,7 @@ fn a_new_timestep_a_resume_and_a_reset_discard_the_unfinished_step() {
 
 #[test]
 fn requests_that_change_nothing_keep_the_unfinished_step() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::weightless();
         bench.ask(of_timestep(1.0)).await;
         let before = bench.steps().await;
@@ -433,7 +425,7 @@ fn requests_that_change_nothing_keep_the_unfinished_step() {
 
 #[test]
 fn a_paused_arm_takes_no_step_and_owes_none() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         sleep(ms(500)).await;
         bench.ask(enable(true)).await;
@@ -455,7 +447,7 @@ fn a_paused_arm_takes_no_step_and_owes_none() {
 
 #[test]
 fn states_go_out_sixty_times_a_second() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<3>::new(Arm::default());
         bench.want(Topic::JointStates, true).await;
         bench.want(Topic::Clock, true).await;
@@ -482,7 +474,7 @@ fn states_go_out_sixty_times_a_second() {
 
 #[test]
 fn missed_ticks_are_skipped_and_at_most_a_quarter_of_a_second_is_caught_up() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         bench.want(Topic::JointStates, true).await;
         for stall in [3, 1000, 60_000] {
@@ -506,7 +498,7 @@ fn missed_ticks_are_skipped_and_at_most_a_quarter_of_a_second_is_caught_up() {
 
 #[test]
 fn a_short_stall_is_caught_up_in_full() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         bench.ask(Reset::default()).await;
         let began = Instant::now();
@@ -520,7 +512,7 @@ fn a_short_stall_is_caught_up_in_full() {
 
 #[test]
 fn nothing_is_said_on_a_topic_that_nobody_wants() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         sleep(ms(3000)).await;
         bench.ask(pause(true)).await;
@@ -551,7 +543,7 @@ fn assert_live_is_offline<const N: usize>(seed: u64)
 where
     Gains<N>: Default,
 {
-    in_virtual_time(move || async move {
+    in_virtual_time(async move {
         let bench = Bench::<N>::new(Arm::default());
         let mut offline = Simulation::<N>::new(Arm::default(), Gains::default());
         let mut random = fastrand::Rng::with_seed(seed);
@@ -629,7 +621,7 @@ fn the_live_arm_is_the_offline_simulation_bit_for_bit() {
 /// Nobody looks in between: what takes a request to its own step is the request itself, not the tick before it.
 #[test]
 fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         let mut offline = Simulation::<2>::new(Arm::default(), Gains::default());
         bench.ask(Reset::default()).await;
@@ -658,7 +650,7 @@ fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
 
 #[test]
 fn a_bad_trajectory_is_answered_to_its_sender_alone_with_the_frames_id() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         let held = *bench.snapshot().await.pid().setpoint();
         let id = json!({"my": [1, "id"]});
@@ -691,7 +683,7 @@ fn a_bad_trajectory_is_answered_to_its_sender_alone_with_the_frames_id() {
 
 #[test]
 fn a_message_of_a_change_comes_before_the_response_and_shows_the_change() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         bench.want(Topic::Diagnostics, true).await;
         sleep(ms(100)).await;
@@ -718,7 +710,7 @@ fn a_message_of_a_change_comes_before_the_response_and_shows_the_change() {
 
 #[test]
 fn a_divergence_is_told_at_once_and_holds_until_the_reset() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         bench.want(Topic::Diagnostics, true).await;
         bench
@@ -767,7 +759,7 @@ fn a_divergence_is_told_at_once_and_holds_until_the_reset() {
 
 #[test]
 fn diagnostics_come_once_a_second_with_rates_of_virtual_time() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<2>::new(Arm::default());
         bench.want(Topic::Diagnostics, true).await;
         sleep(ms(10_500)).await;
@@ -791,7 +783,7 @@ fn diagnostics_come_once_a_second_with_rates_of_virtual_time() {
 
 #[test]
 fn every_service_of_the_arm_answers_whatever_it_is_asked() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::<3>::new(Arm::default());
         let services = [
             Service::SetIntegrator,

@@ -4,19 +4,19 @@
 //! anybody else have a turn.
 
 use std::any::Any;
-use std::future::Future;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::stage::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmPose, ArmSettings, ArmSim, Disturb, Enable, EndGoal, MAX_STEPS, Pause, RefuseSteps, Reset,
     STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, SimulationTime, Step, Stepped,
     StepsEnd, TURN_MESSAGES, TakeSnapshot,
 };
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::node::{Ask, Asker, Call, Done, Interest, Publish, Reply, Unserved};
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
@@ -206,17 +206,6 @@ fn stepped(answer: &Answer) -> Stepped {
     }
 }
 
-fn in_virtual_time<F: Future<Output = ()> + 'static>(test: impl FnOnce() -> F) {
-    let system = System::with_tokio_rt(|| {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .start_paused(true)
-            .build()
-            .unwrap()
-    });
-    system.block_on(async move { test().await });
-}
-
 /// Each flood waits in the mailbox as a whole; the clock moves only in the turns that the arm leaves to others.
 #[test]
 fn the_tick_comes_however_many_messages_wait_for_the_arm() {
@@ -278,7 +267,7 @@ fn the_tick_comes_however_many_messages_wait_for_the_arm() {
         ("resets", |bench| drop(bench.ask(1, Reset::default()))),
     ];
     for (name, send) in kinds {
-        in_virtual_time(move || async move {
+        in_virtual_time(async move {
             let bench = Bench::new().await;
             for _ in 0..FLOOD {
                 send(&bench);
@@ -312,7 +301,7 @@ fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
         }),
     ];
     for (name, send) in kinds {
-        in_virtual_time(move || async move {
+        in_virtual_time(async move {
             let bench = Bench::new().await;
             for n in 0..FLOOD {
                 send(&bench, n);
@@ -327,7 +316,7 @@ fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
 
 #[test]
 fn clients_who_step_the_arm_take_turns_and_neither_the_tick_nor_a_light_call_waits_for_them() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         for connection in 1..=9 {
             bench.step(connection, MAX_STEPS);
@@ -363,7 +352,7 @@ fn clients_who_step_the_arm_take_turns_and_neither_the_tick_nor_a_light_call_wai
 /// Four clients who never stop asking, as many times as it takes for a second to pass.
 #[test]
 fn the_tick_comes_while_clients_step_without_end() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         let mut asked = 0;
         for _ in 0..1000 {
@@ -379,7 +368,7 @@ fn the_tick_comes_while_clients_step_without_end() {
 
 #[test]
 fn a_resume_ends_the_steps_that_are_left_and_says_so() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         bench.step(1, MAX_STEPS);
         bench.ask(2, pause(false));
@@ -397,7 +386,7 @@ fn a_resume_ends_the_steps_that_are_left_and_says_so() {
 /// As if each step had been asked for alone: what comes in between takes effect in between.
 #[test]
 fn a_reset_in_between_takes_effect_in_between() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         bench.step(1, MAX_STEPS);
         bench.ask(2, Reset::default());
@@ -415,7 +404,7 @@ fn a_reset_in_between_takes_effect_in_between() {
 /// Euler at one-second steps: the free arm overflows within some hundred steps; who waits for a turn then takes none.
 #[test]
 fn a_divergence_ends_everybodys_steps() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         let integrator = |timestep: f64| SetIntegrator {
             method: Some(Method::Euler),
@@ -438,7 +427,7 @@ fn a_divergence_ends_everybodys_steps() {
 
 #[test]
 fn steps_of_a_client_that_is_gone_are_not_taken() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         let gone = bench.step(1, MAX_STEPS);
         gone.store(true, Ordering::Relaxed);
@@ -451,7 +440,7 @@ fn steps_of_a_client_that_is_gone_are_not_taken() {
 
 #[test]
 fn at_the_end_the_steps_that_are_left_are_refused() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let bench = Bench::paused().await;
         for connection in 1..=3 {
             bench.step(connection, MAX_STEPS);

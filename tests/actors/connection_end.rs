@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
 use actix::prelude::*;
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::protocol::catalog::Service;
 use serde_json::{Value, json};
 use tokio::time::{Instant, sleep};

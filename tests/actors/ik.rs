@@ -113,7 +113,8 @@ impl<const N: usize> Bench<N> {
         answer
     }
 
-    async fn solve(&mut self, args: Value) -> [f64; N] {
+    /// What a client is answered that asks for this.
+    async fn read_and_solve(&mut self, args: Value) -> [f64; N] {
         let answer = self.call(args).await;
         assert_eq!(answer["result"], true, "{answer}");
         assert_eq!(answer["status"], "");
@@ -121,11 +122,24 @@ impl<const N: usize> Bench<N> {
         numbers(&answer["values"]["positions"]).try_into().unwrap()
     }
 
-    async fn refusal(&mut self, args: Value) -> String {
+    async fn read_and_refuse(&mut self, args: Value) -> String {
         let answer = self.call(args).await;
         assert_eq!(answer["result"], false, "{answer}");
         assert_eq!(answer["values"], json!({}));
         answer["status"].as_str().unwrap().to_owned()
+    }
+
+    async fn ask(&self, target: Target) -> Result<[f64; N], SolveError> {
+        let answer = ask(&self.ik.clone().recipient(), Solve(target)).await;
+        answer.expect("the node answers")
+    }
+
+    async fn solve(&self, target: Target) -> [f64; N] {
+        self.ask(target).await.unwrap()
+    }
+
+    async fn refusal(&self, target: Target) -> String {
+        self.ask(target).await.unwrap_err().to_string()
     }
 
     /// The distance between the target and where `q` puts the hand, as a share of the reach.
@@ -136,17 +150,33 @@ impl<const N: usize> Bench<N> {
     }
 }
 
+/// A target without an orientation.
+fn at(x: f64, y: f64) -> Target {
+    Target {
+        position: glam::dvec2(x, y),
+        orientation: None,
+    }
+}
+
+fn turned(target: Target, phi: f64) -> Target {
+    let orientation = Some(phi);
+    Target {
+        orientation,
+        ..target
+    }
+}
+
 /// What a closed form may lose to rounding: a few units in the last place of each angle, far below the 1e-9 asked for.
 const ROUNDING: f64 = 1e-14;
 
 #[test]
 fn the_solution_puts_the_hand_on_the_target() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0, 0.5], [0.0; 2]);
-        let q = bench.solve(json!({"x": 0.6, "y": 0.7})).await;
+        let bench = Bench::new([1.0, 0.5], [0.0; 2]);
+        let q = bench.solve(at(0.6, 0.7)).await;
         assert!(bench.miss(&q, 0.6, 0.7) < ROUNDING);
-        let mut bench = Bench::new([1.0, 0.5, 0.25], [0.0; 3]);
-        let q = bench.solve(json!({"x": 0.6, "y": 0.7, "phi": 2.0})).await;
+        let bench = Bench::new([1.0, 0.5, 0.25], [0.0; 3]);
+        let q = bench.solve(turned(at(0.6, 0.7), 2.0)).await;
         assert!(bench.miss(&q, 0.6, 0.7) < ROUNDING);
         assert!((q.iter().sum::<f64>() - 2.0).abs() < ROUNDING);
     });
@@ -155,21 +185,16 @@ fn the_solution_puts_the_hand_on_the_target() {
 #[test]
 fn lengths_are_asked_of_the_arm_at_every_call() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
-        bench.solve(json!({"x": 1.5, "y": 0.0})).await;
+        let bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        bench.solve(at(1.5, 0.0)).await;
         let pose = bench.pose.get();
         bench.pose.set(Pose {
             lengths: [2.0, 0.5],
             ..pose
         });
-        let q = bench.solve(json!({"x": 2.25, "y": 0.0})).await;
+        let q = bench.solve(at(2.25, 0.0)).await;
         assert!(bench.miss(&q, 2.25, 0.0) < ROUNDING);
-        assert!(
-            bench
-                .refusal(json!({"x": 1.0, "y": 0.0}))
-                .await
-                .contains("1.5 m")
-        );
+        assert!(bench.refusal(at(1.0, 0.0)).await.contains("1.5 m"));
         assert_eq!(bench.asked.get(), 3);
     });
 }
@@ -186,7 +211,7 @@ fn x_and_y_are_required_numbers_and_every_bad_one_is_named() {
             (json!({"x": null, "y": 1}), "x must be a number"),
             (json!({"x": true, "y": [1]}), "y must be a number"),
         ] {
-            let why = bench.refusal(args).await;
+            let why = bench.read_and_refuse(args).await;
             assert!(why.contains(sentence), "{why}");
         }
         assert_eq!(bench.asked.get(), 0, "nobody is asked about nothing");
@@ -197,9 +222,11 @@ fn x_and_y_are_required_numbers_and_every_bad_one_is_named() {
 fn two_links_ignore_phi_even_a_malformed_one() {
     in_virtual_time(async {
         let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
-        let plain = bench.solve(json!({"x": 0.5, "y": 0.5})).await;
+        let plain = bench.read_and_solve(json!({"x": 0.5, "y": 0.5})).await;
         for phi in [json!(3), json!("north"), json!([1]), json!(null)] {
-            let with_phi = bench.solve(json!({"x": 0.5, "y": 0.5, "phi": phi})).await;
+            let with_phi = bench
+                .read_and_solve(json!({"x": 0.5, "y": 0.5, "phi": phi}))
+                .await;
             assert_eq!(with_phi, plain);
         }
     });
@@ -209,10 +236,14 @@ fn two_links_ignore_phi_even_a_malformed_one() {
 fn three_links_reject_a_malformed_phi_and_take_null_for_none() {
     in_virtual_time(async {
         let mut bench = Bench::new([1.0; 3], [0.1, 0.2, 0.3]);
-        let why = bench.refusal(json!({"x": 1, "y": 1, "phi": "north"})).await;
+        let why = bench
+            .read_and_refuse(json!({"x": 1, "y": 1, "phi": "north"}))
+            .await;
         assert!(why.starts_with("phi must be a number"), "{why}");
-        let open = bench.solve(json!({"x": 1, "y": 1})).await;
-        let null = bench.solve(json!({"x": 1, "y": 1, "phi": null})).await;
+        let open = bench.read_and_solve(json!({"x": 1, "y": 1})).await;
+        let null = bench
+            .read_and_solve(json!({"x": 1, "y": 1, "phi": null}))
+            .await;
         assert_eq!(open, null);
     });
 }
@@ -220,13 +251,13 @@ fn three_links_reject_a_malformed_phi_and_take_null_for_none() {
 #[test]
 fn what_is_beyond_the_reach_or_inside_the_fold_is_rejected_with_its_distance_and_the_limit() {
     in_virtual_time(async {
-        let mut bench = Bench::new([2.0, 0.5], [0.0; 2]);
-        let far = bench.refusal(json!({"x": 0.0, "y": 3.0})).await;
+        let bench = Bench::new([2.0, 0.5], [0.0; 2]);
+        let far = bench.refusal(at(0.0, 3.0)).await;
         assert!(far.contains("3 m") && far.contains("2.5 m"), "{far}");
-        let near = bench.refusal(json!({"x": 1.0, "y": 0.0})).await;
+        let near = bench.refusal(at(1.0, 0.0)).await;
         assert!(near.contains("1 m") && near.contains("1.5 m"), "{near}");
-        let mut bench = Bench::new([1.0; 3], [0.0; 3]);
-        let far = bench.refusal(json!({"x": 3.01, "y": 0.0})).await;
+        let bench = Bench::new([1.0; 3], [0.0; 3]);
+        let far = bench.refusal(at(3.01, 0.0)).await;
         assert!(far.contains("3.01 m") && far.contains("3 m"), "{far}");
     });
 }
@@ -235,9 +266,9 @@ fn what_is_beyond_the_reach_or_inside_the_fold_is_rejected_with_its_distance_and
 #[test]
 fn a_phi_that_puts_the_wrist_out_of_reach_is_rejected_though_the_position_is_reachable() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0; 3], [0.0; 3]);
-        bench.solve(json!({"x": 2.5, "y": 0.0})).await;
-        let why = bench.refusal(json!({"x": 2.5, "y": 0.0, "phi": PI})).await;
+        let bench = Bench::new([1.0; 3], [0.0; 3]);
+        bench.solve(at(2.5, 0.0)).await;
+        let why = bench.refusal(turned(at(2.5, 0.0), PI)).await;
         assert!(why.contains("phi") && why.contains("3.5 m"), "{why}");
     });
 }
@@ -246,19 +277,17 @@ fn a_phi_that_puts_the_wrist_out_of_reach_is_rejected_though_the_position_is_rea
 #[test]
 fn the_boundary_counts_as_reachable_from_a_hair_outside_too() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0, 0.4], [0.3, 0.0]);
+        let bench = Bench::new([1.0, 0.4], [0.3, 0.0]);
         let slack = BOUNDARY * 1.4;
         for (distance, outwards) in [(1.4, 1.0), (0.6, -1.0)] {
             for (x, y) in [(1.0, 0.0), (0.0, -1.0), (0.6, 0.8)] {
-                let exact = bench.solve(json!({"x": x * distance, "y": y * distance}));
+                let exact = bench.solve(at(x * distance, y * distance));
                 assert!(bench_miss(exact.await, x * distance, y * distance) < ROUNDING);
                 let hair = distance + outwards * 0.9 * slack;
-                let q = bench.solve(json!({"x": x * hair, "y": y * hair})).await;
+                let q = bench.solve(at(x * hair, y * hair)).await;
                 assert!(bench_miss(q, x * hair, y * hair) < BOUNDARY);
                 let outside = distance + outwards * 10.0 * slack;
-                bench
-                    .refusal(json!({"x": x * outside, "y": y * outside}))
-                    .await;
+                bench.refusal(at(x * outside, y * outside)).await;
             }
         }
     });
@@ -272,9 +301,9 @@ fn the_boundary_counts_as_reachable_from_a_hair_outside_too() {
 #[test]
 fn solutions_are_wrapped_also_for_an_arm_that_has_wound_up() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0; 3], [1000.0, -2000.0, 3000.0]);
+        let bench = Bench::new([1.0; 3], [1000.0, -2000.0, 3000.0]);
         for (x, y) in [(1.0, 1.0), (-2.9, 0.0), (-1.0, -0.01), (0.0, 2.0)] {
-            let q = bench.solve(json!({"x": x, "y": y})).await;
+            let q = bench.solve(at(x, y)).await;
             assert!(q.iter().all(|q| -PI < *q && *q <= PI), "{q:?}");
         }
     });
@@ -283,24 +312,24 @@ fn solutions_are_wrapped_also_for_an_arm_that_has_wound_up() {
 #[test]
 fn of_the_two_elbows_the_one_nearer_to_the_present_pose_is_given() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0, 1.0], [0.0, 0.5]);
-        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] > 0.0);
+        let bench = Bench::new([1.0, 1.0], [0.0, 0.5]);
+        assert!(bench.solve(at(1.0, 1.0)).await[1] > 0.0);
         bench.stand([1.5, -1.0]);
-        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] < 0.0);
+        assert!(bench.solve(at(1.0, 1.0)).await[1] < 0.0);
         // Stretched along the bearing of the target both are equally near.
         bench.stand([PI / 4.0, 0.0]);
-        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] > 0.0);
+        assert!(bench.solve(at(1.0, 1.0)).await[1] > 0.0);
         // Whole turns make no difference.
         bench.stand([1.5 + 4.0 * PI, -1.0 - 2.0 * PI]);
-        assert!(bench.solve(json!({"x": 1.0, "y": 1.0})).await[1] < 0.0);
+        assert!(bench.solve(at(1.0, 1.0)).await[1] < 0.0);
     });
 }
 
 #[test]
 fn three_links_without_phi_keep_the_present_orientation_where_that_is_possible() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0; 3], [0.2, 0.3, 0.4]);
-        let q = bench.solve(json!({"x": 1.0, "y": 1.0})).await;
+        let bench = Bench::new([1.0; 3], [0.2, 0.3, 0.4]);
+        let q = bench.solve(at(1.0, 1.0)).await;
         assert!((q.iter().sum::<f64>() - 0.9).abs() < ROUNDING, "{q:?}");
     });
 }
@@ -310,13 +339,13 @@ fn three_links_without_phi_keep_the_present_orientation_where_that_is_possible()
 #[test]
 fn three_links_without_phi_take_the_nearest_orientation_that_is_possible_otherwise() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0; 3], [PI - 0.1, 0.0, 0.0]);
-        let q = bench.solve(json!({"x": 2.9, "y": 0.0})).await;
+        let bench = Bench::new([1.0; 3], [PI - 0.1, 0.0, 0.0]);
+        let q = bench.solve(at(2.9, 0.0)).await;
         let orientation: f64 = q.iter().sum();
         let nearest = ((2.9_f64.powi(2) + 1.0 - 4.0) / (2.0 * 2.9)).acos();
         // Two units in the last place of the cosine, divided by its slope of 0.36.
         assert!((orientation - nearest).abs() < 1e-14, "{orientation}");
-        let why = bench.refusal(json!({"x": 3.1, "y": 0.0})).await;
+        let why = bench.refusal(at(3.1, 0.0)).await;
         assert!(!why.is_empty(), "there is none for what is out of reach");
     });
 }
@@ -325,11 +354,10 @@ fn three_links_without_phi_take_the_nearest_orientation_that_is_possible_otherwi
 fn a_node_that_asks_gets_what_a_client_gets() {
     in_virtual_time(async {
         let mut bench = Bench::new([1.0; 3], [0.0; 3]);
-        let named = bench.solve(json!({"x": 1, "y": 0.5, "phi": 1})).await;
-        let target = Target {
-            position: glam::dvec2(1.0, 0.5),
-            orientation: Some(1.0),
-        };
+        let named = bench
+            .read_and_solve(json!({"x": 1, "y": 0.5, "phi": 1}))
+            .await;
+        let target = turned(at(1.0, 0.5), 1.0);
         let solved = ask(&bench.ik.clone().recipient(), Solve(target)).await;
         assert_eq!(solved, Ok(Ok(named)));
     });
@@ -362,10 +390,7 @@ fn without_an_arm_the_caller_is_told_so() {
             tokio::task::yield_now().await;
         }
         let ik = Ik::<2>::new(gone.recipient()).start();
-        let target = Target {
-            position: glam::DVec2::X,
-            orientation: None,
-        };
+        let target = at(1.0, 0.0);
         let answer = ask(&ik.recipient(), Solve(target)).await;
         assert_eq!(answer, Ok(Err(SolveError::NoArm)));
     });

@@ -5,11 +5,11 @@
 use std::sync::Arc;
 
 use actix::prelude::*;
-use pendularm::actors::gateway::gauges::Gauges;
 #[cfg(target_os = "linux")]
 use pendularm::actors::gateway::listener::{KEEPALIVE_IDLE, KEEPALIVE_INTERVAL, KEEPALIVE_PROBES};
 use pendularm::actors::gateway::listener::{Listener, StopListening, bind};
 use pendularm::actors::gateway::registry::Registry;
+use pendularm::actors::resources::gauges::Gauges;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader};
 use tokio::net::TcpStream;
 

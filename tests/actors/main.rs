@@ -31,6 +31,8 @@ mod listener;
 mod memory;
 mod memory_kinds;
 mod pacing;
+#[cfg(feature = "record")]
+mod recorder;
 mod registry;
 mod rosapi;
 mod slow;

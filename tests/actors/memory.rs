@@ -10,12 +10,12 @@ use actix::prelude::*;
 use bytes::Bytes;
 use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::budget::{
+use pendularm::actors::gateway::limits::MAX_CONNECTIONS;
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::resources::budget::{
     Account, CONNECTION_BYTES, MAX_HELD, MAX_MEMORY, MESSAGES_LEFT, MODEST, MODEST_PART, Memory,
     NoRoom,
 };
-use pendularm::actors::gateway::limits::MAX_CONNECTIONS;
-use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::wire::{ROOM_TIME, SMALL_ANSWER};
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::limits::MAX_FRAME;

@@ -6,12 +6,12 @@ use std::sync::Mutex;
 use std::time::Duration;
 
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, run, settle};
-use pendularm::actors::gateway::budget::{CONNECTION_BYTES, Memory};
 use pendularm::actors::gateway::limits::{
     CALL_BYTES, MAX_RESPONSES_WAITING, REGISTRATION_BYTES, STALL_LIMIT,
 };
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::actors::ros::follower::{ActionRequest, Follower};
+use pendularm::actors::resources::budget::{CONNECTION_BYTES, Memory};
+use pendularm::actors::wire::follower::{ActionRequest, GoalFollower};
 use pendularm::protocol::catalog::{Action, Service};
 use pendularm::protocol::outbox::{FRAME_BYTES, PLACE_BYTES};
 use pendularm::protocol::wire::fragments::PIECE_BYTES;
@@ -387,7 +387,7 @@ fn ids_of_goals_that_are_pursued() {
     const ID: usize = 1000;
     run(async {
         // A node that sets every goal in motion and reaches none.
-        let pursued = Mutex::new(Vec::<Follower>::new());
+        let pursued = Mutex::new(Vec::<GoalFollower>::new());
         let pursue = move |request| {
             let mut pursued = pursued.lock().unwrap();
             match request {

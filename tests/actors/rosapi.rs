@@ -9,7 +9,7 @@ use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Attach;
 use pendularm::actors::node::ask;
 use pendularm::actors::ros::rosapi::{
-    ArmParameters, Change, GetParam, NotSet, ParameterValue, Rosapi, SetParam,
+    ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, Rosapi, SetParam,
 };
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
@@ -44,7 +44,7 @@ fn a_parameter_is_set_and_read_as_a_value() {
                 gravity: Some(gravity),
                 ..SetParams::default()
             };
-            let change = Ok(Change::Params(change));
+            let change = Ok(ParamChange::Params(change));
             ask(&rosapi.clone().recipient(), SetParam::<2> { change })
         };
         assert_eq!(set(3.7).await, Ok(Ok(())));

@@ -6,17 +6,19 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::stage::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::sim::{
-    ArmSettings, ArmSim, Consult, HeldLimit, LEAST_PAUSE, Present, SetSetpoint, TakeSnapshot,
+    ArmSettings, ArmSim, Consult, Enable, HeldLimit, LEAST_PAUSE, Pause, Present, Reset, SetGains,
+    SetIntegrator, SetParams, SetSetpoint, TakeSnapshot,
 };
 use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::study::Study;
-use pendularm::actors::compute::work_clock;
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::gateway::gauges::Gauges;
-use pendularm::actors::node::{Interest, Publish, Respond};
+use pendularm::actors::node::{Ask, Call, Interest, Publish, Respond, ask};
+use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::work_clock;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
@@ -44,7 +46,7 @@ fn call(
     args: &Value,
     to: Recipient<Respond>,
     connection: u64,
-) -> (ServiceCall, Call) {
+) -> (ServiceCall, Called) {
     let gone = Arc::new(AtomicBool::new(false));
     let (caller, ended) = Caller::new(
         to,
@@ -60,11 +62,11 @@ fn call(
         arguments,
         caller,
     };
-    (call, Call { ended, gone })
+    (call, Called { ended, gone })
 }
 
 /// A call on its way: ends with it; and the flag that its caller has gone.
-struct Call {
+struct Called {
     ended: oneshot::Receiver<()>,
     gone: Arc<AtomicBool>,
 }
@@ -156,7 +158,7 @@ impl<const N: usize> Bench<N> {
         }
     }
 
-    fn call(&self, connection: u64, service: Service, args: &Value) -> Call {
+    fn call(&self, connection: u64, service: Service, args: &Value) -> Called {
         let (message, call) = call(service, args, self.probe.clone().recipient(), connection);
         let mut routes = Nodes::default();
         Study::attach(&self.study, &mut routes);
@@ -652,7 +654,6 @@ impl Handler<HeldLimit<2>> for Oracle {
 #[derive(Clone, Default)]
 struct Ear {
     published: Rc<RefCell<Vec<(Topic, Value)>>>,
-    answered: Rc<RefCell<Vec<Value>>>,
 }
 
 impl Actor for Ear {
@@ -669,20 +670,10 @@ impl Handler<Publish> for Ear {
     }
 }
 
-impl Handler<Respond> for Ear {
-    type Result = ();
-
-    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        let frame = serde_json::from_slice(&respond.frame.write()).expect("valid JSON");
-        self.answered.borrow_mut().push(frame);
-    }
-}
-
 struct Stage {
     arm: Addr<ArmSim<2>>,
     oracle: Oracle,
     ear: Ear,
-    mouth: Addr<Ear>,
     gauges: Arc<Gauges>,
 }
 
@@ -693,12 +684,11 @@ impl Stage {
             limit: Rc::new(Cell::new(limit)),
         };
         let ear = Ear::default();
-        let mouth = ear.clone().start();
         let gauges = Arc::new(Gauges::default());
         let arm = ArmSim::new(
             Arm::default(),
             Gains::default(),
-            mouth.clone().recipient(),
+            ear.clone().start().recipient(),
             Arc::clone(&gauges),
         )
         .start();
@@ -708,7 +698,6 @@ impl Stage {
             arm,
             oracle,
             ear,
-            mouth,
             gauges,
         }
     }
@@ -717,12 +706,13 @@ impl Stage {
         self.arm.send(Interest { topic, wanted }).await.unwrap();
     }
 
-    async fn ask(&self, service: Service, args: Value) {
-        let (message, call) = call(service, &args, self.mouth.clone().recipient(), 1);
-        let mut routes = Nodes::default();
-        ArmSim::attach(&self.arm, &mut routes);
-        routes.services[&service](message);
-        let _ = call.ended.await;
+    /// Asks the arm as another node does.
+    async fn ask<A: Ask>(&self, question: A)
+    where
+        ArmSim<2>: Handler<Call<A>>,
+    {
+        let answer = ask(&self.arm.clone().recipient(), question).await;
+        assert!(answer.is_ok(), "an answer");
         tokio::task::yield_now().await;
     }
 
@@ -748,15 +738,33 @@ impl Stage {
     }
 }
 
-fn in_virtual_time<F: Future<Output = ()> + 'static>(test: impl FnOnce() -> F) {
-    let system = System::with_tokio_rt(|| {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .start_paused(true)
-            .build()
-            .unwrap()
-    });
-    system.block_on(async move { test().await });
+fn enable(on: bool) -> Enable {
+    Enable {
+        enabled: Some(on),
+        ..Enable::default()
+    }
+}
+
+fn pause(paused: bool) -> Pause {
+    Pause {
+        paused: Some(paused),
+        ..Pause::default()
+    }
+}
+
+fn integrator(timestep: Option<f64>, method: Option<Method>) -> SetIntegrator {
+    SetIntegrator {
+        timestep,
+        method,
+        ..SetIntegrator::default()
+    }
+}
+
+fn gravity(gravity: f64) -> SetParams<2> {
+    SetParams {
+        gravity: Some(gravity),
+        ..SetParams::default()
+    }
 }
 
 fn value<'a>(message: &'a Value, key: &str) -> &'a str {
@@ -767,17 +775,14 @@ fn value<'a>(message: &'a Value, key: &str) -> &'a str {
 
 #[test]
 fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.004).await;
         stage.want(Topic::JointStates, true).await;
         for timestep in [0.01, 0.02, 0.03] {
             stage
-                .ask(
-                    Service::SetIntegrator,
-                    json!({"timestep": timestep, "method": "verlet"}),
-                )
+                .ask(integrator(Some(timestep), Some(Method::Verlet)))
                 .await;
-            stage.ask(Service::Enable, json!({"data": true})).await;
+            stage.ask(enable(true)).await;
             stage.set_setpoint([timestep, 1.0]).await;
             sleep(Duration::from_secs(2)).await;
         }
@@ -788,7 +793,7 @@ fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
 
 #[test]
 fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.004).await;
         stage.want(Topic::Diagnostics, true).await;
         let first = stage.questions().await;
@@ -797,21 +802,19 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
         sleep(Duration::from_secs(10)).await;
         assert_eq!(stage.questions().await, []);
         // What does not bear on the loop in force: with the controller off, gains and setpoint too.
+        stage.ask(integrator(Some(0.002), Some(Method::Rk4))).await;
+        stage.ask(gravity(9.81)).await;
         stage
-            .ask(
-                Service::SetIntegrator,
-                json!({"timestep": 0.002, "method": "rk4"}),
-            )
+            .ask(SetGains {
+                kp: Some([50.0, 50.0]),
+                ..SetGains::default()
+            })
             .await;
-        stage
-            .ask(Service::SetParams, json!({"gravity": 9.81}))
-            .await;
-        stage.ask(Service::SetGains, json!({"kp": [50, 50]})).await;
         stage.set_setpoint([1.0, -1.0]).await;
-        stage.ask(Service::Pause, json!({"data": true})).await;
-        stage.ask(Service::Pause, json!({"data": false})).await;
+        stage.ask(pause(true)).await;
+        stage.ask(pause(false)).await;
         assert_eq!(stage.questions().await, []);
-        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.ask(enable(true)).await;
         let gains = Gains {
             kp: [50.0; 2],
             ..Gains::default()
@@ -827,21 +830,24 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
             ..free
         };
         assert_eq!(stage.questions().await, [control]);
-        stage
-            .ask(Service::SetIntegrator, json!({"method": "midpoint"}))
-            .await;
+        stage.ask(integrator(None, Some(Method::Midpoint))).await;
         control.method = Method::Midpoint;
         assert_eq!(stage.questions().await, [control]);
-        stage.ask(Service::SetParams, json!({"gravity": 1})).await;
+        stage.ask(gravity(1.0)).await;
         control.arm = Arm::new([1.0; 2], [1.0; 2], 1.0).unwrap();
         assert_eq!(stage.questions().await, [control]);
-        stage.ask(Service::SetGains, json!({"ki": [0, 0]})).await;
+        stage
+            .ask(SetGains {
+                ki: Some([0.0, 0.0]),
+                ..SetGains::default()
+            })
+            .await;
         control.gains.ki = [0.0; 2];
         assert_eq!(stage.questions().await, [control]);
         stage.set_setpoint([0.5, 0.5]).await;
         control.setpoint.position = [0.5; 2];
         assert_eq!(stage.questions().await, [control]);
-        stage.ask(Service::Reset, json!({})).await;
+        stage.ask(Reset::default()).await;
         control.setpoint.position = [0.0; 2];
         assert_eq!(stage.questions().await, [control]);
         stage.want(Topic::Diagnostics, false).await;
@@ -853,9 +859,9 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
 /// A thousand setpoints a second for two seconds: twenty questions, and one at the start.
 #[test]
 fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.004).await;
-        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.ask(enable(true)).await;
         stage.want(Topic::Diagnostics, true).await;
         for k in 0..2000 {
             stage.set_setpoint([1e-4 * f64::from(k), 0.0]).await;
@@ -870,9 +876,9 @@ fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
 
 #[test]
 fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.004).await;
-        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.ask(enable(true)).await;
         stage.want(Topic::Diagnostics, true).await;
         sleep(Duration::from_millis(2100)).await;
         for message in stage.said(Topic::Diagnostics) {
@@ -887,14 +893,12 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
         }
         for paused in [false, true] {
             let state = if paused { "paused" } else { "running" };
-            stage.ask(Service::Pause, json!({"data": paused})).await;
+            stage.ask(pause(paused)).await;
             for (timestep, level) in [(0.005, 1), (0.004, 0)] {
                 // Within a tick of the change, not a second later.
                 sleep(Duration::from_millis(5)).await;
                 stage.said(Topic::Diagnostics);
-                stage
-                    .ask(Service::SetIntegrator, json!({"timestep": timestep}))
-                    .await;
+                stage.ask(integrator(Some(timestep), None)).await;
                 sleep(Duration::from_millis(20)).await;
                 let told = stage.said(Topic::Diagnostics);
                 let status = &told[0]["status"][0];
@@ -914,7 +918,7 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
             }
         }
         stage.oracle.limit.set(0.0);
-        stage.ask(Service::Enable, json!({"data": false})).await;
+        stage.ask(enable(false)).await;
         sleep(Duration::from_millis(300)).await;
         let told = stage.said(Topic::Diagnostics);
         assert_eq!(
@@ -927,10 +931,10 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
 /// A setpoint that is dragged asks for a prediction now and then, not at every tick; the last one has its own.
 #[test]
 fn a_setpoint_that_goes_on_moving_is_predicted_now_and_then() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.004).await;
         stage.want(Topic::Diagnostics, true).await;
-        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.ask(enable(true)).await;
         stage.questions().await;
         let time = Duration::from_secs(2);
         let moves = 100_u32;
@@ -953,15 +957,15 @@ fn a_setpoint_that_goes_on_moving_is_predicted_now_and_then() {
 /// A limit of other gains says nothing: between the change and the answer the limit is unknown, and there is no warning.
 #[test]
 fn a_limit_of_another_loop_is_never_held_against_the_arm() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.0).await;
         stage.want(Topic::Diagnostics, true).await;
         // Between two ticks, so that none comes between the change and the message.
         sleep(Duration::from_millis(508)).await;
         stage.said(Topic::Diagnostics);
         stage.oracle.limit.set(0.004);
-        stage.ask(Service::Enable, json!({"data": true})).await;
-        stage.ask(Service::Pause, json!({"data": true})).await;
+        stage.ask(enable(true)).await;
+        stage.ask(pause(true)).await;
         sleep(Duration::from_millis(100)).await;
         let told = stage.said(Topic::Diagnostics);
         let told: Vec<_> = told
@@ -979,16 +983,14 @@ fn a_limit_of_another_loop_is_never_held_against_the_arm() {
 
 #[test]
 fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(f64::INFINITY).await;
         stage.want(Topic::Diagnostics, true).await;
-        stage.ask(Service::Pause, json!({"data": true})).await;
+        stage.ask(pause(true)).await;
         // At rest without gravity, so that nothing moves either.
-        stage.ask(Service::SetParams, json!({"gravity": 0})).await;
-        stage.ask(Service::Reset, json!({})).await;
-        stage
-            .ask(Service::SetIntegrator, json!({"timestep": 1e6}))
-            .await;
+        stage.ask(gravity(0.0)).await;
+        stage.ask(Reset::default()).await;
+        stage.ask(integrator(Some(1e6), None)).await;
         sleep(Duration::from_secs(2)).await;
         let told = stage.said(Topic::Diagnostics);
         let message = told.last().unwrap();
@@ -1003,14 +1005,12 @@ fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
 /// smaller of the two limits warns.
 #[test]
 fn a_motion_too_fast_for_the_timestep_is_warned_of() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.2).await;
         stage.want(Topic::Diagnostics, true).await;
-        stage.ask(Service::Pause, json!({"data": true})).await;
+        stage.ask(pause(true)).await;
         for (timestep, warned) in [(0.05, false), (0.15, true)] {
-            stage
-                .ask(Service::SetIntegrator, json!({"timestep": timestep}))
-                .await;
+            stage.ask(integrator(Some(timestep), None)).await;
             sleep(Duration::from_secs(2)).await;
             let told = stage.said(Topic::Diagnostics);
             let message = told.last().unwrap();
@@ -1022,9 +1022,7 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
             assert_eq!(warning.contains(said), warned, "{warning}");
         }
         // Beyond both limits the smaller one is told.
-        stage
-            .ask(Service::SetIntegrator, json!({"timestep": 0.3}))
-            .await;
+        stage.ask(integrator(Some(0.3), None)).await;
         sleep(Duration::from_secs(2)).await;
         let told = stage.said(Topic::Diagnostics);
         let warning = value(told.last().unwrap(), "warning").to_owned();
@@ -1034,17 +1032,15 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
 
 #[test]
 fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(0.004).await;
-        stage
-            .ask(Service::SetIntegrator, json!({"method": "midpoint"}))
-            .await;
+        stage.ask(integrator(None, Some(Method::Midpoint))).await;
         stage.want(Topic::ErrorEstimate, true).await;
         sleep(Duration::from_secs(3)).await;
         let told = stage.said(Topic::ErrorEstimate);
         assert!((29..=31).contains(&told.len()), "{}", told.len());
         assert_eq!(stage.gauges.error_estimates(), told.len() as u64);
-        stage.ask(Service::Pause, json!({"data": true})).await;
+        stage.ask(pause(true)).await;
         sleep(Duration::from_millis(200)).await;
         let simulation = stage.arm.send(TakeSnapshot::<2>).await.unwrap().0;
         let expected = estimate(&simulation).unwrap();
@@ -1063,20 +1059,18 @@ fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
 
 #[test]
 fn an_arm_that_has_diverged_has_no_local_error() {
-    in_virtual_time(|| async {
+    in_virtual_time(async {
         let stage = Stage::new(f64::INFINITY).await;
         stage.want(Topic::ErrorEstimate, true).await;
         stage
-            .ask(Service::SetGains, json!({"kp": [1e200, 1e200]}))
+            .ask(SetGains {
+                kp: Some([1e200; 2]),
+                ..SetGains::default()
+            })
             .await;
         stage.set_setpoint([1.0, 1.0]).await;
-        stage
-            .ask(
-                Service::SetIntegrator,
-                json!({"timestep": 0.01, "method": "euler"}),
-            )
-            .await;
-        stage.ask(Service::Enable, json!({"data": true})).await;
+        stage.ask(integrator(Some(0.01), Some(Method::Euler))).await;
+        stage.ask(enable(true)).await;
         sleep(Duration::from_secs(1)).await;
         let told = stage.said(Topic::ErrorEstimate);
         assert_eq!(

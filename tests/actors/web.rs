@@ -9,12 +9,12 @@ use std::time::Duration;
 
 use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
 use bytes::Bytes;
-use pendularm::actors::gateway::budget::Memory;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::gate::{Gate, MAX_HEADS};
 use pendularm::actors::gateway::limits::{FRAME_TIME, STALL_LIMIT};
 use pendularm::actors::gateway::messages::{FinishAll, Publish};
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::web::access::Access;
 use pendularm::web::{Door, MAX_FILES_TOTAL, MAX_REQUESTS};

@@ -116,6 +116,7 @@ class Page:
         self.browser = browser
         self.complaints = []  # errors of the console, exceptions, violations of the policy
         self.expect_network_errors = False
+        self.told = 0  # messages that came over its WebSocket
         self._loaded = queue.Queue()
         target = browser.send("Target.createTarget", {"url": "about:blank"})["targetId"]
         self.target = target
@@ -142,6 +143,8 @@ class Page:
             entry = params["entry"]
             if not (self.expect_network_errors and "net::ERR_" in entry["text"]):
                 self.complaints.append(f"{entry['source']}: {entry['text']} {entry.get('url', '')}")
+        elif method == "Network.webSocketFrameReceived":
+            self.told += 1
         elif method == "Page.loadEventFired":
             self._loaded.put(True)
 

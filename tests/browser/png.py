@@ -68,7 +68,3 @@ def close(one, other, tolerance=24):
     """Whether two colors are alike."""
     return all(abs(a - b) <= tolerance for a, b in zip(one, other))
 
-
-def named(text):
-    """(red, green, blue) of `#rrggbb`."""
-    return tuple(int(text[i:i + 2], 16) for i in (1, 3, 5))

@@ -5,11 +5,12 @@ Invariant: a test passes only if its page's console said nothing: no exception, 
 
 import os
 import pathlib
+import re
 import time
 import unittest
 
 from chromium import Browser
-from png import Image, named
+from png import Image
 from runtime import Runtime
 
 ARTEFACTS = pathlib.Path(os.environ.get("ARTEFACTS", "target/browser"))
@@ -76,7 +77,8 @@ class PageTest(unittest.TestCase):
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""
-        return named(self.page.run(f"getComputedStyle(document.documentElement).getPropertyValue('--{name}').trim()"))
+        text = self.page.run(f"(() => {{ const e = document.querySelector('#probe'); e.style.color = 'var(--{name})'; return getComputedStyle(e).color; }})()")
+        return tuple(int(one) for one in re.findall(r"\d+", text)[:3])
 
     def settle(self, positions):
         """The servo holds the arm at `positions`, and then it is paused: a picture that does not change."""

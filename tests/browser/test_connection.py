@@ -43,6 +43,17 @@ class Reconnecting(PageTest):
         self.page.click("#servo")
         self.wait(lambda: self.runtime.call("/pid_controller/enable")["values"]["data"], "servo")
 
+    def test_what_was_refused_for_want_of_a_connection_is_said_no_longer_than_that(self):
+        self.tab("compare")
+        self.page.expect_network_errors = True
+        self.runtime.stop()
+        self.page.until("document.querySelector('#connection-text').textContent !== 'connected'")
+        self.page.click("#compare-form button[type=submit]")
+        self.page.until("document.querySelector('#compare-form .refusal').textContent.includes('not connected')")
+        self.runtime.start()
+        self.connected()
+        self.page.until("document.querySelector('#compare-form .refusal').textContent === ''")
+
     def test_it_takes_another_number_of_links(self):
         self.page.expect_network_errors = True
         self.runtime.restart(links=3)

@@ -167,7 +167,7 @@ class Controls(PageTest):
         self.runtime.call("/arm_sim/pause", data=True)
         self.page.until("document.querySelector('#limit-bar').className === 'limit-bar good'")
         self.runtime.call("/arm_sim/set_integrator", timestep=2 * limit)
-        self.page.until("document.querySelector('#notice').textContent.includes('above the predicted stability limit')")
+        self.page.until("document.querySelector('#notice').textContent.includes('is above the limit')")
         self.assertTrue(self.page.run("document.querySelector('#out-limit').classList.contains('bad')"))
         self.keep("limit")
         self.page.click("#notice button")
@@ -203,7 +203,7 @@ class Controls(PageTest):
     def test_any_number_of_runs_is_compared_with_a_reference(self):
         self.tab("compare")
         for _ in range(2):
-            self.page.click("#compare-form .compare-row button[type=button]")
+            self.page.click("#compare-form .compare-rows > button")
         self.page.run("document.querySelectorAll('#compare-rows select')[2].value = 'verlet'")
         self.page.click("#compare-form button[type=submit]")
         self.page.until("!document.querySelector('#compare-result').hidden", 60, "a result")
@@ -251,9 +251,10 @@ class Controls(PageTest):
         self.page.until("document.querySelector('#pause-text').textContent === 'Run'")
         self.page.key("4")
         self.wait(lambda: not self.values("/arm_sim/pause")["data"], "a method goes on")
-        for key, on in (("c", True), ("s", False), ("x", True)):
+        for key, on in (("c", True), ("c", False), ("x", True), ("s", False), ("s", False), ("x", True)):
             self.page.key(key)
             self.wait(lambda: self.values("/pid_controller/enable")["data"] is on, key)
+            self.page.until(f"document.querySelector('#servo').ariaChecked === '{str(on).lower()}'")
 
     def test_q_and_e_move_the_setpoint_of_the_chosen_joint(self):
         self.page.click("#servo")

@@ -6,7 +6,7 @@ from stage import PageTest
 
 AXE = pathlib.Path(__file__).parents[2] / "node_modules/axe-core/axe.min.js"
 PANELS = ("plots", "stability", "error", "compare", "tasks")
-PHONE = {"width": 390, "height": 800, "density": 2, "touch": True}
+PHONE = {"width": 390, "height": 844, "density": 2, "touch": True}
 
 
 class Access:
@@ -21,6 +21,20 @@ class Access:
         self.keep(f"layout-{type(self).__name__}", whole=True)
 
 
+class Free:
+    """Where the view is small nothing is in its corners."""
+
+    def test_nothing_lies_over_the_arm(self):
+        self.page.click("#lesson-limit")
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
+        over = self.page.run("""(() => { const arm = document.querySelector('#arm').getBoundingClientRect();
+            return [...document.querySelectorAll('.clock, .view-tools, #notice')].filter((one) => {
+                const b = one.getBoundingClientRect();
+                return b.bottom > arm.top + 1 && b.top < arm.bottom - 1;
+            }).map((one) => one.id || one.className); })()""")
+        self.assertEqual(over, [])
+
+
 class Desktop(Access, PageTest):
     def box(self, selector):
         return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
@@ -31,6 +45,17 @@ class Desktop(Access, PageTest):
         for panel, control in (("compare", "#compare-form button[type=submit]"), ("tasks", "#trial-start"), ("error", "#ladder"), ("stability", "#region")):
             self.tab(panel)
             self.assertLessEqual(self.box(control)[3], 900, control)
+
+    def test_no_moving_canvas_is_in_a_round_clip(self):
+        """Which a browser draws apart, and once more through a mask, in every frame."""
+        clips = self.page.run("""[...document.querySelectorAll('#arm, #plots canvas')].flatMap((one) => {
+            const found = [];
+            for (let e = one.parentElement; e; e = e.parentElement) {
+                const { overflow, borderRadius } = getComputedStyle(e);
+                if (overflow !== 'visible' && borderRadius !== '0px') found.push(`${one.id} in ${e.id || e.className}`);
+            }
+            return found; })""")
+        self.assertEqual(clips, [])
 
     def test_a_notice_does_not_cover_the_arm(self):
         self.runtime.call("/arm_sim/set_integrator", timestep=0.0055)
@@ -56,13 +81,28 @@ class ThreeLinks(Access, PageTest):
         self.assertTrue(captions)
 
 
-class Phone(Access, PageTest):
+class Laptop(Free, PageTest):
+    view = {"width": 1280, "height": 720}
+
+    def test_captions_are_whole(self):
+        self.page.until("document.querySelector('#legend-drift').textContent.length > 3")
+        clipped = self.page.run("[...document.querySelectorAll('#plots figcaption')].filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent)")
+        self.assertEqual(clipped, [])
+
+
+class Phone(Free, Access, PageTest):
     view = PHONE
 
     def test_arm_integrator_and_servo_come_first(self):
-        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#lessons', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
+        tops = self.page.run("['#arm', '#transport', '#methods', '#kp-fields', '#lesson-choice', '#panel'].map((one) => document.querySelector(one).getBoundingClientRect().top)")
         self.assertEqual(tops, sorted(tops))
         self.assertEqual(self.page.run("document.documentElement.scrollWidth"), 390)
+
+    def test_a_lesson_brings_its_text_and_the_arm_into_sight(self):
+        self.page.click("#lesson-limit")
+        self.page.until("document.querySelector('#lesson-text').textContent.startsWith('The servo steps')")
+        top, bottom = self.page.run("[document.querySelector('#lesson-text').getBoundingClientRect().top, document.querySelector('#arm').getBoundingClientRect().bottom]")
+        self.assertTrue(0 <= top < bottom <= 844, (top, bottom))
 
     def test_what_is_touched_is_44_pixels_high(self):
         small = self.page.run("[...document.querySelectorAll('button, select, input:not([type=checkbox], [type=radio]), summary, .segment')]"

@@ -47,8 +47,43 @@ class Right(Lesson):
     def test_eulers_free_swing_is_stable_at_no_timestep(self):
         self.page.click("input[value=euler]")
         self.page.until("document.querySelector('#out-limit').textContent === 'no timestep'")
-        self.assertEqual(self.page.text("#verdict-pill"), "grows at any timestep")
+        self.assertEqual(self.page.text("#verdict-pill"), "never stable")
         self.assertRegex(self.page.text("#verdict"), r"doubles every [\d.]+ s")
+
+    def test_each_integrators_button_says_what_it_bears_in_the_loop_in_force(self):
+        def served(method):
+            limit = self.values("/study/stability", integrator=method, **self.asked)["timestep_limit_held"]
+            return "no timestep" if limit == 0 else f"{float(format(1000 * limit, '.3g')):g} ms"
+
+        def shown():
+            return self.page.run("Object.fromEntries([...document.querySelectorAll('#methods .segment')].map((one) =>"
+                                 " [one.querySelector('input').value, one.querySelector('.bears').textContent]))")
+
+        methods = ("euler", "midpoint", "verlet", "rk4")
+        self.asked = {"gains": self.free()}
+        self.wait(lambda: shown() == {method: served(method) for method in methods}, "the arm left to itself")
+        self.asked = {}
+        self.page.click("#servo")
+        self.wait(lambda: shown() == {method: served(method) for method in methods}, "the servo")
+        self.page.fill(f"#kd-fields {NUMBER}", "60")
+        self.wait(lambda: shown() == {method: served(method) for method in methods}, "other gains")
+
+    def test_one_button_says_why_the_gains_bear_that(self):
+        self.page.click("#servo")
+        self.page.until("document.querySelector('#why').checkVisibility()")
+        self.page.click("#why")
+        text = self.page.until("document.querySelector('#why-text').checkVisibility() && document.querySelector('#why-text').textContent")
+        limit = 1000 * self.values("/study/stability")["timestep_limit_held"]
+        self.assertTrue(text.startswith(f"Why {float(format(limit, '.3g')):g} ms: "), text)
+        self.assertIn("overshoots", text)
+        self.keep("why")
+
+    def test_a_mark_of_a_target_goes_once_the_arm_is_sent_elsewhere(self):
+        self.page.click("#servo")
+        self.runtime.call("/ik_action/send_goal", x=0.4, y=1.1)
+        self.page.until("own('store.js').then(({ state }) => state.goal?.outcome === 'reached')", 20)
+        self.page.run("own('runtime.js').then((arm) => arm.sendSetpoint([0.1, 0.2]))")
+        self.page.until("own('store.js').then(({ state }) => state.goal === null)")
 
     def test_a_buttons_figure_is_of_the_present_loop(self):
         self.runtime.call("/arm_sim/set_integrator", timestep=0.01)
@@ -152,6 +187,30 @@ class BlowUp(Lesson):
                    if all(abs(a - b) < 24 for a, b in zip(picture[x, y], color))}
         self.assertGreaterEqual(len(heights), 4)
 
+    def test_the_limit_of_an_arm_that_has_diverged_is_that_of_its_pose(self):
+        self.diverge()
+        limit = 1000 * self.values("/study/stability", integrator="euler")["timestep_limit_held"]
+        wanted = f"{float(format(limit, '.3g')):g} ms"
+        self.page.until(f"document.querySelector('#out-limit').textContent === '{wanted}'")
+        self.assertIn(f"20 ms is above the limit {wanted}, at the setpoint (0.00, 0.00) rad.", self.page.text("#notice"))
+        self.assertIn("Advised: ", self.page.text("#limit-text"))
+        self.assertNotIn(" ns", self.page.text("#limit-text"))
+
+    def test_a_click_in_the_map_brings_an_arm_that_has_diverged_back(self):
+        self.page.click("#lesson-stiff")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.02)
+        self.page.until("document.querySelector('#run-state').textContent === 'diverged'", 20)
+        begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Begin anew')"
+        self.page.until(begin_anew)
+        box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        # 0.2 ms at the present gains.
+        x, y = box[0] + 46 + (box[2] - 56) * math.log10(2) / 3, box[1] + 8 + (box[3] - 40) / 2
+        self.page.mouse("mousePressed", x, y)
+        self.page.mouse("mouseReleased", x, y)
+        self.page.until("document.querySelector('#run-state').textContent === 'running'")
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")
+
     def test_one_button_recovers(self):
         self.diverge()
         button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Reset with'))?.textContent")
@@ -221,6 +280,11 @@ class Ways(Lesson):
         self.assertIn("robot arm", text)
         self.assertIn("Try", text)
         self.keep("first-visit")
+
+    def test_what_a_stranger_is_to_try_is_one_click(self):
+        self.page.click("#lesson-text button")
+        self.page.until("document.querySelector('#lesson-limit').ariaPressed === 'true'")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
 
     def test_a_reset_restores_what_the_lesson_set(self):
         self.page.click("#lesson-sag")
@@ -294,6 +358,19 @@ class Ways(Lesson):
         time.sleep(0.5)
         self.page.click("#watch")
         self.assertRegex(self.page.text("#watch-hud"), r"^⏱ [\d.]+ s$")
+
+
+class Defaults(Lesson):
+    def test_the_pages_defaults_are_what_the_runtime_starts_with(self):
+        present = {
+            "integrator": self.values("/arm_sim/set_integrator"), "params": self.values("/arm_sim/set_params"),
+            "gains": self.values("/pid_controller/set_gains"), "servo": self.values("/pid_controller/enable")["data"],
+        }
+        self.assertEqual(self.page.run(f"own('settings.js').then(({{ DEFAULTS }}) => DEFAULTS[{self.links}])"), {**present, "setpoint": [0] * self.links})
+
+
+class DefaultsThreeLinks(Defaults):
+    links = 3
 
 
 class Suggestion(Lesson):
@@ -370,6 +447,18 @@ class Still(Lesson):
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
         time.sleep(0.5)
         self.assertEqual(self.drawn(2), 0)
+
+    def test_a_paused_page_is_told_little(self):
+        running = self.page.told
+        time.sleep(3)
+        self.assertGreater(self.page.told - running, 30, "while it moves it hears of every state")
+        self.runtime.call("/arm_sim/pause", data=True)
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        time.sleep(1)
+        paused = self.page.told
+        time.sleep(3)
+        # Once a second: a joint state, the diagnostics, the answers about five settings; and one more of each.
+        self.assertLessEqual(self.page.told - paused, 4 * 8)
 
     def test_an_arm_that_the_servo_holds_still_is_not_drawn_in_every_frame(self):
         self.page.click("#servo")

@@ -25,8 +25,11 @@ against() {
     runtime=
 }
 
-against .venv/bin/python python/roslibpy_client.py
+for client in roslibpy compas_fab; do
+    against .venv/bin/python "python/${client}_client.py"
+done
 for client in roslib2 roslib1 lichtblick; do
     against node "node/$client.mjs"
 done
 against roslibrust/target/debug/pendularm-client-roslibrust
+timeout 300 .venv/bin/python python/record_readers.py "$program"

@@ -15,21 +15,27 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use crate::standing;
 
 /// What a floor may name, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 11] = [
+const FLOORS: [(&str, &[&str]); 12] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
     ("study", &["math"]),
+    ("record", &["math", "protocol"]),
     ("web", &["protocol"]),
     ("report", &["math", "study"]),
     ("options", &["protocol", "web", "report"]),
     ("plan", &["math", "study", "options"]),
     (
         "actors",
-        &["math", "protocol", "logging", "study", "web", "options"],
+        &[
+            "math", "protocol", "logging", "study", "record", "web", "options",
+        ],
     ),
     ("lib", &[]),
-    ("main", &["logging", "report", "options", "plan", "actors"]),
+    (
+        "main",
+        &["logging", "record", "report", "options", "plan", "actors"],
+    ),
 ];
 
 /// The same within the protocol.

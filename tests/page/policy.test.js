@@ -3,7 +3,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { answerInForce, energyName, limitInForce, motionHasChanged, question, verdict, worstText } from "../../page/policy.js";
+import { adviceText, answerInForce, energyName, limitInForce, motionHasChanged, question, verdict, worstText } from "../../page/policy.js";
 
 const VALUES = {
   timestep_limit_held: 0.0136, timestep_limit_continuous: 0.0204, minimum_over_poses_held: 0.00432,
@@ -55,6 +55,23 @@ test("a motion that bears less than the pose decides, and is named by its speed"
   const said = verdict(arm({ stability: moving, integrator: { method: "rk4", timestep: 0.006 } }));
   assert.equal(said.kind, "beyond");
   assert.equal(said.where, "moving at 12.5 rad/s");
+});
+
+test("what the gains bear is said of this pose, of every pose, and with what to use", () => {
+  assert.equal(adviceText(arm()), "Stable up to 13.6 ms, at the setpoint (0.90, −1.30) rad; in every pose up to 4.32 ms. Advised: 3.46 ms.");
+  assert.match(adviceText(arm({ stability: { ...VALUES, minimum_over_poses_held: 0 } })), /; in every pose none is\.$/);
+  assert.match(adviceText(arm({ stability: { ...VALUES, timestep_limit_held: 0 } })), /^No timestep is stable, at the setpoint/);
+  assert.equal(adviceText({ ...arm(), enabled: false }), "");
+});
+
+test("who shakes beyond the limit, or has diverged, is fast because of that: the pose decides", () => {
+  const thrashing = { ...VALUES, timestep_limit_motion: 1e-150, motion_speed: 5.6e156, equilibrium: [0.9, -1.3], equilibrium_kind: "setpoint" };
+  for (const changed of [{ integrator: { method: "rk4", timestep: 0.02 } }, { diagnostics: { state: "diverged" } }]) {
+    const found = limitInForce(arm({ stability: thrashing, ...changed }));
+    assert.deepEqual([found.limit, found.everyPose], [VALUES.timestep_limit_held, VALUES.minimum_over_poses_held]);
+    assert.match(found.where, /^at the setpoint/);
+    assert.equal(found.advised, 0.8 * VALUES.minimum_over_poses_held);
+  }
 });
 
 test("the study is asked again once the motion bears another timestep", () => {

@@ -4,7 +4,7 @@
 
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::Arguments;
-use pendularm::protocol::op::fields::{Bound, Fields, Reason, Rejection};
+use pendularm::protocol::op::fields::{Bound, Fields, Reason, RejectedField};
 use proptest::prelude::*;
 use serde_json::value::RawValue;
 
@@ -146,10 +146,14 @@ fn null_means_absent_only_in_optional_fields_of_services_that_take_all_or_nothin
     });
     assert_eq!(value, (None, None));
     assert_eq!(status, "x must be a number, got null");
-    let (_, status) = reading(Service::CancelGoal, r#"{"goal_id":null}"#, |fields| {
+    let (value, status) = reading(Service::CancelGoal, r#"{"goal_id":null}"#, |fields| {
         fields.text("goal_id").map(std::borrow::Cow::into_owned)
     });
-    assert_eq!(status, "goal_id must be a string, got null");
+    assert_eq!((value, status.as_str()), (None, ""));
+    let (_, status) = reading(Service::SetParams, r#"{"gravity":null}"#, |fields| {
+        fields.number("gravity", Bound::NonNegative)
+    });
+    assert_eq!(status, "gravity must be a number, got null");
 }
 
 #[test]
@@ -370,7 +374,7 @@ fn another_layer_may_refuse_a_field_in_its_own_words() {
     assert_eq!(fields.status(), "method is not to be trusted");
     assert_eq!(
         fields.rejections(),
-        [Rejection {
+        [RejectedField {
             field: "method".to_owned(),
             reason: Reason::Refused("is not to be trusted".to_owned()),
         }]

@@ -4,7 +4,7 @@
 use std::rc::Rc;
 use std::time::Duration;
 
-use pendularm::actors::gateway::budget::MODEST;
+use pendularm::actors::resources::budget::MODEST;
 use tokio::time::Instant;
 
 use crate::client::{Client, Door};

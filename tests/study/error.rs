@@ -5,7 +5,7 @@ use pendularm::math::integrator::Method;
 use pendularm::report::experiments::budget::Budget;
 use pendularm::report::experiments::chaos::{energy_drift, horizon, lyapunov_rate, separation};
 use pendularm::report::experiments::error::{OUTPUTS, scenes};
-use pendularm::report::experiments::reference::{Law, Reference};
+use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 
 /// Halving the timestep divides the error by 2^p where truncation is all there is.
 #[test]
@@ -106,7 +106,7 @@ fn the_parts_of_an_error_add_up() {
 #[test]
 fn a_better_method_has_a_later_horizon() {
     let arm = Arm::<2>::default();
-    let reference = Reference::of(&arm, &State::rest(), &Law::FREE, 0.125, 96);
+    let reference = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 0.125, 96);
     let at = |method| {
         let errors = separation(&arm, &State::rest(), method, 1.0 / 256.0, 32, &reference);
         horizon(&errors, 0.125).unwrap_or(f64::INFINITY)

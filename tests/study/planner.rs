@@ -5,7 +5,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::report::experiments::reference::{Law, Reference};
+use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::planner::{Candidate, MAX_DURATION, PlanError, Planned, Planning, Task};
 
@@ -33,7 +33,7 @@ fn error_of<const N: usize>(task: &Task<N>, law: &Law<N>, candidate: &Candidate)
     let every = (steps / 50).max(1);
     let count = steps / every;
     let spacing = candidate.timestep * every as f64;
-    let truth = Reference::of(&task.control.arm, &task.start, law, spacing, count);
+    let truth = ReferenceMotion::of(&task.control.arm, &task.start, law, spacing, count);
     let control = task.control.with_method(candidate.method);
     let mut live = control
         .with_timestep(candidate.timestep)

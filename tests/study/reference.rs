@@ -5,7 +5,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::report::experiments::reference::{
-    DoubleDouble, Law, Reference, exact_steps, largest_difference,
+    DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference,
 };
 use serde_json::Value;
 
@@ -41,7 +41,7 @@ fn compare<const N: usize>(case: &Value) {
         .map(|t| t - std::mem::replace(&mut before, t))
         .collect();
     let law = Law::Constant(array(&case["tau"]));
-    let reference = Reference::between(&arm, &start, &law, &intervals);
+    let reference = ReferenceMotion::between(&arm, &start, &law, &intervals);
     for index in 0..reference.len() {
         let state = reference.state(index).unwrap();
         let growth = case["growth_max"][index].as_f64().unwrap();
@@ -109,14 +109,14 @@ fn start() -> State<2> {
 fn a_held_effort_approaches_the_continuous_law_at_first_order() {
     let arm = Arm::<2>::default();
     let continuous = Law::Continuous(GAINS, SETPOINT);
-    let exact = Reference::of(&arm, &start(), &continuous, 0.125, 4);
+    let exact = ReferenceMotion::of(&arm, &start(), &continuous, 0.125, 4);
     let distance = |period: f64| {
         let law = Law::Held {
             gains: GAINS,
             setpoint: SETPOINT,
             period,
         };
-        let held = Reference::of(&arm, &start(), &law, 0.125, 4);
+        let held = ReferenceMotion::of(&arm, &start(), &law, 0.125, 4);
         let state = held.state(3).unwrap();
         exact.angle_error(3, &state.position).unwrap()
     };
@@ -158,7 +158,7 @@ fn exact_steps_are_the_steps_of_the_live_arm_without_rounding() {
 #[test]
 fn a_reference_knows_far_more_digits_than_a_double() {
     let arm = Arm::<3>::default();
-    let reference = Reference::of(&arm, &State::rest(), &Law::FREE, 0.5, 4);
+    let reference = ReferenceMotion::of(&arm, &State::rest(), &Law::FREE, 0.5, 4);
     assert!(reference.uncertainty().iter().all(|own| *own < 1e-26));
     assert!(reference.angle_error(0, &[f64::NAN; 3]).unwrap().is_nan());
     assert_eq!(DoubleDouble::from(1.5).to_f64(), 1.5);

@@ -12,6 +12,33 @@ use serde_json::json;
 pub const SET_GRAVITY: &str =
     "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
 
+/// The variables of the environment that the program reads.
+pub const VARIABLES: [&str; 11] = [
+    "ARM_SIM_LINKS",
+    "ARM_SIM_BIND",
+    "ARM_SIM_SEED",
+    "ARM_SIM_LOG",
+    "ARM_SIM_TOKEN",
+    "ARM_SIM_RECORD",
+    "ARM_SIM_RECORD_DIR",
+    "ARM_SIM_ALLOW_HOST",
+    "ARM_SIM_ALLOW_ORIGIN",
+    "ARM_SIM_STRICT_ORIGIN",
+    "ARM_SIM_REPORT",
+];
+
+/// The program, with nothing of the tester's environment that could change what it does.
+pub fn program() -> Command {
+    without_variables(Command::new(env!("CARGO_BIN_EXE_pendularm")))
+}
+
+fn without_variables(mut command: Command) -> Command {
+    for variable in VARIABLES {
+        command.env_remove(variable);
+    }
+    command
+}
+
 /// The program, running; ended with the value.
 pub struct Runtime {
     child: Child,
@@ -36,8 +63,7 @@ impl Runtime {
 
     /// The same at another address.
     pub fn with_bind(bind: &str, arguments: &[&str]) -> Self {
-        let program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
-        Self::spawn(program, bind, arguments)
+        Self::spawn(program(), bind, arguments)
     }
 
     /// The same, started by a shell that has done `prelude` before: sets limits, say.
@@ -45,23 +71,10 @@ impl Runtime {
         let mut shell = Command::new("sh");
         let script = format!("{prelude} && exec \"$0\" \"$@\"");
         shell.args(["-c", &script, env!("CARGO_BIN_EXE_pendularm")]);
-        Self::spawn(shell, "127.0.0.1:0", &[])
+        Self::spawn(without_variables(shell), "127.0.0.1:0", &[])
     }
 
     fn spawn(mut command: Command, bind: &str, arguments: &[&str]) -> Self {
-        for variable in [
-            "ARM_SIM_LINKS",
-            "ARM_SIM_BIND",
-            "ARM_SIM_SEED",
-            "ARM_SIM_LOG",
-            "ARM_SIM_TOKEN",
-            "ARM_SIM_ALLOW_HOST",
-            "ARM_SIM_ALLOW_ORIGIN",
-            "ARM_SIM_STRICT_ORIGIN",
-            "ARM_SIM_REPORT",
-        ] {
-            command.env_remove(variable);
-        }
         let mut child = command
             .args(["--bind", bind])
             .args(arguments)
@@ -84,6 +97,14 @@ impl Runtime {
 
     pub fn connect(&self) -> Client {
         Client::to(self.address)
+    }
+
+    /// The most memory that the program has had resident, in bytes.
+    pub fn peak_memory(&self) -> usize {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.pid())).unwrap();
+        let line = status.lines().find(|line| line.starts_with("VmHWM"));
+        let kilobytes = line.and_then(|line| line.split_whitespace().nth(1));
+        kilobytes.unwrap().parse::<usize>().unwrap() * 1024
     }
 
     pub fn pid(&self) -> u32 {

@@ -18,9 +18,9 @@ use pendularm::actors::arm::sim::{
     Tracking,
 };
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::Publish;
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;

@@ -11,11 +11,11 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use actix::prelude::*;
-use pendularm::actors::gateway::budget::Memory;
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::gauges::Gauges;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::Interest;
+use pendularm::actors::resources::budget::Memory;
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm_client::pipe::Client;

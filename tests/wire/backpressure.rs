@@ -16,17 +16,6 @@ const MIB: usize = 1024 * 1024;
 /// What the program needs by itself, and what an allocator and a test build add.
 const BASE: usize = 40 * MIB;
 
-/// The most memory that the program has had resident, in bytes.
-fn peak_memory(runtime: &Runtime) -> usize {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", runtime.pid())).unwrap();
-    let line = status
-        .lines()
-        .find(|line| line.starts_with("VmHWM"))
-        .unwrap();
-    let kilobytes: usize = line.split_whitespace().nth(1).unwrap().parse().unwrap();
-    kilobytes * 1024
-}
-
 fn diagnostic(client: &mut Client, key: &str) -> u64 {
     let message = client.message("/diagnostics");
     let statuses = message["status"].as_array().unwrap();
@@ -57,7 +46,7 @@ fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted()
             "in lockstep, so nothing is lost"
         );
     }
-    let peak = peak_memory(&runtime);
+    let peak = runtime.peak_memory();
     assert!(peak < BASE, "{peak} bytes for an outbox of 4 MiB");
     client.subscribe("/diagnostics");
     let dropped = diagnostic(&mut client, "messages_dropped");
@@ -114,7 +103,7 @@ fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
         before < CALLS,
         "everything was read although nothing was taken"
     );
-    let peak = peak_memory(&runtime);
+    let peak = runtime.peak_memory();
     assert!(
         peak < BASE + 50 * MIB,
         "{peak} bytes for 32 MiB of responses and a frame"
@@ -155,7 +144,7 @@ fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() 
         );
     }
     assert!(busy > 50, "{busy} of 200 refused");
-    let peak = peak_memory(&runtime);
+    let peak = runtime.peak_memory();
     assert!(
         peak < BASE + MAX_BACKLOG + 16 * MIB,
         "{peak} bytes for 64 MiB that may wait"
@@ -215,7 +204,7 @@ fn a_flood_of_garbage_is_answered_line_by_line_in_bounded_memory() {
         assert_eq!(status["level"], "error");
     }
     sending.join().unwrap();
-    assert!(peak_memory(&runtime) < BASE + 32 * MIB);
+    assert!(runtime.peak_memory() < BASE + 32 * MIB);
 }
 
 #[test]
@@ -234,7 +223,7 @@ fn ids_of_four_mebibytes_are_echoed_again_and_again() {
             assert_eq!(client.receive()["id"], id.as_str());
         }
     }
-    assert!(peak_memory(&runtime) < BASE + 32 * MIB);
+    assert!(runtime.peak_memory() < BASE + 32 * MIB);
 }
 
 /// A message of a few bytes must not cost a subscriber that never reads many times its size.
@@ -251,6 +240,6 @@ fn an_outbox_full_of_the_smallest_messages_is_bounded_too() {
         client.send_bytes(frames.as_bytes());
         client.settle();
     }
-    let peak = peak_memory(&runtime);
+    let peak = runtime.peak_memory();
     assert!(peak < BASE, "{peak} bytes");
 }

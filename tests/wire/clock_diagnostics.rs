@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use crate::arm::{stamp, time};
 use crate::common::{Client, Runtime};
-use pendularm::actors::gateway::budget::MODEST;
+use pendularm::actors::resources::budget::MODEST;
 use serde_json::{Value, json};
 
 /// The contract's, then ours.
@@ -194,6 +194,7 @@ fn the_energy_drift_counts_from_reset_parameters_and_switch() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.subscribe("/diagnostics");
+    client.subscribe("/clock");
     client.ask("/arm_sim/reset", json!({}));
     let free = arm_status(&mut client);
     assert!(number(&free, "energy").abs() < 1e-6, "{free}");
@@ -239,7 +240,7 @@ fn the_energy_drift_counts_from_reset_parameters_and_switch() {
         ("/arm_sim/reset", json!({})),
     ] {
         client.ask("/arm_sim/pause", json!({"data": false}));
-        std::thread::sleep(Duration::from_millis(300));
+        swing(&mut client, 0.3);
         client.ask("/arm_sim/pause", json!({"data": true}));
         client.ask(service, args);
         client.kept.clear();
@@ -249,6 +250,14 @@ fn the_energy_drift_counts_from_reset_parameters_and_switch() {
             "{service}"
         );
     }
+}
+
+/// Waits until the arm's own clock has gone on by so much \[s\].
+fn swing(client: &mut Client, passing: f64) {
+    let now = |client: &mut Client| time(&client.message("/clock")["clock"]);
+    client.kept.clear();
+    let began = now(client);
+    while now(client) < began + passing {}
 }
 
 /// No machine takes a step in a picosecond: the arm lags, says so, and goes on answering.

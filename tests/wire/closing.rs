@@ -71,12 +71,16 @@ fn a_half_closed_client_gets_the_answer_of_a_provider() {
     let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
     provider.send(&json!({"op": "advertise_service", "service": "/s"}));
     provider.status();
+    caller.send(&json!({"op": "advertise_service", "service": "/mine"}));
+    caller.status();
     for id in [1, 2] {
         caller.send(&json!({"op": "call_service", "service": "/s", "id": id}));
     }
     half_close(&caller);
     let calls = [provider.receive(), provider.receive()];
-    std::thread::sleep(Duration::from_millis(200));
+    // The end of the stream has been seen once what the caller provides is withdrawn.
+    let is_listed = |services: &Value| services["services"].to_string().contains("/mine");
+    while is_listed(&provider.ask("/rosapi/services", json!({}))) {}
     for call in calls {
         provider.send(
             &json!({"op": "service_response", "service": "/s", "id": call["id"],

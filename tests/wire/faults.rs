@@ -6,6 +6,7 @@ use std::io::Write;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::arm::ticks;
 use crate::common::{Client, PATIENCE, Runtime};
 use serde_json::json;
 
@@ -86,7 +87,8 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
         }
         frames
     });
-    std::thread::sleep(Duration::from_millis(200));
+    // Everything is under way: the arm has made twelve ticks beside it.
+    ticks(&mut watchers[0], 12);
     let pid = runtime.pid().to_string();
     let sent = Command::new("kill").args(["-TERM", &pid]).status();
     assert!(sent.expect("kill runs").success());

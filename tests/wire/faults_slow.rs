@@ -6,22 +6,11 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
-use pendularm::actors::gateway::budget::MAX_MEMORY;
+use pendularm::actors::resources::budget::MAX_MEMORY;
 use serde_json::{Value, json};
 
 const MIB: usize = 1024 * 1024;
 const STEP: &str = "/arm_sim/integration_step";
-
-/// The most memory that the program has had resident, in bytes.
-fn peak_memory(runtime: &Runtime) -> usize {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", runtime.pid())).unwrap();
-    let line = status
-        .lines()
-        .find(|line| line.starts_with("VmHWM"))
-        .unwrap();
-    let kilobytes: usize = line.split_whitespace().nth(1).unwrap().parse().unwrap();
-    kilobytes * 1024
-}
 
 /// Fifty clients ask for 60 MB each and read nothing. Those whose answers fit get them, whole, as soon as they read; the others are told at once.
 #[test]
@@ -73,7 +62,7 @@ fn fifty_deaf_clients_that_ask_for_a_million_steps_cost_bounded_memory() {
         }
         answers.extend(reading.into_iter().map(|thread| thread.join().unwrap()));
     });
-    let peak = peak_memory(&runtime);
+    let peak = runtime.peak_memory();
     println!("peak {} MiB", peak / MIB);
     let mut whole = 0;
     for (n, (id, result, length, status)) in answers.iter().enumerate() {

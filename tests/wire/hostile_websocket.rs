@@ -94,27 +94,18 @@ fn pings_without_end_are_answered_as_far_as_they_are_read() {
     let mut socket = Socket::open(runtime.address);
     let mut ping = vec![0x89, 0x80 | 125, 0, 0, 0, 0];
     ping.extend_from_slice(&[b'x'; 125]);
-    let before = peak_memory(&runtime);
+    let before = runtime.peak_memory();
     // More than any two sockets hold.
     for _ in 0..400 {
         socket.send_bytes(&ping.repeat(1000));
     }
-    let grown = peak_memory(&runtime) - before;
+    let grown = runtime.peak_memory() - before;
     assert!(
         grown < 8_000_000,
         "{grown} bytes for pongs that are not read"
     );
     let response = socket.call("/arm_sim/set_params", json!({}));
     assert_eq!(response["result"], true);
-}
-
-/// The most memory that the program has had resident, in bytes.
-fn peak_memory(runtime: &Runtime) -> usize {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", runtime.pid())).unwrap();
-    let line = status.lines().find(|line| line.starts_with("VmHWM"));
-    let line = line.unwrap();
-    let kilobytes: usize = line.split_whitespace().nth(1).unwrap().parse().unwrap();
-    kilobytes * 1024
 }
 
 /// A body behind a handshake is not a way past the check of the origin, nor are two requests in one.

@@ -4,6 +4,9 @@ use std::time::Duration;
 
 use crate::arm::{numbers, stamp, state};
 use crate::common::{Client, Runtime};
+use pendularm::math::expression::Expression;
+use pendularm::math::integrator::Method;
+use pendularm::math::particle::Particle;
 use serde_json::{Value, json};
 
 const SERVICE: &str = "/arm_sim/integration_step";
@@ -116,6 +119,21 @@ fn the_answer_starts_at_the_start_and_has_one_entry_more_than_steps() {
     assert_eq!(numbers(&values["positions"]).len(), 31);
     assert_eq!(numbers(&values["velocities"]), vec![-2.0; 31]);
     assert_eq!(values["positions"][0], 0.25);
+}
+
+#[test]
+fn what_is_printed_reads_back_as_the_same_bits() {
+    let runtime = Runtime::start();
+    let args = json!({"function": "sin(5*t)*exp(-t)", "x0": 1, "xdot0": -1, "dt": 0.001, "steps": 5000,
+        "integrator": "rk4"});
+    let values = runtime.connect().ask(SERVICE, args);
+    let function = Expression::parse("sin(5*t)*exp(-t)").unwrap();
+    let mut particle = Particle::new(function, 1.0, -1.0, 0.001, 5000, Method::Rk4).unwrap();
+    particle.advance(5000);
+    let times: Vec<f64> = particle.times().collect();
+    let expected = json!({"times": times, "positions": particle.positions(),
+        "velocities": particle.velocities()});
+    assert_eq!(values, expected);
 }
 
 #[test]

@@ -5,27 +5,12 @@ use std::net::TcpListener;
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{Client, Runtime};
+use crate::common::{self, Client, Runtime};
 use serde_json::{Value, json};
-
-const VARIABLES: [&str; 9] = [
-    "ARM_SIM_LINKS",
-    "ARM_SIM_BIND",
-    "ARM_SIM_SEED",
-    "ARM_SIM_LOG",
-    "ARM_SIM_TOKEN",
-    "ARM_SIM_ALLOW_HOST",
-    "ARM_SIM_ALLOW_ORIGIN",
-    "ARM_SIM_STRICT_ORIGIN",
-    "ARM_SIM_REPORT",
-];
 
 /// The program with these arguments and variables, and no other variable of its own.
 fn program(arguments: &[&str], variables: &[(&str, &str)]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pendularm"));
-    for variable in VARIABLES {
-        command.env_remove(variable);
-    }
+    let mut command = common::program();
     command.args(arguments).envs(variables.iter().copied());
     command
         .stdin(Stdio::null())

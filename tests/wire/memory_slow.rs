@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
-use pendularm::actors::gateway::budget::MAX_MEMORY;
+use pendularm::actors::resources::budget::MAX_MEMORY;
 use serde_json::json;
 
 const MB: usize = 1_000_000;
@@ -69,20 +69,6 @@ fn line(frame: &serde_json::Value) -> String {
     format!("{frame}\n")
 }
 
-/// The most memory that the program has had resident, in bytes.
-fn peak_memory(runtime: &Runtime) -> usize {
-    let status = std::fs::read_to_string(format!("/proc/{}/status", runtime.pid())).unwrap();
-    let line = status.lines().find(|line| line.starts_with("VmHWM"));
-    let kilobytes: usize = line
-        .unwrap()
-        .split_whitespace()
-        .nth(1)
-        .unwrap()
-        .parse()
-        .unwrap();
-    kilobytes * 1024
-}
-
 /// Calls every 10 ms until told to stop; gives the longest wait for an answer.
 fn be_honest(mut client: Client, stop: &AtomicBool) -> Duration {
     let mut longest = Duration::ZERO;
@@ -103,7 +89,7 @@ fn attack(name: &str, attackers: Vec<Attacker>) -> usize {
 fn attack_on(runtime: &Runtime, name: &str, mut attackers: Vec<Attacker>) -> usize {
     let stop = AtomicBool::new(false);
     let honest = runtime.connect();
-    let before = peak_memory(runtime);
+    let before = runtime.peak_memory();
     std::thread::scope(|scope| {
         let honest = scope.spawn(|| be_honest(honest, &stop));
         let end = Instant::now() + TIME;
@@ -118,7 +104,7 @@ fn attack_on(runtime: &Runtime, name: &str, mut attackers: Vec<Attacker>) -> usi
         newcomer.message("/joint_states");
         stop.store(true, Ordering::Relaxed);
         let longest = honest.join().unwrap();
-        let peak = peak_memory(runtime);
+        let peak = runtime.peak_memory();
         let sent: usize = attackers.iter().map(|one| one.sent).sum();
         println!(
             "{name}: {} MB sent by those still connected, peak {} MB, longest call {} ms",

@@ -4,6 +4,7 @@
 
 use std::time::Duration;
 
+use crate::arm::ticks;
 use crate::common::Runtime;
 use serde_json::json;
 
@@ -100,7 +101,10 @@ fn after_a_response_no_older_state_follows_under_either_spelling() {
     let mut client = runtime.connect();
     client.send(&json!({"op": "subscribe", "topic": "joint_states", "throttle_rate": 300}));
     client.message("joint_states");
-    std::thread::sleep(Duration::from_millis(100));
+    // Some ticks later messages are held back: another client, which is not throttled, has seen them.
+    let mut other = runtime.connect();
+    other.subscribe("/joint_states");
+    ticks(&mut other, 6);
     client.ask("/arm_sim/reset", json!({}));
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.ask("/arm_sim/reset", json!({}));

@@ -5,6 +5,7 @@
 use std::ffi::OsString;
 use std::process::{Command, Output, Stdio};
 
+use crate::common;
 use pendularm::options::{DEFAULT_BIND, Links, Options, Parsed, UsageError};
 use proptest::prelude::*;
 use tracing::level_filters::LevelFilter;
@@ -58,6 +59,8 @@ fn an_empty_variable_counts_as_unset() {
         ("ARM_SIM_SEED", ""),
         ("ARM_SIM_LOG", ""),
         ("ARM_SIM_TOKEN", ""),
+        ("ARM_SIM_RECORD", ""),
+        ("ARM_SIM_RECORD_DIR", ""),
         ("ARM_SIM_ALLOW_HOST", ""),
         ("ARM_SIM_ALLOW_ORIGIN", ""),
         ("ARM_SIM_STRICT_ORIGIN", ""),
@@ -256,6 +259,10 @@ fn the_help_shows_every_option_with_its_variable_and_default() {
         ("--seed <N>", "ARM_SIM_SEED", "a new seed at every start"),
         ("--log <LEVEL>", "ARM_SIM_LOG", "info"),
         ("--token <TOKEN>", "ARM_SIM_TOKEN", "none"),
+        #[cfg(feature = "record")]
+        ("--record <FILE>", "ARM_SIM_RECORD", "none"),
+        #[cfg(feature = "record")]
+        ("--record-dir <FOLDER>", "ARM_SIM_RECORD_DIR", "none"),
         #[cfg(feature = "web")]
         ("--allow-host <HOSTS>", "ARM_SIM_ALLOW_HOST", "none"),
         #[cfg(feature = "web")]
@@ -408,22 +415,27 @@ proptest! {
     }
 }
 
-/// The program itself, with nothing of the tester's environment that could change what it does.
-fn program(arguments: &[&str]) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_pendularm"));
-    for variable in [
-        "ARM_SIM_LINKS",
-        "ARM_SIM_BIND",
-        "ARM_SIM_SEED",
-        "ARM_SIM_LOG",
-        "ARM_SIM_TOKEN",
-        "ARM_SIM_ALLOW_HOST",
-        "ARM_SIM_ALLOW_ORIGIN",
-        "ARM_SIM_STRICT_ORIGIN",
-        "ARM_SIM_REPORT",
-    ] {
-        command.env_remove(variable);
+#[cfg(feature = "record")]
+#[test]
+fn a_run_is_recorded_into_a_file_and_replayed_from_one() {
+    let given = options(
+        &["--record", "a/run.mcap"],
+        &[("ARM_SIM_RECORD_DIR", "runs")],
+    );
+    assert_eq!(given.record.file.unwrap().to_str(), Some("a/run.mcap"));
+    assert_eq!(given.record.folder.unwrap().to_str(), Some("runs"));
+    match parse(&["replay", "run.mcap"], &[("ARM_SIM_RECORD", "other")]) {
+        Ok(Parsed::Replay(replay)) => assert_eq!(replay.file.to_str(), Some("run.mcap")),
+        other => panic!("not to be replayed: {other:?}"),
     }
+    assert!(refusal(&["replay"], &[]).contains("--help"));
+    let stray = refusal(&["--links=2", "replay", "run.mcap"], &[]);
+    assert!(stray.contains("--links"), "{stray}");
+}
+
+/// The program itself with these arguments.
+fn program(arguments: &[&str]) -> Command {
+    let mut command = common::program();
     command.args(arguments).stdin(Stdio::null());
     command
 }

@@ -6,6 +6,7 @@ use std::io::Write;
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use crate::arm::ticks;
 use crate::common::{Client, PATIENCE, Runtime};
 use serde_json::{Value, json};
 
@@ -65,7 +66,8 @@ fn a_signal_ends_a_program_with_clients_that_watch_flood_or_never_read() {
         let frame = b"{\"op\":\"call_service\",\"service\":\"/arm_sim/pause\"}\n".repeat(100);
         while std::io::Write::write_all(&mut &flood, &frame).is_ok() {}
     });
-    std::thread::sleep(Duration::from_millis(100));
+    // The flood is under way: the arm has made some ticks beside it.
+    ticks(&mut watchers[0], 6);
     ends_on(&mut runtime, "TERM");
     flooding.join().unwrap();
     for client in &mut watchers {

@@ -18,7 +18,7 @@ pub mod websocket;
 
 use script::Client;
 
-/// What every client has to show where a token is asked for.
+/// The token that every client has to show where one is asked for.
 pub const TOKEN: &str = "a-token-that-nobody-guesses-0123456789";
 
 /// An attack.
@@ -26,11 +26,11 @@ pub const TOKEN: &str = "a-token-that-nobody-guesses-0123456789";
 pub struct Attack {
     /// Its name, for `--only`.
     pub name: &'static str,
-    /// What it does.
+    /// Its actions.
     pub what: &'static str,
     /// Its clients.
     pub cast: fn() -> Vec<Client>,
-    /// What the program is started with.
+    /// The arguments that the program is started with.
     pub options: &'static [&'static str],
     /// Open files that the program may have.
     pub files: Option<u64>,
@@ -79,7 +79,7 @@ impl Attack {
         }
     }
 
-    /// That takes all places.
+    /// An attack that takes all places.
     pub const fn fills(self) -> Self {
         Self {
             fills: true,
@@ -87,7 +87,7 @@ impl Attack {
         }
     }
 
-    /// That moves the arm or changes its settings.
+    /// An attack that moves the arm or changes its settings.
     pub const fn moves(self) -> Self {
         Self {
             moves: true,

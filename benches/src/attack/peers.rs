@@ -9,7 +9,7 @@ use crate::protocol::Protocol;
 pub struct Common {
     /// Its name, for `--only`.
     pub name: &'static str,
-    /// What it does.
+    /// Its actions.
     pub what: &'static str,
     /// Its clients.
     pub cast: fn(Protocol) -> Vec<Client>,

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use pendularm_client::websocket::{LAST, append, opcode};
 
-/// What a client opens its connection with.
+/// The first bytes of a client.
 #[derive(Clone, PartialEq, Eq)]
 pub enum Door {
     /// Nothing: lines, or whatever it says.

@@ -29,7 +29,7 @@ const RETURN: Duration = Duration::from_millis(10);
 /// Connections made in one sweep: a listener's queue holds some hundreds, and what overflows comes a second later.
 const CONNECTS: usize = 20;
 
-/// What was done, for whoever watches.
+/// The deeds so far, for whoever watches.
 #[derive(Default)]
 pub struct Deeds {
     pub connections: AtomicU64,
@@ -49,7 +49,7 @@ struct Player<'a> {
     /// Bytes that it may still send until the next drip.
     allowance: usize,
     replies: VecDeque<u8>,
-    /// What came that is not replied to.
+    /// Input that is not replied to.
     unread: Vec<u8>,
     writable: bool,
     readable: bool,

@@ -5,7 +5,7 @@ use super::script::{Client, light, web_frame};
 use pendularm_client::websocket::opcode::{CLOSE, CONTINUATION, PING, PONG, TEXT};
 
 const MIB: usize = 1024 * 1024;
-/// What a WebSocket is asked for behind its request line.
+/// The head of a WebSocket's request behind its first line.
 const UPGRADE: &[u8] =
     b"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n\
     Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n";

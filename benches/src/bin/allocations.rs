@@ -12,7 +12,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use actix::prelude::*;
 use bytes::Bytes;
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Registry;
 use pendularm::math::arm::Arm;

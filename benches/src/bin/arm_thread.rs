@@ -12,14 +12,14 @@ use std::time::Instant;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::gauges::Gauges;
+use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, DuplexStream};
 
-/// What one message may take, in microseconds.
+/// The longest time of one message, in microseconds.
 const BAR: f64 = 100.0;
 /// Bytes of a payload, about.
 const SIZE: usize = 4_000_000;

@@ -12,9 +12,10 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+
+use pendularm_benches::program::Program;
 
 /// Between two calls of the second client.
 const PACE: Duration = Duration::from_millis(2);
@@ -26,39 +27,11 @@ const HEAVY: &[u8] = b"{\"op\":\"call_service\",\"id\":\"heavy\",\"service\":\"/
     {\"function\":\"sin(3*t)*exp(-t/100)-0.1*sqrt(abs(t))\",\"x0\":0,\"xdot0\":1,\"dt\":0.0001,\"steps\":1000000,\
     \"integrator\":\"rk4\"}}\n";
 
-struct Runtime {
-    child: Child,
-    address: String,
-}
-
-impl Runtime {
-    fn start(program: &str) -> Self {
-        let mut child = Command::new(program)
-            .args(["--bind", "127.0.0.1:0", "--log", "off"])
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the runtime starts");
-        let mut line = String::new();
-        BufReader::new(child.stdout.take().expect("piped"))
-            .read_line(&mut line)
-            .expect("a line");
-        let address = line.trim().trim_start_matches("listening on ").to_owned();
-        Self { child, address }
-    }
-
-    fn connect(&self, first: &[u8]) -> TcpStream {
-        let mut stream = TcpStream::connect(&self.address).expect("the runtime accepts");
-        stream.set_nodelay(true).expect("nodelay");
-        stream.write_all(first).expect("sent");
-        stream
-    }
-}
-
-impl Drop for Runtime {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+fn connect(runtime: &Program, first: &[u8]) -> TcpStream {
+    let mut stream = TcpStream::connect(runtime.address).expect("the runtime accepts");
+    stream.set_nodelay(true).expect("nodelay");
+    stream.write_all(first).expect("sent");
+    stream
 }
 
 /// What there is beside the clients that watch.
@@ -147,7 +120,7 @@ fn show(what: &str, phases: &mut [Phase], samples: fn(&mut Phase) -> &mut Vec<f6
 }
 
 fn watch(program: &str, length: Duration, beside: Beside) -> Phase {
-    let runtime = Runtime::start(program);
+    let runtime = Program::start(program, &["--bind", "127.0.0.1:0", "--log", "off"]).expect("the runtime starts");
     let over = AtomicBool::new(false);
     let computed = AtomicU64::new(0);
     let mut phase = Phase::default();
@@ -162,17 +135,17 @@ fn watch(program: &str, length: Duration, beside: Beside) -> Phase {
                 });
             }
             Beside::Computation => {
-                let stream = runtime.connect(HEAVY);
+                let stream = connect(&runtime, HEAVY);
                 scope.spawn(|| compute(stream, &over, &computed));
             }
         }
         // Past the start, and in the midst of a computation.
         std::thread::sleep(Duration::from_secs(1));
-        let states = runtime.connect(b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n");
+        let states = connect(&runtime, b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n");
         let states = scope.spawn(|| joint_states(states, &over));
-        let health = runtime.connect(b"{\"op\":\"subscribe\",\"topic\":\"/diagnostics\"}\n");
+        let health = connect(&runtime, b"{\"op\":\"subscribe\",\"topic\":\"/diagnostics\"}\n");
         let health = scope.spawn(|| diagnostics(health, &over));
-        phase.calls = calls(runtime.connect(b""), length);
+        phase.calls = calls(connect(&runtime, b""), length);
         over.store(true, Ordering::Relaxed);
         (phase.states, phase.gaps) = states.join().expect("the watcher lives");
         (phase.step_time, phase.real_time) = health.join().expect("the watcher lives");

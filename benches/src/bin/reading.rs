@@ -16,7 +16,7 @@ use pendularm::protocol::op::{self, Op};
 use pendularm::protocol::wire::frame::{FrameReader, RawFrame};
 use pendularm::protocol::wire::{fragments, json};
 
-/// What is read at least, in MB/s.
+/// The least speed of reading, in MB/s.
 const BAR: f64 = 200.0;
 /// Bytes of an input.
 const SIZE: usize = 1024 * 1024;
@@ -105,7 +105,7 @@ fn framed(frame: &str) -> RawFrame {
 }
 
 struct Table {
-    /// What a row must have in its name.
+    /// A row must have this in its name.
     word: String,
     missed: usize,
 }
@@ -168,7 +168,7 @@ fn main() {
         ] {
             table.frame(&format!("{input}, {place}"), &frame);
         }
-        // What a node of ours reads of long arguments: a field, and one that it does not have.
+        // A node of ours reads a field of long arguments, and one that they do not have.
         for name in ["lengths", "other"] {
             let frame = format!(
                 "{{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{{\"{name}\":{value}}}}}"

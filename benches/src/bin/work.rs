@@ -3,43 +3,31 @@
 //! `cargo run --release --bin work -- VARIANT COUNT`
 //!
 //! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. `step-LINKS-METHOD-WHAT` is a step of
-//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges.
+//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges. WHAT is
+//! `free`, `pid`, `pd` (no integral), `pi` (no damping) or `pushed` (`pid` under a disturbance of zeros), with `weightless` before it.
 
 use std::hint::black_box;
 
-use pendularm::math::arm::{Arm, State};
 use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
-use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::math::simulation::Simulation;
+use pendularm::math::pid::Gains;
+use pendularm::report::experiments::step_scene::{ready, undamped};
 
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
     Gains<N>: Default,
 {
-    let gravity = if what.contains("weightless") {
-        0.0
-    } else {
-        9.81
-    };
-    let arm = Arm::<N>::new([1.0; N], [1.0; N], gravity).expect("an arm");
-    let mut gains = Gains::<N>::default();
-    if what.contains("pd") {
-        gains.ki = [0.0; N];
+    let has = |word: &str| what.split('-').any(|part| part == word);
+    let gravity = if has("weightless") { 0.0 } else { 9.81 };
+    let control = ["pd", "pi", "pid", "pushed"].iter().any(|law| has(law));
+    let mut simulation = ready::<N>(gravity, !has("pd"), control, method);
+    if has("pi") {
+        simulation.set_gains(undamped());
     }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    // Angles stay small enough for one path through sine and cosine.
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(what.contains("pd") || what.contains("pid"));
+    if has("pushed") {
+        simulation.disturb([0.0; N], 1e9);
+    }
     assert_eq!(simulation.advance(count), count);
     black_box(simulation.state());
 }

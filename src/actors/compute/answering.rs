@@ -4,10 +4,10 @@
 
 use std::time::Instant;
 
-use super::work_clock;
 use super::workers::{Computation, Progress, WorkerPool};
-use crate::actors::gateway::budget::NoRoom;
 use crate::actors::node::{Pieces, Reply, Unserved};
+use crate::actors::resources::budget::NoRoom;
+use crate::actors::resources::work_clock;
 
 /// The longest number and the comma behind it, and the number itself while the answer is computed.
 pub(super) const NUMBER_BYTES: usize = 25 + 8;
@@ -28,16 +28,16 @@ pub(super) fn answer<T: Send + 'static>(
     work: impl Work<T> + 'static,
 ) {
     let of = reply.client();
-    let stage = Stage::Asked(Box::new(work));
+    let stage = AnsweringStage::Asked(Box::new(work));
     workers.submit(of, Box::new(Answering { reply, stage }));
 }
 
 struct Answering<T> {
     reply: Reply<T>,
-    stage: Stage<T>,
+    stage: AnsweringStage<T>,
 }
 
-enum Stage<T> {
+enum AnsweringStage<T> {
     /// Room for the answer is yet to be taken.
     Asked(Box<dyn Work<T>>),
     Working(Box<dyn Work<T>>),
@@ -48,53 +48,53 @@ enum Stage<T> {
 impl<T: Send> Answering<T> {
     fn caller_is_gone(&self) -> bool {
         match &self.stage {
-            Stage::Writing(pieces) => pieces.is_gone(),
+            AnsweringStage::Writing(pieces) => pieces.is_gone(),
             _ => self.reply.caller_is_gone(),
         }
     }
 
     fn end(&mut self, why: Unserved) {
-        match std::mem::replace(&mut self.stage, Stage::Answered) {
-            Stage::Asked(_) | Stage::Working(_) => self.reply.refuse(why),
-            Stage::Writing(mut pieces) => pieces.refuse(why),
+        match std::mem::replace(&mut self.stage, AnsweringStage::Answered) {
+            AnsweringStage::Asked(_) | AnsweringStage::Working(_) => self.reply.refuse(why),
+            AnsweringStage::Writing(mut pieces) => pieces.refuse(why),
             // The pool may end between the answer and the last look at the clock.
-            Stage::Answered => {}
+            AnsweringStage::Answered => {}
         }
     }
 }
 
 impl<T: Send> Computation for Answering<T> {
     fn advance(&mut self, deadline: Instant) -> Progress {
-        while !matches!(self.stage, Stage::Answered) {
+        while !matches!(self.stage, AnsweringStage::Answered) {
             if self.caller_is_gone() {
                 self.end(Unserved::CallerGone);
             }
-            self.stage = match std::mem::replace(&mut self.stage, Stage::Answered) {
-                Stage::Asked(work) => match self.reply.reserve(work.most_bytes()) {
-                    Ok(()) => Stage::Working(work),
+            self.stage = match std::mem::replace(&mut self.stage, AnsweringStage::Answered) {
+                AnsweringStage::Asked(work) => match self.reply.reserve(work.most_bytes()) {
+                    Ok(()) => AnsweringStage::Working(work),
                     Err(NoRoom::Yet) => {
-                        self.stage = Stage::Asked(work);
+                        self.stage = AnsweringStage::Asked(work);
                         return Progress::Waiting;
                     }
                     Err(why) => {
                         self.reply.refuse(why.into());
-                        Stage::Answered
+                        AnsweringStage::Answered
                     }
                 },
-                Stage::Working(mut work) => match work.advance() {
-                    None => Stage::Working(work),
-                    Some(answer) => Stage::Writing(self.reply.answer_in_pieces(answer)),
+                AnsweringStage::Working(mut work) => match work.advance() {
+                    None => AnsweringStage::Working(work),
+                    Some(answer) => AnsweringStage::Writing(self.reply.answer_in_pieces(answer)),
                 },
-                Stage::Writing(mut pieces) => {
+                AnsweringStage::Writing(mut pieces) => {
                     if pieces.advance() {
-                        Stage::Answered
+                        AnsweringStage::Answered
                     } else {
-                        Stage::Writing(pieces)
+                        AnsweringStage::Writing(pieces)
                     }
                 }
-                Stage::Answered => Stage::Answered,
+                AnsweringStage::Answered => AnsweringStage::Answered,
             };
-            if work_clock::now() >= deadline && !matches!(self.stage, Stage::Answered) {
+            if work_clock::now() >= deadline && !matches!(self.stage, AnsweringStage::Answered) {
                 return Progress::Unfinished;
             }
         }

@@ -5,5 +5,4 @@
 mod answering;
 pub mod integration;
 pub mod study;
-pub mod work_clock;
 pub mod workers;

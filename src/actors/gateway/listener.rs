@@ -14,8 +14,8 @@ use tokio::net::{TcpListener, TcpStream};
 use super::connection::Connection;
 use super::connection::gate::Gate;
 use super::ends::Ends;
-use super::gauges::Gauges;
 use super::registry::Registry;
+use crate::actors::resources::gauges::Gauges;
 
 /// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
 const BACKOFF: Duration = Duration::from_millis(50);

@@ -4,18 +4,19 @@
 //! order sent.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::{Notify, oneshot};
 
-use super::budget::Account;
 use super::encoded::Encoded;
 use crate::actors::ConnectionId;
 pub use crate::actors::node::{Feedback, Publish, Respond};
-use crate::protocol::catalog::Service;
+use crate::actors::resources::budget::Account;
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Op;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::payload::Payload;
@@ -36,6 +37,8 @@ pub struct Outlets {
     pub configure: Recipient<Configure>,
     /// The end.
     pub finish: Recipient<Finish>,
+    /// Set while the client is told why a call failed in `values` too.
+    pub wants_text: Arc<AtomicBool>,
     /// Set when the client is gone: heavy computations for it stop.
     pub gone: Arc<AtomicBool>,
     /// Bytes of responses that wait to be written; kept by the connection.
@@ -44,6 +47,23 @@ pub struct Outlets {
     pub account: Arc<Account>,
     /// Notified when the client loses its place to one that comes.
     pub displaced: Arc<Notify>,
+}
+
+impl Outlets {
+    /// How the client is told why a call failed.
+    #[must_use]
+    pub fn error_form(&self) -> ErrorForm {
+        form_of(&self.wants_text)
+    }
+}
+
+/// The form of errors that a connection's flag stands for.
+pub(super) fn form_of(wants_text: &AtomicBool) -> ErrorForm {
+    if wants_text.load(Ordering::Relaxed) {
+        ErrorForm::Text
+    } else {
+        ErrorForm::Object
+    }
 }
 
 /// Why a client was not taken.
@@ -138,6 +158,43 @@ impl Handled {
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Census")]
 pub struct TakeCensus;
+
+/// Something that passes the registry, for whoever overhears it.
+pub enum Overheard<'a> {
+    /// A message of the runtime, as the whole `publish` frame.
+    Published(Topic, &'a Bytes),
+    /// A client's message on a topic that the runtime listens to.
+    Heard(Topic, &'a Payload),
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client.
+        from: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, if there is one.
+        id: Option<&'a Payload>,
+        /// The arguments.
+        args: &'a Payload,
+    },
+    /// The answer to such a call, as the whole frame.
+    Answered {
+        /// The client.
+        to: ConnectionId,
+        /// The service.
+        service: Service,
+        /// The frame.
+        frame: &'a Bytes,
+    },
+}
+
+/// Overhears what passes, on the registry's thread, and may not wait.
+pub type Eavesdropper = Box<dyn FnMut(Overheard<'_>) + Send>;
+
+/// From now on this one overhears what passes, or nobody does; every topic of the runtime counts as subscribed to
+/// meanwhile. From the recorder.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Overhear(pub Option<Eavesdropper>);
 
 /// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
 #[derive(Message)]

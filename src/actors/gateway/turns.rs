@@ -82,7 +82,7 @@ impl Line {
     /// Has the task work through the line, and make free again what has been taken.
     fn work(self: Rc<Self>) {
         if !self.at_work.replace(true) {
-            actix_rt::spawn(Work(self).run());
+            actix_rt::spawn(LineTask(self).run());
         }
     }
 
@@ -96,9 +96,9 @@ impl Line {
 }
 
 /// The task; where it ends before its time, with the runtime that it ran in, nobody waits in vain.
-struct Work(Rc<Line>);
+struct LineTask(Rc<Line>);
 
-impl Drop for Work {
+impl Drop for LineTask {
     fn drop(&mut self) {
         self.0.at_work.set(false);
         self.0.left.set(self.0.free);
@@ -106,7 +106,7 @@ impl Drop for Work {
     }
 }
 
-impl Work {
+impl LineTask {
     async fn run(self) {
         let line = &self.0;
         loop {

@@ -24,7 +24,7 @@ pub enum Bound {
 }
 
 impl Bound {
-    pub(super) fn holds(self, value: f64) -> bool {
+    pub(in crate::protocol::op) fn holds(self, value: f64) -> bool {
         match self {
             Self::Finite => true,
             Self::Positive => value > 0.0,
@@ -46,7 +46,7 @@ impl fmt::Display for Bound {
 /// A field that was not taken, and why. Reads as a sentence: `masses[1] must be greater than 0, got -2`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{field} {reason}")]
-pub struct Rejection {
+pub struct RejectedField {
     /// The field, with the index of the entry where one entry is at fault.
     pub field: String,
     /// The fault.
@@ -94,10 +94,10 @@ pub enum Reason {
         /// How many it has.
         got: usize,
     },
-    /// A positional array with more entries than the service has fields.
+    /// An array with more entries than it may have: a positional one has one for each field of the service.
     #[error("must have at most {limit} entries, got {got}")]
     TooMany {
-        /// Fields of the service.
+        /// Entries that it may have.
         limit: usize,
         /// Entries of the array.
         got: usize,
@@ -109,10 +109,10 @@ pub enum Reason {
 
 /// The fields of a request that were not taken, in the order in which they were read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Rejections(Vec<Rejection>);
+pub struct Rejections(Vec<RejectedField>);
 
-impl From<Rejection> for Rejections {
-    fn from(rejection: Rejection) -> Self {
+impl From<RejectedField> for Rejections {
+    fn from(rejection: RejectedField) -> Self {
         Self(vec![rejection])
     }
 }
@@ -126,23 +126,23 @@ impl Rejections {
 
     /// The rejections, one by one.
     #[must_use]
-    pub fn as_slice(&self) -> &[Rejection] {
+    pub fn as_slice(&self) -> &[RejectedField] {
         &self.0
     }
 
     /// All of them in one line; empty if there are none: the `status` of the response.
     #[must_use]
     pub fn status(&self) -> String {
-        let sentences: Vec<String> = self.0.iter().map(Rejection::to_string).collect();
+        let sentences: Vec<String> = self.0.iter().map(RejectedField::to_string).collect();
         text::shortened(&sentences.join("; "), MAX_STATUS)
     }
 
     /// Rejects a field for a reason that the layer which was to use it gives; reads on from the field's name.
     pub fn refuse(&mut self, field: &str, reason: &impl fmt::Display) {
-        self.push(Rejection::refused(field, reason));
+        self.push(RejectedField::refused(field, reason));
     }
 
-    pub(super) fn push(&mut self, rejection: Rejection) {
+    pub(super) fn push(&mut self, rejection: RejectedField) {
         self.0.push(rejection);
     }
 
@@ -158,7 +158,7 @@ impl fmt::Display for Rejections {
     }
 }
 
-impl Rejection {
+impl RejectedField {
     /// A field that the layer which was to use it does not take; `reason` reads on from the field's name.
     #[must_use]
     pub fn refused(field: &str, reason: &impl fmt::Display) -> Self {

@@ -18,7 +18,7 @@ const SLACK: usize = 32;
 /// The throttles of one connection and what they hold back.
 #[derive(Debug, Default)]
 pub(super) struct Throttles {
-    topics: HashMap<Arc<str>, Throttle>,
+    topics: HashMap<Arc<str>, TopicThrottle>,
     /// When the next message of a topic is due. Entries that no longer hold are skipped when they come up.
     releases: BinaryHeap<Reverse<(Instant, Arc<str>)>>,
     /// The messages that are held back, by age. Entries that no longer hold are skipped when they come up.
@@ -31,7 +31,7 @@ pub(super) struct Throttles {
 
 /// The throttle of one topic.
 #[derive(Debug)]
-struct Throttle {
+struct TopicThrottle {
     /// Least time between deliveries.
     interval: Duration,
     /// How many messages may be held back, 1 or more.
@@ -42,7 +42,7 @@ struct Throttle {
     held: VecDeque<(u64, Bytes)>,
 }
 
-impl Throttle {
+impl TopicThrottle {
     /// When the next message may go; `None`: at once.
     fn next(&self) -> Option<Instant> {
         self.last.and_then(|last| last.checked_add(self.interval))
@@ -95,7 +95,7 @@ impl Throttles {
         let throttle = self
             .topics
             .entry(Arc::clone(topic))
-            .or_insert_with(|| Throttle {
+            .or_insert_with(|| TopicThrottle {
                 interval,
                 queue_length,
                 last: None,
@@ -243,7 +243,7 @@ impl Throttles {
             .topics
             .get(topic)
             .filter(|throttle| !throttle.held.is_empty());
-        if let Some(next) = throttle.and_then(Throttle::next) {
+        if let Some(next) = throttle.and_then(TopicThrottle::next) {
             self.releases.push(Reverse((next, Arc::clone(topic))));
         }
     }

@@ -4,6 +4,9 @@
 
 pub mod cbor;
 pub mod cdr;
+pub mod cdr_reader;
 pub mod parameters;
 pub mod rosapi;
+pub mod srdf;
+pub mod stamps;
 pub mod urdf;

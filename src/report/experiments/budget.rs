@@ -1,14 +1,15 @@
 //! Where an error comes from: truncation, rounding, and the effort held for a step.
 //!
-//! With `live` the live arm's steps in doubles, `exact` the same steps with 106 bits, `plant` the true motion under the effort
-//! that these steps hold, and `law` the true motion under the law at every instant:
+//! With `live` the live arm's steps in doubles, `exact` the same steps with 106 bits, `plant` the true motion under the
+//! effort that these steps hold, and `law` the true motion under the law at every instant:
 //!
 //! `live - law = (live - exact) + (exact - plant) + (plant - law)`: rounding, truncation, control hold.
 //!
-//! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the others.
+//! **Invariant:** the three parts are differences of motions that are each computed; none is what remains of the
+//! others.
 
 use super::error::{OUTPUTS, REACH_GAINS, REACH_SETPOINT, SAMPLES};
-use super::reference::{DoubleDouble, Law, Reference, exact_steps, largest_difference};
+use super::reference::{DoubleDouble, Law, ReferenceMotion, exact_steps, largest_difference};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -36,7 +37,7 @@ pub struct Budget {
     start: State<2>,
     duration: f64,
     control: bool,
-    law: Reference<2>,
+    law: ReferenceMotion<2>,
 }
 
 impl Budget {
@@ -49,7 +50,7 @@ impl Budget {
             Law::FREE
         };
         let (arm, start) = (Arm::default(), State::rest());
-        let law = Reference::of(&arm, &start, &law, duration / in_f64(OUTPUTS), SAMPLES);
+        let law = ReferenceMotion::of(&arm, &start, &law, duration / in_f64(OUTPUTS), SAMPLES);
         Self {
             arm,
             start,
@@ -71,7 +72,7 @@ impl Budget {
         };
         let plant = self.control.then(|| {
             let spacing = self.duration / in_f64(OUTPUTS);
-            Reference::of(&self.arm, &self.start, &held, spacing, SAMPLES)
+            ReferenceMotion::of(&self.arm, &self.start, &held, spacing, SAMPLES)
         });
         let law = if self.control { held } else { Law::FREE };
         let plant = plant.as_ref().unwrap_or(&self.law).samples();

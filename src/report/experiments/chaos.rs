@@ -1,13 +1,13 @@
 //! How long a chaotic swing can be followed: separation from the reference, horizon, Lyapunov rate, energy drift.
 //!
 //! A free swing of two or more links multiplies every error by `e` about once per Lyapunov time, whatever the method. A
-//! smaller error at the start of that growth buys time only in proportion to its logarithm, so every method has a horizon past
-//! which its swing and the true one have nothing in common but their energy.
+//! smaller error at the start of that growth buys time only in proportion to its logarithm, so every method has a
+//! horizon past which its swing and the true one have nothing in common but their energy.
 //!
 //! **Invariant:** every number here is about one stated start; a Lyapunov rate is a property of where the swing goes.
 
 use super::error::energy_scale;
-use super::reference::Reference;
+use super::reference::ReferenceMotion;
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::dynamics::energy;
@@ -24,8 +24,8 @@ fn swing<const N: usize>(arm: &Arm<N>, start: &State<N>, method: Method, h: f64)
     control.with_timestep(h).simulation(*start)
 }
 
-/// Largest angle error \[rad\] at every sample of `reference`, which are `every` steps of `h` \[s\] apart. Ends early where the
-/// run leaves the finite numbers.
+/// Largest angle error \[rad\] at every sample of `reference`, which are `every` steps of `h` \[s\] apart. Ends early
+/// where the run leaves the finite numbers.
 #[must_use]
 pub fn separation<const N: usize>(
     arm: &Arm<N>,
@@ -33,7 +33,7 @@ pub fn separation<const N: usize>(
     method: Method,
     h: f64,
     every: u64,
-    reference: &Reference<N>,
+    reference: &ReferenceMotion<N>,
 ) -> Vec<f64> {
     let mut simulation = swing(arm, start, method, h);
     (0..reference.len())
@@ -56,8 +56,8 @@ pub fn horizon(errors: &[f64], spacing: f64) -> Option<f64> {
 
 /// Lyapunov rate \[1/s\] of the swing from `start` over `duration` \[s\], whole and by halves.
 ///
-/// Two swings a nudge apart; the nudge is measured in angles and rates (in units of 1 rad and 1 rad/s) every quarter second
-/// and put back to its size. Source: Benettin, Galgani, Giorgilli and Strelcyn, *Meccanica* 15 (1980).
+/// Two swings a nudge apart; the nudge is measured in angles and rates (in units of 1 rad and 1 rad/s) every quarter
+/// second and put back to its size. Source: Benettin, Galgani, Giorgilli and Strelcyn, *Meccanica* 15 (1980).
 #[must_use]
 pub fn lyapunov_rate<const N: usize>(arm: &Arm<N>, start: &State<N>, duration: f64) -> [f64; 3] {
     const H: f64 = 1.0 / 1024.0;

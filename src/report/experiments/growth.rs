@@ -1,7 +1,8 @@
 //! How much a small deviation of the arm itself grows per control period: what the spectral radius predicts.
 //!
-//! The arm is nudged off its equilibrium, and after every period its deviation (position, velocity, integral) is scaled back to the size
-//! of the nudge, so that the fastest mode alone is left and neither dies in rounding nor leaves what is linear.
+//! The arm is nudged off its equilibrium, and after every period its deviation (position, velocity, integral) is scaled
+//! back to the size of the nudge, so that the fastest mode alone is left and neither dies in rounding nor leaves what
+//! is linear.
 //!
 //! **Invariant:** no prediction enters but the equilibrium.
 
@@ -12,7 +13,8 @@ use crate::study::control_loop::ControlLoop;
 use crate::study::linear::equilibrium;
 use crate::study::matrix;
 
-/// Size to which deviations are scaled back \[rad\]: small, so that what is linear shows, and a billion units of rounding.
+/// Size to which deviations are scaled back \[rad\]: small, so that what is linear shows, and a billion units of
+/// rounding.
 const SIZE: f64 = 1e-6;
 
 /// Periods before counting starts, in which all modes but the fastest fall behind.

@@ -1,10 +1,10 @@
 //! The largest stable timestep, measured: the arm itself is nudged off its equilibrium and watched.
 //!
-//! Held control runs through [`Simulation`], the live loop; control in every stage through [`ContinuousLoop`], where the
-//! method steps the arm and its law as one system. Stable means that the deviation decays. "Did it overflow?" would be
-//! the wrong question: just past the limit a nonlinear arm chatters between two poses for ever. And decay is judged by
-//! energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose; single joints may well move further off
-//! for a while, as others come back.
+//! Held control runs through [`Simulation`], the live loop; control in every stage through [`ContinuousLoop`], where
+//! the method steps the arm and its law as one system. Stable means that the deviation decays. "Did it overflow?" would
+//! be the wrong question: just past the limit a nonlinear arm chatters between two poses for ever. And decay is judged
+//! by energy, `½ v M v + ½ x (Kp + ∂G/∂q) x`, which a loop with damping can only lose; single joints may well move
+//! further off for a while, as others come back.
 //!
 //! **Invariant:** no prediction enters but the equilibrium and a timestep to start the search from.
 
@@ -29,8 +29,8 @@ pub const STEPS: u64 = 4000;
 /// The nudge \[rad\]; small, so that what is linear shows, and a billion units of rounding.
 const NUDGE: f64 = 1e-6;
 
-/// A deviation, or a velocity times the timestep, that has made its point \[rad\]: two thousand nudges, and still less than
-/// the chatter past a limit.
+/// A deviation, or a velocity times the timestep, that has made its point \[rad\]: two thousand nudges, and still less
+/// than the chatter past a limit.
 const ESCAPED: f64 = 2e-3;
 
 /// A deviation that has died \[rad\]; a hundred thousand units of rounding, which would otherwise be compared next.
@@ -77,8 +77,8 @@ pub fn decays<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> b
     growth(control, sampling).is_some_and(|growth| growth < 1.0)
 }
 
-/// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth: in the first, modes
-/// die out that say nothing about the last to do so. `None` once the deviation has escaped.
+/// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth: in the first,
+/// modes die out that say nothing about the last to do so. `None` once the deviation has escaped.
 #[must_use]
 pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> Option<f64> {
     let rest = equilibrium(control);
@@ -167,7 +167,8 @@ fn primed<const N: usize>(control: &ControlLoop<N>, integral: &[f64; N]) -> Opti
     primed.then_some(live)
 }
 
-/// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the velocity.
+/// A state a little off `position`, no two joints alike, so that every mode gets its part: fast ones through the
+/// velocity.
 pub(super) fn nudged<const N: usize>(position: &[f64; N], timestep: f64) -> State<N> {
     let mut state = State::at_rest(*position);
     let mut nudge = NUDGE;
@@ -210,8 +211,8 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     Some(below)
 }
 
-/// Largest of the last eighth of [`STEPS`] energies per largest of the second; zero once one is zero, `None` once one is
-/// missing.
+/// Largest of the last eighth of [`STEPS`] energies per largest of the second; zero once one is zero, `None` once one
+/// is missing.
 fn watch(mut energy: impl FnMut() -> Option<f64>) -> Option<f64> {
     let window = STEPS / 8;
     let (mut early, mut late) = (0.0_f64, 0.0_f64);

@@ -10,7 +10,7 @@ use crate::report::experiments::error::OUTPUTS;
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
 use crate::report::svg::{
-    Axis, Key, Marker, Plot, Point, Series, Unit, number, scientific, seconds,
+    Axis, Curve, Key, Marker, Plot, Point, Unit, number, scientific, seconds,
 };
 
 const DURATION: f64 = 2.0;
@@ -100,9 +100,9 @@ fn plot(panel: &Panel, x: &Axis, y: &Axis) -> Plot {
         .parts
         .iter()
         .map(|parts| (parts.timestep, parts.total));
-    plot.series.push(Series {
+    plot.series.push(Curve {
         dashed: true,
-        ..Series::line("ink", total)
+        ..Curve::line("ink", total)
     });
     for (class, name, marker) in PARTS {
         let points: Vec<Point> = panel
@@ -114,16 +114,16 @@ fn plot(panel: &Panel, x: &Axis, y: &Axis) -> Plot {
                     "c3" => parts.rounding,
                     _ => parts.hold,
                 };
-                let told = format!(
+                let tooltip = format!(
                     "{name}: {} rad at {}",
                     scientific(value),
                     seconds(parts.timestep)
                 );
-                Point::new(parts.timestep, value, told)
+                Point::new(parts.timestep, value, tooltip)
             })
             .filter(|point| point.y != 0.0)
             .collect();
-        plot.series.push(Series {
+        plot.series.push(Curve {
             class,
             marker,
             line: true,
@@ -159,9 +159,9 @@ fn figure(panels: &[Panel]) -> Figure {
     Figure::new(
         "error-budget",
         "Under a held effort the hold outweighs everything else; rounding is visible only where nothing else is left",
-        "2 links, 2 s. Truncation: the method's steps in twice the digits against the true motion under the effort those steps hold. \
-         Rounding: the live arm's steps against the same steps in twice the digits. Hold: that true motion against the one under the law \
-         at every instant.",
+        "2 links, 2 s. Truncation: the method's steps in twice the digits against the true motion under the effort \
+         those steps hold. Rounding: the live arm's steps against the same steps in twice the digits. Hold: that true \
+         motion against the one under the law at every instant.",
         &legend,
         &plots,
     )
@@ -171,8 +171,8 @@ fn hold(panels: &[Panel]) -> Table {
     let mut table = Table::new(
         "hold",
         "What holding the effort costs",
-        "PD reach, timestep = control period. Against the continuous law all methods of order 2 and more are alike; against the motion under \
-         their own held effort they differ by orders.",
+        "PD reach, timestep = control period. Against the continuous law all methods of order 2 and more are alike; \
+         against the motion under their own held effort they differ by orders.",
         &[
             "Control period",
             "Hold alone",
@@ -244,8 +244,8 @@ fn findings(panels: &[Panel]) -> Vec<String> {
     }
     if let Some(parts) = rk4.and_then(near) {
         findings.push(format!(
-            "**At a control period of {} holding the effort costs {} rad, RK4's truncation {} and rounding {}**: a better method cannot make \
-             good what the control period loses.",
+            "**At a control period of {} holding the effort costs {} rad, RK4's truncation {} and rounding {}**: a \
+             better method cannot make good what the control period loses.",
             seconds(parts.timestep),
             scientific(parts.hold),
             scientific(parts.truncation),

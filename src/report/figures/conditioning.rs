@@ -3,16 +3,16 @@
 //! **Invariant:** the truth behind the digits is known to at least ten more of them.
 
 use crate::report::csv::Csv;
-use crate::report::experiments::conditioning::{Lost, Pose, digits_lost};
+use crate::report::experiments::conditioning::{Lost, PoseShape, digits_lost};
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
-use crate::report::svg::{Axis, Key, Marker, Plot, Point, Series, Unit, number, power};
+use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, power};
 
 /// Digits that the recursion may lose at worst.
 const ALLOWED: f64 = 2.5;
 
 /// The panel of folded arms.
-const FOLDED: &str = "3 links, folded twice";
+const FOLDED: &str = "3 links, folded back once";
 
 type Column = (f64, Lost);
 
@@ -23,9 +23,9 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     );
     let mut panels: Vec<(&str, Vec<Column>)> = Vec::new();
     for (title, pose) in [
-        ("3 links, bent", Pose::Bent),
-        ("3 links, stretched", Pose::Stretched),
-        (FOLDED, Pose::Folded),
+        ("3 links, bent", PoseShape::Bent),
+        ("3 links, stretched", PoseShape::Stretched),
+        (FOLDED, PoseShape::Folded),
     ] {
         let mut columns = Vec::new();
         for exponent in -9..=9 {
@@ -59,8 +59,10 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let own = largest(&panels, |lost| lost.recursion.1 - lost.inherent.1);
     Section {
         findings: vec![format!(
-            "**With a last link 10⁹ times lighter or heavier than the others bent and stretched arms lose at most {} of 16 digits**; folded twice, up to {}, of \
-             which at most {} are the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix loses up to {}.",
+            "**With a last link 10⁹ times lighter or heavier than the others bent and stretched arms lose at most {} \
+             of 16 digits**; with the second link folded back onto the first, up to {}, of \
+             which at most {} are the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix \
+             loses up to {}.",
             number(worst),
             number(lost_folded),
             number(own.max(0.0)),
@@ -80,7 +82,8 @@ fn verdicts(worst: f64, own: f64, count: u32) -> Vec<Verdict> {
     vec![
         Verdict {
             claim: format!(
-                "In none of these poses are more than {ALLOWED} digits lost beyond those that lie in the angles' last bits"
+                "In none of these poses are more than {ALLOWED} digits lost beyond those that lie in the angles' last \
+                 bits"
             ),
             seen: format!("at worst {} digits beyond", number(own.max(0.0))),
             holds: own <= ALLOWED,
@@ -138,7 +141,7 @@ fn figure(panels: &[(&str, Vec<Column>)], worst: f64) -> Figure {
                         ),
                     )
                 });
-                plot.series.push(Series {
+                plot.series.push(Curve {
                     class,
                     marker,
                     line: true,
@@ -161,10 +164,12 @@ fn figure(panels: &[(&str, Vec<Column>)], worst: f64) -> Figure {
     Figure::new(
         "conditioning",
         format!(
-            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most of them",
+            "Bent and stretched, the recursion loses at most {} digits where eliminating the mass matrix loses most of \
+             them",
             number(worst)
         ),
-        "Worst of all sampled states. The dashed line is what the last bit of an angle changes by itself: no way of solving can be asked for more. Crosses at the top: elimination failed.",
+        "Worst of all sampled states. The dashed line is what the last bit of an angle changes by itself: no way of \
+         solving can be asked for more. Crosses at the top: elimination failed.",
         &[
             key("c1", Marker::Diamond, false, "this arm's recursion"),
             key("c2", Marker::Square, false, "elimination of M(q)"),

@@ -8,11 +8,11 @@ use crate::report::csv::Csv;
 use crate::report::experiments::chaos::energy_drift;
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
-use crate::report::svg::{Axis, Key, Plot, Series, Unit, number, scientific, seconds};
+use crate::report::svg::{Axis, Curve, Key, Plot, Unit, number, scientific, seconds};
 
 const TIMESTEP: f64 = 1e-3;
 
-struct Panel {
+struct DriftPanel {
     title: String,
     method: Method,
     points: Vec<(f64, f64)>,
@@ -30,7 +30,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     for (index, method) in Method::ALL.into_iter().enumerate() {
         let arm = Arm::<2>::default();
         let mut add = |title: &str, points| {
-            panels.push(Panel {
+            panels.push(DriftPanel {
                 title: title.to_owned(),
                 method,
                 points,
@@ -73,13 +73,13 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-impl Panel {
+impl DriftPanel {
     fn end(&self) -> f64 {
         self.points.last().map_or(f64::NAN, |point| point.1)
     }
 }
 
-fn figure(panels: &[Panel]) -> Figure {
+fn figure(panels: &[DriftPanel]) -> Figure {
     let times = panels
         .iter()
         .flat_map(|panel| panel.points.iter().map(|point| point.0));
@@ -97,7 +97,7 @@ fn figure(panels: &[Panel]) -> Figure {
         }
         for plot in plots.iter_mut().filter(|plot| plot.title == panel.title) {
             let points = panel.points.iter().filter(|point| point.1 > 0.0).copied();
-            plot.series.push(Series::line(panel.method.name(), points));
+            plot.series.push(Curve::line(panel.method.name(), points));
         }
     }
     let keys: Vec<Key> = Method::ALL
@@ -107,21 +107,21 @@ fn figure(panels: &[Panel]) -> Figure {
     Figure::new(
         "energy-drift",
         headline(panels),
-        "Timestep 1 ms, no control: energy should stay. The scale is the arm's largest change of potential energy plus its kinetic energy at the \
-         start. A line that ends early left the finite numbers.",
+        "Timestep 1 ms, no control: energy should stay. The scale is the arm's largest change of potential energy plus \
+         its kinetic energy at the start. A line that ends early left the finite numbers.",
         &keys,
         &plots,
     )
 }
 
-fn of<'a>(panels: &'a [Panel], title: &str, method: Method) -> Option<&'a Panel> {
+fn of<'a>(panels: &'a [DriftPanel], title: &str, method: Method) -> Option<&'a DriftPanel> {
     panels
         .iter()
         .find(|panel| panel.title.starts_with(title) && panel.method == method)
 }
 
-fn headline(panels: &[Panel]) -> String {
-    let end = |title, method| of(panels, title, method).map_or(f64::NAN, Panel::end);
+fn headline(panels: &[DriftPanel]) -> String {
+    let end = |title, method| of(panels, title, method).map_or(f64::NAN, DriftPanel::end);
     format!(
         "Verlet keeps energy to {} on a regular swing but only to {} on a chaotic one; RK4 to {}",
         scientific(end("Regular", Method::Verlet)),
@@ -130,12 +130,12 @@ fn headline(panels: &[Panel]) -> String {
     )
 }
 
-fn findings(panels: &[Panel]) -> Vec<String> {
-    let end = |method| of(panels, "Chaotic swing, 2", method).map_or(f64::NAN, Panel::end);
+fn findings(panels: &[DriftPanel]) -> Vec<String> {
+    let end = |method| of(panels, "Chaotic swing, 2", method).map_or(f64::NAN, DriftPanel::end);
     let duration = panels.first().map_or(0.0, |panel| panel.duration);
     vec![format!(
-        "**Over {} s of chaotic swing at {} the energy error is {} of the scale with Verlet, {} with midpoint and {} with RK4.** This Verlet is not symplectic: the \
-         forces of an arm depend on velocity.",
+        "**Over {} s of chaotic swing at {} the energy error is {} of the scale with Verlet, {} with midpoint and {} \
+         with RK4.** This Verlet is not symplectic: the forces of an arm depend on velocity.",
         number(duration),
         seconds(TIMESTEP),
         scientific(end(Method::Verlet)),
@@ -144,17 +144,18 @@ fn findings(panels: &[Panel]) -> Vec<String> {
     )]
 }
 
-fn verdicts(panels: &[Panel]) -> Vec<Verdict> {
+fn verdicts(panels: &[DriftPanel]) -> Vec<Verdict> {
     let mut holds = true;
     for title in ["Regular", "Chaotic swing, 2", "Chaotic swing, 3"] {
-        let end = |method| of(panels, title, method).map_or(f64::NAN, Panel::end);
+        let end = |method| of(panels, title, method).map_or(f64::NAN, DriftPanel::end);
         let order_two = end(Method::Midpoint).min(end(Method::Verlet));
         // An Euler run that left the finite numbers has no end to compare.
         let euler = end(Method::Euler);
         holds &= end(Method::Rk4) < order_two && (order_two < euler || !euler.is_finite());
     }
     vec![Verdict {
-        claim: "At 1 ms energy is kept best by RK4, then by the methods of order 2, worst by Euler, in all three swings".to_owned(),
+        claim: "At 1 ms energy is kept best by RK4, then by the methods of order 2, worst by Euler, in all three \
+                swings".to_owned(),
         seen: headline(panels),
         holds,
     }]

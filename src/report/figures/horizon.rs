@@ -7,10 +7,10 @@ use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::chaos::{HORIZON_ERROR, horizon, lyapunov_rate, separation};
-use crate::report::experiments::reference::{Law, Reference};
+use crate::report::experiments::reference::{Law, ReferenceMotion};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
-use crate::report::svg::{Axis, Key, Mark, Plot, Series, Unit, number, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Plot, Unit, number, seconds};
 
 /// Time between samples \[s\], a multiple of every timestep.
 const SPACING: f64 = 1.0 / 16.0;
@@ -67,7 +67,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
 
 fn swing<const N: usize>(making: &mut Making<'_>, samples: usize, before: usize) -> Swing {
     let (arm, start) = (Arm::<N>::default(), State::rest());
-    let reference = Reference::of(&arm, &start, &Law::FREE, SPACING, samples);
+    let reference = ReferenceMotion::of(&arm, &start, &Law::FREE, SPACING, samples);
     let known = reference
         .uncertainty()
         .iter()
@@ -160,12 +160,12 @@ fn figure(swings: &[Swing]) -> Figure {
                     .enumerate()
                     .filter(|(_, error)| **error > 0.0 && error.is_finite())
                     .map(|(index, error)| (time(index), *error));
-                plot.series.push(Series::line(method.name(), points));
+                plot.series.push(Curve::line(method.name(), points));
                 if let Some(at) = swing.horizon(*method, SHOWN) {
                     plot.marks.push(Mark::Vertical {
                         x: at,
                         class: method.name(),
-                        told: format!("{method}: horizon {} s", number(at)),
+                        tooltip: format!("{method}: horizon {} s", number(at)),
                     });
                 }
             }
@@ -174,9 +174,9 @@ fn figure(swings: &[Swing]) -> Figure {
             let to =
                 (from + 9.0 * std::f64::consts::LN_10 / swing.rate[0]).min(swing.known_until());
             let growth = [from, to].map(|t| (t, 1e-15 * (swing.rate[0] * (t - from)).exp()));
-            plot.series.push(Series {
+            plot.series.push(Curve {
                 dashed: true,
-                ..Series::line("soft", growth)
+                ..Curve::line("soft", growth)
             });
             plot
         })
@@ -192,8 +192,9 @@ fn figure(swings: &[Swing]) -> Figure {
     Figure::new(
         "separation",
         headline(swings),
-        "Free swing from the horizontal. An error of 0.01 rad is the horizon (dotted upright lines); past it a swing and the true one have only \
-         their energy in common. The panel ends where the reference itself is no longer known, or where it was not taken further.",
+        "Free swing from the horizontal. An error of 0.01 rad is the horizon (dotted upright lines); past it a swing \
+         and the true one have only their energy in common. The panel ends where the reference itself is no longer \
+         known, or where it was not taken further.",
         &keys,
         &plots,
     )
@@ -224,7 +225,8 @@ fn table(swings: &[Swing]) -> Table {
     let mut table = Table::new(
         "horizon",
         "Horizon: when the error passes 0.01 rad [s]",
-        "The Lyapunov time is how long an error takes to grow by e, from two neighbouring swings followed for minutes; in brackets from each half alone.",
+        "The Lyapunov time is how long an error takes to grow by e, from two neighbouring swings followed for minutes; \
+         in brackets from each half alone.",
         &head,
     );
     for swing in swings {
@@ -267,11 +269,12 @@ fn finding(swing: &Swing) -> Option<String> {
         .into_iter()
         .filter_map(|every| Some((every, swing.horizon(Method::Rk4, every)?)));
     let end = floor.max_by(|one, other| one.1.total_cmp(&other.1)).map(|(every, at)| {
-        // What truncation alone would buy: the fourth power of the ratio of timesteps.
+        // Truncation alone would buy the fourth power of the ratio of timesteps.
         let ratio = timestep(1024) / timestep(every);
         let bought = ratio.powi(4).ln() * swing.lyapunov_time();
         format!(
-            " With steps of {} it is {} s, {} s later, where truncation alone would have bought {} s: rounding ends it.",
+            " With steps of {} it is {} s, {} s later, where truncation alone would have bought {} s: rounding ends \
+             it.",
             seconds(timestep(every)),
             number(at),
             number(at - fine),
@@ -279,8 +282,8 @@ fn finding(swing: &Swing) -> Option<String> {
         )
     });
     Some(format!(
-        "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every {} s, so sixteen times the work \
-         buys {} s.{}",
+        "**A free {}-link swing can be followed for {} s with RK4 at {}, and for {} s at {}**: errors grow by e every \
+         {} s, so sixteen times the work buys {} s.{}",
         swing.links,
         number(coarse),
         seconds(timestep(64)),
@@ -297,14 +300,14 @@ fn verdict(swing: &Swing) -> Verdict {
         .into_iter()
         .map(|method| swing.horizon(method, SHOWN).unwrap_or(f64::INFINITY))
         .collect();
-    let told = |at: &f64| {
+    let shown = |at: &f64| {
         if at.is_finite() {
             format!("{} s", number(*at))
         } else {
             format!("after {} s", number(swing.known_until()))
         }
     };
-    let text: Vec<String> = horizons.iter().map(told).collect();
+    let text: Vec<String> = horizons.iter().map(shown).collect();
     let holds = match horizons.as_slice() {
         &[euler, midpoint, verlet, rk4] => {
             euler < midpoint.min(verlet) && midpoint.max(verlet) < rk4

@@ -49,12 +49,12 @@ impl Bars {
         for (label, value) in &self.rows {
             let (middle, thick) = (top + 0.5 * pitch, (0.68 * pitch).min(26.0));
             let width = value.unwrap_or(0.0).max(0.0) / largest * (WIDTH - LEFT - RIGHT);
-            let told = value.map_or_else(|| "not measured".to_owned(), number);
+            let text = value.map_or_else(|| "not measured".to_owned(), number);
             write!(
                 out,
                 "<text class=\"label\" x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>\
                  <rect class=\"bar\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{width:.1}\" height=\"{thick:.1}\"/>\
-                 <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\">{told}</text>",
+                 <text class=\"label\" x=\"{:.1}\" y=\"{:.1}\">{text}</text>",
                 LEFT - 6.0,
                 middle + 4.0,
                 escape(label),

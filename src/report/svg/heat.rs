@@ -39,7 +39,8 @@ impl Heat {
                     let (from, to) = (across(*from), across(*to));
                     write!(
                         out,
-                        "<rect shape-rendering=\"crispEdges\" class=\"h{}\" x=\"{from:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>",
+                        "<rect shape-rendering=\"crispEdges\" class=\"h{}\" x=\"{from:.1}\" y=\"{top:.1}\" \
+                         width=\"{:.1}\" height=\"{:.1}\"/>",
                         level.clamp(&-LEVELS, &LEVELS) + LEVELS,
                         to - from,
                         bottom - top

@@ -1,7 +1,8 @@
-//! Small SVG plots: log axes, lines, markers, marks that explain, heat maps. No library, no script, no colour of its own.
+//! Small SVG plots: log axes, lines, markers, marks that explain, heat maps. No library, no script, no colour of its
+//! own.
 //!
-//! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with a marker
-//! shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
+//! Colours are CSS classes ([`STYLE`]): one per method throughout, from a palette that survives colour blindness, with
+//! a marker shape each, light and dark. A plot is drawn for a column of some 400 px; figures are grids of such panels.
 //!
 //! **Invariant:** whatever has no place on the axes is drawn at the edge as lost, never dropped in silence.
 
@@ -10,7 +11,7 @@ mod bars;
 mod heat;
 mod plot;
 
-pub(crate) use axis::{Axis, Unit, number, power, scientific, seconds};
+pub(crate) use axis::{Axis, Unit, number, plain, power, scientific, seconds};
 pub(crate) use bars::Bars;
 pub(crate) use heat::Heat;
 pub(crate) use plot::Plot;
@@ -71,23 +72,23 @@ pub(crate) struct Point {
     pub(crate) y: f64,
     /// From and to, along x.
     pub(crate) spread: Option<(f64, f64)>,
-    pub(crate) told: String,
+    pub(crate) tooltip: String,
 }
 
 impl Point {
-    pub(crate) fn new(x: f64, y: f64, told: impl Into<String>) -> Self {
+    pub(crate) fn new(x: f64, y: f64, tooltip: impl Into<String>) -> Self {
         Self {
             x,
             y,
             spread: None,
-            told: told.into(),
+            tooltip: tooltip.into(),
         }
     }
 }
 
 /// A line, or marks, or both.
 #[derive(Debug, Clone)]
-pub(crate) struct Series {
+pub(crate) struct Curve {
     /// CSS class: a method's name, or one of the style's others.
     pub(crate) class: &'static str,
     pub(crate) marker: Marker,
@@ -96,7 +97,7 @@ pub(crate) struct Series {
     pub(crate) points: Vec<Point>,
 }
 
-impl Series {
+impl Curve {
     /// A method's line with its colour and marker.
     pub(crate) fn of(method: Method, points: Vec<Point>) -> Self {
         Self {
@@ -130,7 +131,7 @@ pub(crate) enum Mark {
     Vertical {
         x: f64,
         class: &'static str,
-        told: String,
+        tooltip: String,
     },
     /// A line across at `y`, labelled.
     Horizontal {
@@ -187,7 +188,8 @@ impl Key {
         let dashed = if self.dashed { " dashed" } else { "" };
         format!(
             "<svg class=\"swatch\" viewBox=\"0 0 28 12\" width=\"28\" height=\"12\" aria-hidden=\"true\">\
-             <g class=\"series {}{dashed}\"><path class=\"line\" d=\"M1 6H27\"/><path class=\"marker\" d=\"{}\"/></g></svg>",
+             <g class=\"series {}{dashed}\"><path class=\"line\" d=\"M1 6H27\"/><path class=\"marker\" \
+             d=\"{}\"/></g></svg>",
             self.class,
             self.marker.path(14.0, 6.0)
         )
@@ -208,8 +210,8 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
         HEIGHT * length_in_f64(rows) + header,
     );
     let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" height=\"{height}\">\
-         <style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
          <text class=\"heading\" x=\"14\" y=\"26\">{}</text>",
         escape(title)
     );

@@ -4,7 +4,7 @@
 
 use std::fmt::Write;
 
-use super::{Axis, HEIGHT, Heat, Mark, Marker, Point, Series, Unit, WIDTH, escape, number};
+use super::{Axis, Curve, HEIGHT, Heat, Mark, Marker, Point, Unit, WIDTH, escape, number};
 
 const LEFT: f64 = 58.0;
 const RIGHT: f64 = 14.0;
@@ -21,7 +21,7 @@ pub(crate) struct Plot {
     pub(crate) above: Option<(&'static str, f64)>,
     pub(crate) heat: Option<Heat>,
     pub(crate) marks: Vec<Mark>,
-    pub(crate) series: Vec<Series>,
+    pub(crate) series: Vec<Curve>,
 }
 
 impl Plot {
@@ -141,12 +141,12 @@ impl Plot {
     fn mark(&self, out: &mut String, mark: &Mark) -> std::fmt::Result {
         let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
         match mark {
-            Mark::Vertical { x, class, told } if self.x.holds(*x) => {
+            Mark::Vertical { x, class, tooltip } if self.x.holds(*x) => {
                 let x = self.across(*x);
                 write!(
                     out,
                     "<path class=\"edge {class}\" d=\"M{x:.1} {bottom}V{TOP}\"><title>{}</title></path>",
-                    escape(told)
+                    escape(tooltip)
                 )
             }
             Mark::Horizontal {
@@ -206,7 +206,7 @@ impl Plot {
         Ok(())
     }
 
-    fn series(&self, out: &mut String, series: &Series) -> std::fmt::Result {
+    fn series(&self, out: &mut String, series: &Curve) -> std::fmt::Result {
         let dashed = if series.dashed { " dashed" } else { "" };
         write!(out, "<g class=\"series {}{dashed}\">", series.class)?;
         if series.line {
@@ -241,12 +241,12 @@ impl Plot {
     }
 
     fn point(&self, out: &mut String, marker: Marker, point: &Point) -> std::fmt::Result {
-        let told = escape(&point.told);
+        let tooltip = escape(&point.tooltip);
         let x = self.across(point.x);
         if self.lost(point) {
             return write!(
                 out,
-                "<path class=\"lost\" d=\"M{:.1} {:.1}l7 7m0 -7l-7 7\"><title>{told}</title></path>",
+                "<path class=\"lost\" d=\"M{:.1} {:.1}l7 7m0 -7l-7 7\"><title>{tooltip}</title></path>",
                 x - 3.5,
                 TOP + 2.5
             );
@@ -264,7 +264,7 @@ impl Plot {
         }
         write!(
             out,
-            "<path class=\"marker\" d=\"{}\"><title>{told}</title></path>",
+            "<path class=\"marker\" d=\"{}\"><title>{tooltip}</title></path>",
             marker.path(x, y)
         )
     }

@@ -5,7 +5,7 @@
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -15,6 +15,7 @@ use pendularm_benches::attack::TOKEN;
 use pendularm_benches::protocol::{Event, Protocol};
 
 use crate::newcomer::{self, Visits};
+use crate::target::Target;
 
 /// Between two calls.
 const CALLS: Duration = Duration::from_millis(10);
@@ -22,15 +23,6 @@ const CALLS: Duration = Duration::from_millis(10);
 const MESSAGES: Duration = Duration::from_micros(16_667);
 /// What is watched where there is no arm.
 const TOPIC: &str = "/healthy";
-
-/// A server, and what it asks.
-#[derive(Clone, Copy)]
-pub struct Target {
-    pub protocol: Protocol,
-    pub address: SocketAddr,
-    pub locked: bool,
-    pub patience: Duration,
-}
 
 /// What they had.
 pub struct Health {

@@ -10,6 +10,7 @@ mod healthy;
 mod newcomer;
 mod server;
 mod table;
+mod target;
 
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -200,7 +201,7 @@ fn endure(
     } = server;
     let pid = program.pid();
     let (over, deeds) = (AtomicBool::new(false), Deeds::default());
-    let watched = healthy::Target {
+    let watched = target::Target {
         protocol,
         address,
         locked,

@@ -13,7 +13,7 @@ use pendularm_client::blocking::Client;
 use pendularm_client::codec::Framing;
 use serde_json::{Value, json};
 
-use crate::healthy::Target;
+use crate::target::Target;
 
 /// Between two visits.
 const PERIOD: Duration = Duration::from_millis(250);

@@ -10,7 +10,7 @@ use mio::net::TcpStream;
 use mio::{Events, Interest, Poll, Token};
 
 use crate::message::{Template, now, stamp};
-use crate::process;
+use pendularm_benches::process;
 use pendularm_benches::protocol::{Event, Protocol};
 
 /// How long a server may take for what is asked of it before the run fails.

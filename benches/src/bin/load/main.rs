@@ -8,13 +8,13 @@
 mod fleet;
 mod message;
 mod probe;
-mod process;
 mod report;
 
 use std::net::{SocketAddr, TcpListener};
 use std::time::{Duration, Instant};
 
 use fleet::{Fleet, Outcome, Pace, Scene};
+use pendularm_benches::process;
 use pendularm_benches::protocol::Protocol;
 
 /// How often the arm publishes, and so everybody here that does not flood.

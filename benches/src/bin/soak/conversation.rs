@@ -1,4 +1,4 @@
-//! What a client that reads does over and over: wait for its answers, for a status, for the end.
+//! A client that reads, and so waits over and over: for its answers, for a status, for the end.
 //!
 //! **Invariant:** a call that is not answered in time, or before the end of the stream, is a fault that names it.
 

@@ -1,4 +1,4 @@
-//! What the healthy clients' record says: was `/joint_states` in time and in order, did the arm keep time.
+//! The verdict on the healthy clients' record: was `/joint_states` in time and in order, did the arm keep time.
 //!
 //! **Invariant:** pure; judges what was kept, with nothing left out.
 

@@ -6,7 +6,7 @@ use std::collections::HashMap;
 
 use serde_json::Value;
 
-/// What a call's response must be, beyond its shape.
+/// The response that a call must have, beyond its shape.
 pub type Check = Box<dyn Fn(&Value) -> Result<(), String>>;
 
 /// Calls that wait for their response.

@@ -1,7 +1,7 @@
-//! Whoever has the arm: settings, setpoints, goals, trials, pauses and resets, all the time; and whoever reads
+//! The operator, who has the arm: settings, setpoints, goals, trials, pauses and resets, all the time; and who reads
 //! `/diagnostics` meanwhile.
 //!
-//! What is set keeps the loop stable in every pose: masses and lengths do not fall below the default ones by more than
+//! The settings keep the loop stable in every pose: masses and lengths do not fall below the default ones by more than
 //! a tenth, gains by a third, and timesteps stay at or below 2 ms, where the default arm holds until 4 ms.
 //!
 //! **Invariant:** the only client that moves the arm, so that what it set is what it finds.

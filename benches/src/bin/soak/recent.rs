@@ -26,7 +26,7 @@ impl Recent {
         self.0.push_back(shown);
     }
 
-    /// What is kept, oldest first.
+    /// The frames that are kept, oldest first.
     pub fn frames(&self) -> Vec<String> {
         self.0.iter().cloned().collect()
     }

@@ -156,7 +156,7 @@ fn leaks(outcome: &Outcome) -> bool {
     ) & verdict("threads left over", threads, "0", threads == 0.0)
 }
 
-/// What the healthy clients saw.
+/// The healthy clients' record.
 fn joint_states(outcome: &Outcome) -> bool {
     let record = &outcome.record;
     let show = |name: &str, quantiles: [f64; 4]| {

@@ -40,7 +40,7 @@ const RESIDENTS: u64 = 2 + Watch::CONNECTIONS;
 
 /// All that a soak has found out.
 pub struct Outcome {
-    /// What was done, by name.
+    /// The deeds, by name.
     pub counts: Vec<(&'static str, u64)>,
     /// Faults of clients.
     pub faults: u64,
@@ -52,15 +52,15 @@ pub struct Outcome {
     pub course: Vec<(f64, Vitals)>,
     /// The same at every ebb.
     pub ebbs: Vec<(f64, Vitals)>,
-    /// What the healthy clients saw.
+    /// The healthy clients' record.
     pub record: Record,
     /// When the arm's clock was touched.
     pub deeds: Deeds,
-    /// What kinds of clients there were, from when to when.
+    /// The kinds of clients that there were, from when to when.
     pub lives: Vec<(&'static str, Instant, Instant)>,
-    /// What `/diagnostics` said last, and at worst.
+    /// The latest `/diagnostics`, and the worst.
     pub diagnosis: Diagnosis,
-    /// What the program wrote on standard error.
+    /// The program's lines on standard error.
     pub log: Log,
     /// How long it took to end, and its exit status.
     pub ended: Result<(Duration, Option<i32>), String>,
@@ -289,7 +289,7 @@ async fn settle(pid: u32, held: Vitals) {
                 break;
             }
             Some(now) => {
-                // What was sent by those who have gone is still carried out: that may take a while on a busy machine.
+                // Requests of clients that have gone are still carried out: that may take a while on a busy machine.
                 if now.cpu > worked + BUSY {
                     (worked, deadline) = (now.cpu, Instant::now() + LET_GO);
                 }

@@ -43,7 +43,7 @@ impl Door {
     }
 }
 
-/// What came.
+/// Something that came.
 pub enum Came {
     /// A response, which was the right one.
     Answer(Value),
@@ -61,7 +61,7 @@ pub enum Came {
 pub struct Client {
     /// Who it is, for reports.
     pub name: String,
-    /// What it shares with all.
+    /// The world, shared with all.
     pub world: Rc<World>,
     /// Its calls.
     pub ledger: Ledger,
@@ -69,7 +69,7 @@ pub struct Client {
     door: Door,
     codec: Codec,
     chunk: Vec<u8>,
-    /// What is to be sent with the next [`Client::flush`].
+    /// Bytes that go with the next [`Client::flush`].
     out: Vec<u8>,
     ended: bool,
     sent: Recent,
@@ -78,7 +78,7 @@ pub struct Client {
     may_hold: usize,
 }
 
-/// What a client is told that held the most when all together held too much.
+/// The status for the client that held the most when all together held too much.
 const HELD_MOST: &str = "memory: this connection held the most";
 /// A client that holds no more never gives way, whatever the others hold.
 const MODEST: usize = 256 * 1024;

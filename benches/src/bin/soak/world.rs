@@ -1,4 +1,4 @@
-//! What all clients of a soak share: where the program listens, what was done, what went wrong.
+//! The world of a soak, which all clients share: where the program listens, what was done, what went wrong.
 //!
 //! **Invariant:** numbers given out are never given out again, so what comes back under one belongs to one question.
 
@@ -24,7 +24,7 @@ pub fn is_wanted(name: &str) -> bool {
 pub struct Fault {
     /// Which client.
     pub client: String,
-    /// What is wrong.
+    /// The fault itself.
     pub what: String,
     /// The last it sent, shortened, oldest first.
     pub sent: Vec<String>,
@@ -61,11 +61,11 @@ pub struct World {
     pub diagnosis: RefCell<Diagnosis>,
     /// When the operator reset or paused the arm.
     pub deeds: RefCell<Deeds>,
-    /// What kinds of clients there were, from when to when.
+    /// The kinds of clients that there were, from when to when.
     pub lives: RefCell<Vec<(&'static str, Instant, Instant)>>,
 }
 
-/// What `/diagnostics` last said of the gateway, and what it said over time of the arm.
+/// The gateway's latest `/diagnostics`, and the arm's over time.
 #[derive(Debug, Default, Clone)]
 pub struct Diagnosis {
     /// Messages of `/diagnostics` so far.

@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** a goal's messages show the target and the setpoint that it was accepted with.
 
-use super::messages::{GoalNews, GoalOwner};
+use super::services::{GoalNews, GoalOwner};
 use crate::actors::arm::ik::target_message;
 use crate::actors::arm::sim::GoalJudged;
-use crate::actors::ros::follower::{Canceller, GoalStatus};
+use crate::actors::wire::follower::{Canceller, GoalStatus};
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Target;
 use crate::protocol::messages::goal::{IkFeedback, IkResult};

@@ -1,28 +1,29 @@
 //! Goals: `/ik_action/send_goal` and `/ik_action/cancel_goal`, feedback on `/ik_action/feedback`, the end on
 //! `/ik_action/result`.
 //!
-//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the setpoint.
-//! Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears nothing else,
-//! so that goals follow one another whole.
+//! A goal is solved by `ik` and announced to the arm, which judges it at every step once it has been given the
+//! setpoint. Subscribers see that setpoint on `/joint_trajectory`. While a goal is being set in motion the node hears
+//! nothing else, so that goals follow one another whole.
 //!
 //! **Invariant:** at most one goal is active, and each has exactly one result. A preempting goal comes in this order:
 //! the old goal's result, the response, the trajectory, feedback, result.
 
 mod active;
-mod messages;
-mod wire;
+mod services;
 
 use actix::prelude::*;
 
 use self::active::ActiveGoal;
-pub use self::messages::{
+use self::services::requests;
+pub use self::services::{
     CancelFollowed, CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, SendGoal, Settle,
 };
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names};
-use crate::actors::node::{Call, Frame, Interest, Publish, Reply, ask};
+use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ask};
+use crate::actors::wire::Nodes;
 use crate::math::goal::Outcome;
-use crate::protocol::catalog::{Node, Topic};
+use crate::protocol::catalog::{Action, Node, Service, Topic};
 use crate::protocol::messages::{self as frames, goal::setpoint_trajectory};
 
 /// The error for a client that cancels a goal which it has not sent, or which has ended.
@@ -69,6 +70,17 @@ impl<const N: usize> IkAction<N> {
             accepted: 0,
             feedback_wanted: false,
             result_wanted: false,
+        }
+    }
+
+    /// Enters this node's services and topics into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<SendGoal<N>>(Service::SendGoal, address.clone());
+        nodes.serve::<CancelGoal>(Service::CancelGoal, address.clone());
+        let requests = requests(address.clone().recipient(), address.clone().recipient());
+        nodes.actions.insert(Action::MoveTo, requests);
+        for topic in [Topic::IkFeedback, Topic::IkResult] {
+            nodes.publishers.insert(topic, address.clone().recipient());
         }
     }
 }
@@ -212,7 +224,7 @@ impl<const N: usize> IkAction<N> {
         };
         let (number, positions) = (goal.number, goal.positions);
         let topic = Topic::JointTrajectory;
-        let frame = Frame::unwritten(move || {
+        let frame = FrameOut::unwritten(move || {
             frames::publish(
                 topic.name(),
                 &setpoint_trajectory(&joint_names::<N>(), &positions),

@@ -7,8 +7,7 @@
 //! runs and nobody watches.
 
 mod goals;
-mod messages;
-mod wire;
+mod services;
 
 use std::time::Duration;
 
@@ -16,13 +15,14 @@ use actix::prelude::*;
 
 pub use self::goals::GoalClient;
 use self::goals::{GoalAnswer, carry_out};
-pub use self::messages::{NotStarted, SkipTarget, StartTrial, StopTrial, Terms};
+pub use self::services::{NotStarted, SkipTarget, StartTrial, StopTrial, Terms};
 use super::ik::target_message;
 use super::ik_action::{GoalNews, Settle};
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
+use crate::actors::wire::Nodes;
 use crate::math::trial::{Action, Changes, Conclusion, Rejection, Trial, sample};
-use crate::protocol::catalog::{Node, Topic};
+use crate::protocol::catalog::{Node, Service, Topic};
 use crate::protocol::messages as frames;
 use crate::protocol::messages::goal::TrialStatus;
 
@@ -78,6 +78,15 @@ impl<const N: usize> IkTrial<N> {
             status_asked: false,
             deadline: None,
         }
+    }
+
+    /// Enters this node's services and its topic into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<StartTrial>(Service::TrialStart, address.clone());
+        nodes.serve::<SkipTarget>(Service::TrialSkip, address.clone());
+        nodes.serve::<StopTrial>(Service::TrialStop, address.clone());
+        let node = address.clone().recipient();
+        nodes.publishers.insert(Topic::TrialStatus, node);
     }
 }
 

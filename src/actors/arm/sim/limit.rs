@@ -1,8 +1,8 @@
 //! The arm judges its own timestep: how large it may be at the present setpoint, and by how much each step is off.
 //!
-//! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It is
-//! looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the controller off
-//! the loop in force is the arm left to itself, whatever gains and setpoint wait to be switched on.
+//! The limit is predicted by the node `study`, on its workers, and kept here until the control loop is another one. It
+//! is looked after at publishing ticks, and only while somebody subscribes to a topic that shows it. With the
+//! controller off the loop in force is the arm left to itself, whatever gains and setpoint wait to be switched on.
 //!
 //! **Invariant:** nothing is ever refused or changed because of a limit or an error; they are only published.
 
@@ -11,82 +11,18 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use super::ArmSim;
-use crate::math::arm::State;
+use super::messages::{ArmSettings, Consult, HeldLimit, Present};
+use super::node::ArmSim;
+use super::state::limit::{resemble, share_limit};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::ErrorEstimateMessage;
 use crate::study::control_loop::ControlLoop;
 use crate::study::error_estimate::estimate;
 use crate::study::motion::Motion;
 
-/// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may come
-/// by the thousand a second.
+/// Least time between two predictions for one arm with one set of gains, a millisecond of a worker each: setpoints may
+/// come by the thousand a second.
 pub const LEAST_PAUSE: Duration = Duration::from_millis(100);
-
-// ---- state ----------------------------------------------------------------------------------------------------------
-
-/// The arm's memory of its limit.
-pub(super) struct LimitWatch<const N: usize> {
-    /// Who predicts, if anybody does.
-    study: Option<Recipient<HeldLimit<N>>>,
-    /// The loop that was last asked about, and when.
-    asked: Option<(ControlLoop<N>, Instant)>,
-    /// The answer is on its way.
-    waiting: bool,
-    /// The latest answer \[s\], infinite where nothing limits, and the loop that it is about.
-    known: Option<(ControlLoop<N>, f64)>,
-    /// Whether the timestep was too long when that was last published.
-    warned: bool,
-}
-
-impl<const N: usize> Default for LimitWatch<N> {
-    fn default() -> Self {
-        Self {
-            study: None,
-            asked: None,
-            waiting: false,
-            known: None,
-            warned: false,
-        }
-    }
-}
-
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// Whether two loops have one limit: it depends on everything but the timestep.
-fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.setpoint == other.setpoint && resemble(one, other)
-}
-
-/// Whether two loops differ in setpoint and timestep at most.
-fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
-    one.arm == other.arm && one.gains == other.gains && one.method == other.method
-}
-
-/// The arm's settings as they are now. From `study`, at every call.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Present<N>")]
-pub struct ArmSettings<const N: usize>;
-
-/// The arm's settings at one instant.
-#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
-pub struct Present<const N: usize> {
-    /// The loop, with the gains as they are set, whether the controller is on or off.
-    pub control: ControlLoop<N>,
-    /// Where the arm is and how it moves.
-    pub state: State<N>,
-}
-
-/// The largest stable timestep \[s\] of a loop with held control, infinite where nothing limits. From the arm to `study`;
-/// none if the runtime ends meanwhile.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Option<f64>")]
-pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
-
-/// Whom to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
@@ -152,8 +88,8 @@ impl<const N: usize> ArmSim<N> {
         self.telemetry.wants(Topic::Diagnostics) || self.telemetry.wants(Topic::ErrorEstimate)
     }
 
-    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none. One for an earlier setpoint will
-    /// do until the next is there; one for another arm, other gains or another method says nothing.
+    /// The latest prediction \[s\]: infinite where nothing limits, NaN while there is none. One for an earlier setpoint
+    /// will do until the next is there; one for another arm, other gains or another method says nothing.
     pub(super) fn timestep_limit(&self) -> f64 {
         match &self.limit.known {
             Some((of, limit)) if resemble(of, &ControlLoop::in_force(&self.simulation)) => *limit,
@@ -178,7 +114,8 @@ impl<const N: usize> ArmSim<N> {
                 timestep: bears,
             } = motion;
             return Some(format!(
-                "the timestep {timestep:?} s exceeds {bears:.2e} s, up to which {method} is predicted to carry a motion of {speed:.1} rad/s"
+                "the timestep {timestep:?} s exceeds {bears:.2e} s, up to which {method} is predicted to carry a \
+                 motion of {speed:.1} rad/s"
             ));
         }
         let method = self.simulation.method();
@@ -191,7 +128,8 @@ impl<const N: usize> ArmSim<N> {
             format!("{method} is predicted to be unstable at every timestep {place}")
         } else {
             format!(
-                "the timestep {timestep:?} s exceeds {limit:?} s, up to which {method} is predicted to be stable {place}"
+                "the timestep {timestep:?} s exceeds {limit:?} s, up to which {method} is predicted to be stable \
+                 {place}"
             )
         };
         (timestep > limit).then_some(says)

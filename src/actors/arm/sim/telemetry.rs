@@ -1,23 +1,16 @@
-//! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth, `/diagnostics`
-//! once a second and at every change.
+//! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
+//! `/diagnostics` once a second and at every change.
 //!
 //! **Invariant:** nothing is reckoned for a topic that nobody subscribes to; what is published is written elsewhere.
 
-use std::sync::Arc;
-use std::time::Duration;
-
 use bytes::Bytes;
 use serde::Serialize;
-use tokio::time::Instant;
 
-use super::{ArmSim, PUBLISH_RATE};
-use crate::actors::gateway::gauges::Gauges;
-use crate::actors::node::{Frame, Publish};
+use super::node::{ArmSim, PUBLISH_RATE};
+use super::state::telemetry::{Batch, Window, energy};
+use crate::actors::node::{FrameOut, Publish};
 use crate::math::arm::State;
-use crate::math::count::in_f64;
-use crate::math::dynamics;
 use crate::math::pacer::CATCH_UP;
-use crate::math::simulation::Simulation;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::{
     self, Clock, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Stamp,
@@ -25,128 +18,9 @@ use crate::protocol::messages::{
 
 /// The frame in which everything is expressed.
 const FRAME_ID: &str = "world";
-/// Rates are given over at least this long: over less they say nothing.
-const SHORTEST_WINDOW: Duration = Duration::from_millis(250);
-
-/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for control.
+/// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for
+/// control.
 const ESTIMATE_TICKS: u64 = 6;
-
-/// Counts between two messages of `/diagnostics`, and the topics that somebody wants.
-pub(super) struct Telemetry {
-    gauges: Arc<Gauges>,
-    wanted: Vec<Topic>,
-    /// Publishing ticks so far.
-    ticks: u64,
-    /// Energy when it was last changed from outside \[J\]: what the drift is measured from.
-    energy_reference: f64,
-    window: Window,
-    /// Wall time that the latest wake-up left owed \[s\].
-    owed: f64,
-    /// Rates over the window before, for a message that comes early in the present one.
-    last_rates: Rates,
-}
-
-/// Work since `began`.
-struct Window {
-    began: Instant,
-    steps: u64,
-    /// Simulation time \[s\].
-    simulated: f64,
-    /// The longest batch since the last message.
-    longest: Batch,
-}
-
-/// The steps of one wake-up.
-#[derive(Clone, Copy, Default)]
-struct Batch {
-    steps: u64,
-    took: Duration,
-}
-
-impl Batch {
-    /// Time per step \[s\]; 0 where there was none.
-    fn step_time(self) -> f64 {
-        self.took.as_secs_f64() / in_f64(self.steps.max(1))
-    }
-}
-
-#[derive(Clone, Copy, Default)]
-struct Rates {
-    real_time_factor: f64,
-    steps_per_second: f64,
-}
-
-impl Telemetry {
-    pub(super) fn new<const N: usize>(gauges: Arc<Gauges>, simulation: &Simulation<N>) -> Self {
-        Self {
-            gauges,
-            wanted: Vec::new(),
-            ticks: 0,
-            energy_reference: energy(simulation),
-            window: Window::new(),
-            owed: 0.0,
-            last_rates: Rates::default(),
-        }
-    }
-
-    pub(super) fn set_wanted(&mut self, topic: Topic, wanted: bool) {
-        self.wanted.retain(|&one| one != topic);
-        if wanted {
-            self.wanted.push(topic);
-        }
-    }
-
-    pub(super) fn wants(&self, topic: Topic) -> bool {
-        self.wanted.contains(&topic)
-    }
-
-    /// Counts an estimate of the local error.
-    pub(super) fn count_estimate(&self) {
-        self.gauges.add_estimate();
-    }
-
-    /// Notes a batch of steps and the processor's time that it took.
-    pub(super) fn stepped(&mut self, steps: u64, took: Duration, timestep: f64) {
-        if steps == 0 {
-            return;
-        }
-        self.window.steps += steps;
-        self.window.simulated += in_f64(steps) * timestep;
-        if took > self.window.longest.took {
-            self.window.longest = Batch { steps, took };
-        }
-    }
-
-    /// Notes how many steps a wake-up left owed.
-    pub(super) fn owes(&mut self, steps: u64, timestep: f64) {
-        self.owed = in_f64(steps) * timestep;
-    }
-
-    /// Whether the arm lags so far behind wall time that it soon has to drop some, or does so already.
-    fn lags(&self) -> bool {
-        self.owed > CATCH_UP.as_secs_f64() / 2.0
-    }
-}
-
-impl Window {
-    fn new() -> Self {
-        Self {
-            began: Instant::now(),
-            steps: 0,
-            simulated: 0.0,
-            longest: Batch::default(),
-        }
-    }
-
-    /// Rates since the window began; `None` while it is too short to tell.
-    fn rates(&self) -> Option<Rates> {
-        let elapsed = self.began.elapsed();
-        (elapsed >= SHORTEST_WINDOW).then(|| Rates {
-            real_time_factor: self.simulated / elapsed.as_secs_f64(),
-            steps_per_second: in_f64(self.steps) / elapsed.as_secs_f64(),
-        })
-    }
-}
 
 impl<const N: usize> ArmSim<N> {
     /// Publishes what is due at a tick.
@@ -197,7 +71,7 @@ impl<const N: usize> ArmSim<N> {
     }
 
     fn publish_frame(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {
-        let frame = Frame::unwritten(write);
+        let frame = FrameOut::unwritten(write);
         self.publish.do_send(Publish { topic, frame });
     }
 
@@ -303,10 +177,6 @@ impl<const N: usize> ArmSim<N> {
             values,
         }
     }
-}
-
-fn energy<const N: usize>(simulation: &Simulation<N>) -> f64 {
-    dynamics::energy(simulation.arm(), simulation.state())
 }
 
 fn entry(key: &str, value: impl Into<String>) -> KeyValue<'_> {

@@ -1,20 +1,23 @@
 //! `/arm_sim/integration_step`: the four methods on `x'' = f(t)`, done on the worker pool, apart from the live arm.
 //!
-//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a time.
+//! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
+//! time.
 //!
 //! **Invariant:** nothing here knows the arm; whatever is asked, the arm and the other clients go on.
 
-mod wire;
+mod services;
 
 use actix::prelude::*;
 
+pub use self::services::{IntegrationStep, NotIntegrated};
 use super::answering::{NUMBER_BYTES, Work, answer};
 use super::workers::WorkerPool;
-use crate::actors::node::{Ask, Call};
+use crate::actors::node::Call;
+use crate::actors::wire::Nodes;
 use crate::math::expression::Expression;
-use crate::math::integrator::Method;
-use crate::math::particle::{Particle, ParticleError};
-use crate::protocol::op::fields::{Rejection, Rejections};
+use crate::math::particle::Particle;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::fields::{RejectedField, Rejections};
 
 /// Expression nodes evaluated between two looks at the clock: some hundred microseconds.
 const NODES_PER_LOOK: u64 = 50_000;
@@ -34,42 +37,11 @@ impl Integration {
     pub fn new(workers: WorkerPool) -> Self {
         Self { workers }
     }
-}
 
-// ---- messages -------------------------------------------------------------------------------------------------------
-
-/// Integrates a particle of one degree of freedom. All or nothing.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct IntegrationStep {
-    /// Its acceleration as a formula \[m/s²\], of t in s.
-    pub function: Option<String>,
-    /// Where it starts \[m\].
-    pub x0: Option<f64>,
-    /// How fast \[m/s\]; 0 if it is not said.
-    pub xdot0: Option<f64>,
-    /// Length of a step \[s\], greater than 0.
-    pub dt: Option<f64>,
-    /// How many.
-    pub steps: Option<u64>,
-    /// The method that takes them.
-    pub method: Option<Method>,
-    /// Fields that were not valid.
-    pub rejected: Rejections,
-}
-
-impl Ask for IntegrationStep {
-    type Answer = Result<Box<Particle>, NotIntegrated>;
-}
-
-/// Why nothing was integrated.
-#[derive(Debug, thiserror::Error)]
-pub enum NotIntegrated {
-    /// Fields were not valid.
-    #[error("{0}")]
-    Rejected(Rejections),
-    /// They do not go together.
-    #[error(transparent)]
-    Particle(#[from] ParticleError),
+    /// Enters this node's service into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve_long::<IntegrationStep>(Service::IntegrationStep, address.clone());
+    }
 }
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -130,7 +102,7 @@ impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
 fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
     let function = ask.function.as_deref().map(Expression::parse);
     let mut rejected = match &function {
-        Some(Err(why)) => Rejection::refused("function:", why).into(),
+        Some(Err(why)) => RejectedField::refused("function:", why).into(),
         _ => Rejections::default(),
     };
     rejected.append(ask.rejected);

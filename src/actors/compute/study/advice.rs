@@ -2,15 +2,220 @@
 //!
 //! **Invariant:** every answer has been run, and the arm hears of none.
 
-use super::{NotPlanned, NotSuggested, PlanRun, PlannedRun, SuggestGains, Suggested};
-use crate::actors::arm::sim::Present;
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::reading::taken;
+use crate::actors::arm::sim::{FieldByField as _, Present, SetGains, SetParams};
 use crate::actors::compute::answering::Work;
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Answered, Callable};
 use crate::math::arm::{ArmError, State};
+use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::study::control_loop::ControlLoop;
-use crate::study::gains::{GainsSearch, Wish};
+use crate::study::gains::{GainsError, GainsSearch, SuggestedGains, Wish};
 use crate::study::linear::no_control;
-use crate::study::planner::{Planning, Task};
+use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+/// Looks for gains by which every move settles in time, with a margin of stability.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SuggestGains<const N: usize> {
+    /// Time in which every move is to settle \[s\], greater than 0.
+    pub settling_time: Option<f64>,
+    /// How many timesteps the smallest stable timestep over all poses is to be, at least 1.
+    pub margin: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub timestep: Option<f64>,
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+}
+
+impl<const N: usize> Ask for SuggestGains<N> {
+    type Answer = Result<Suggested<N>, NotSuggested>;
+}
+
+/// Gains that have been tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Suggested<const N: usize> {
+    /// The gains, and how they fared.
+    pub found: SuggestedGains<N>,
+    /// The timestep that they are for \[s\].
+    pub timestep: f64,
+}
+
+/// Why no gains are suggested.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotSuggested {
+    /// There can't be such an arm.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// There are no such gains.
+    #[error(transparent)]
+    Gains(#[from] GainsError),
+}
+
+/// Looks for the cheapest method and timestep that keep a run within an error.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanRun<const N: usize> {
+    /// The error of the end effector that may be made \[m\], greater than 0.
+    pub error: f64,
+    /// How long the run is \[s\], greater than 0.
+    pub duration: Option<f64>,
+    /// Whether the gains that are set control the arm where the question has none.
+    pub servo: bool,
+    /// Where it starts \[rad\].
+    pub q0: Option<[f64; N]>,
+    /// How fast \[rad/s\].
+    pub qdot0: Option<[f64; N]>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+    /// Gains that are to be others.
+    pub gains: Option<SetGains<N>>,
+    /// The setpoint \[rad\], at rest.
+    pub setpoint: Option<[f64; N]>,
+}
+
+impl<const N: usize> Ask for PlanRun<N> {
+    type Answer = Result<PlannedRun, NotPlanned>;
+}
+
+/// A plan that has been tried.
+#[derive(Debug, Clone)]
+pub struct PlannedRun {
+    /// The cheapest.
+    pub best: Candidate,
+    /// All that were tried and good enough.
+    pub planned: Planned,
+    /// Whether a controller holds the arm: its period is then the timestep.
+    pub controlled: bool,
+}
+
+/// Why there is no plan.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotPlanned {
+    /// There can't be such an arm.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// There can't be such a plan.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// Nothing was good enough.
+    #[error("no plan was found")]
+    Nothing,
+}
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+impl<const N: usize> Callable for SuggestGains<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            settling_time: fields.number("settling_time", Bound::Positive),
+            margin: fields.number("margin", Bound::Positive),
+            timestep: fields.number("timestep", Bound::Positive),
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            params: fields.object("params", SetParams::of),
+        };
+        if ask.margin.is_some_and(|margin| margin < 1.0) {
+            fields.refuse("margin", &"must be at least 1");
+        }
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Answered for SuggestGains<N> {
+    fn write(answer: Result<Suggested<N>, NotSuggested>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            kp: Vec<f64>,
+            ki: Vec<f64>,
+            kd: Vec<f64>,
+            timestep_limit: Option<f64>,
+            certified: bool,
+            margin: Option<f64>,
+            settled_after: f64,
+        }
+        to.outcome(answer.map(|Suggested { found, timestep }| Values {
+            kp: found.gains.kp.to_vec(),
+            ki: found.gains.ki.to_vec(),
+            kd: found.gains.kd.to_vec(),
+            timestep_limit: found.limit,
+            certified: found.certified,
+            margin: found.limit.map(|limit| limit / timestep),
+            settled_after: found.settled_after,
+        }))
+    }
+}
+
+impl<const N: usize> Callable for PlanRun<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            // The catalog requires it: where it is not there, the question is rejected.
+            error: fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
+            duration: fields.number("duration", Bound::Positive),
+            servo: fields.boolean("servo").unwrap_or(false),
+            q0: fields.array("q0", Bound::Finite),
+            qdot0: fields.array("qdot0", Bound::Finite),
+            params: fields.object("params", SetParams::of),
+            gains: fields.object("gains", SetGains::of),
+            setpoint: fields.array("setpoint", Bound::Finite),
+        };
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Answered for PlanRun<N> {
+    fn write(answer: Result<PlannedRun, NotPlanned>, to: &Address) -> Bytes {
+        to.outcome(answer.map(PlanValues::from))
+    }
+}
+
+#[derive(Serialize)]
+struct PlanValues {
+    integrator: &'static str,
+    timestep: f64,
+    control_period: Option<f64>,
+    evaluations_per_second: f64,
+    error: f64,
+    error_uncertainty: f64,
+    methods: Vec<&'static str>,
+    timesteps: Vec<f64>,
+    evaluations: Vec<u64>,
+    errors: Vec<f64>,
+}
+
+impl From<PlannedRun> for PlanValues {
+    fn from(run: PlannedRun) -> Self {
+        let PlannedRun {
+            best,
+            planned,
+            controlled,
+        } = run;
+        let all = || planned.candidates.iter().rev();
+        Self {
+            integrator: best.method.name(),
+            timestep: best.timestep,
+            control_period: controlled.then_some(best.timestep),
+            evaluations_per_second: f64::from(best.method.evaluations()) / best.timestep,
+            error: best.error,
+            error_uncertainty: planned.uncertainty,
+            methods: all().map(|one| one.method.name()).collect(),
+            timesteps: all().map(|one| one.timestep).collect(),
+            evaluations: all().map(|one| one.evaluations).collect(),
+            errors: all().map(|one| one.error).collect(),
+        }
+    }
+}
+
+// ---- work -----------------------------------------------------------------------------------------------------------
 
 /// Time to settle in unless it is said \[s\]: what the default gains promise of the default arms.
 const DEFAULT_SETTLING: f64 = 4.0;

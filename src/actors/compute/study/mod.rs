@@ -1,15 +1,14 @@
 //! `/study/*`: predictions and offline runs of the arm, done on the worker pool, apart from the live arm.
 //!
-//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is. A connection
-//! hands over one computation at a time.
+//! A value that a request leaves out is asked of the arm when the computation begins; the arm itself is left as it is.
+//! A connection hands over one computation at a time.
 //!
 //! **Invariant:** a call is answered once, and neither the arm nor another client waits for it.
 
 mod advice;
-mod messages;
+mod reading;
 mod rollout;
 mod stability;
-mod wire;
 
 use std::time::Instant;
 
@@ -17,17 +16,17 @@ use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use self::advice::{GainsWork, PlanWork};
-pub use self::messages::{
-    NotPlanned, NotRun, NotSuggested, PlanRun, PlannedRun, PredictStability, Predicted, Ran,
-    RunOffline, SuggestGains, Suggested,
-};
+pub use self::advice::{NotPlanned, NotSuggested, PlanRun, PlannedRun, SuggestGains, Suggested};
 use self::rollout::RolloutWork;
+pub use self::rollout::{NotRun, Ran, RunOffline};
 use self::stability::StabilityWork;
+pub use self::stability::{PredictStability, Predicted};
 use super::answering::{Work, answer};
 use super::workers::{Computation, Progress, RUNTIME, WorkerPool};
 use crate::actors::arm::sim::{ArmSettings, HeldLimit, Present};
 use crate::actors::node::{Call, Reply, Unserved};
-use crate::protocol::catalog::Node;
+use crate::actors::wire::Nodes;
+use crate::protocol::catalog::{Node, Service};
 use crate::study::control_loop::ControlLoop;
 use crate::study::stability::limit_held;
 
@@ -58,6 +57,14 @@ impl<const N: usize> Study<N> {
             Ok(present) => answer(&study.workers, reply, work(present)),
             Err(_) => reply.refuse(Unserved::NoAnswer(Node::ArmSim.name())),
         }));
+    }
+
+    /// Enters this node's services into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<PredictStability<N>>(Service::Stability, address.clone());
+        nodes.serve_long::<RunOffline<N>>(Service::Rollout, address.clone());
+        nodes.serve::<SuggestGains<N>>(Service::SuggestGains, address.clone());
+        nodes.serve::<PlanRun<N>>(Service::Plan, address.clone());
     }
 }
 

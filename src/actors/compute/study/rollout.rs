@@ -7,15 +7,214 @@
 
 use std::time::Duration;
 
-use super::{NotRun, Ran, RunOffline};
-use crate::actors::arm::sim::Present;
+use bytes::Bytes;
+
+use super::reading::taken;
+use crate::actors::arm::sim::{FieldByField as _, Present, SetGains, SetParams};
 use crate::actors::compute::answering::{NUMBER_BYTES, Work};
-use crate::actors::compute::work_clock;
-use crate::math::arm::State;
+use crate::actors::node::Ask;
+use crate::actors::resources::work_clock;
+use crate::actors::wire::{Address, Callable, Streamed};
+use crate::math::arm::{ArmError, State};
+use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::wire::streamed::StreamedResponse;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
-use crate::study::rollout::{Plan, Rollout};
+use crate::study::rollout::{Deviation, MAX_SAMPLES, Plan, Rollout, RolloutError};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+/// Runs the arm offline.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunOffline<const N: usize> {
+    /// Where it starts \[rad\]; 0 if it is not said.
+    pub q0: Option<[f64; N]>,
+    /// How fast \[rad/s\]; 0 if it is not said.
+    pub qdot0: Option<[f64; N]>,
+    /// How long \[s\], greater than 0.
+    pub duration: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub timestep: Option<f64>,
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+    /// The gains; without them nothing controls the arm. A part that is left out is switched off.
+    pub gains: Option<SetGains<N>>,
+    /// The setpoint \[rad\], at rest.
+    pub setpoint: Option<[f64; N]>,
+    /// How many samples.
+    pub samples: Option<u64>,
+    /// Whether to run a reference too.
+    pub reference: Option<bool>,
+}
+
+impl<const N: usize> Ask for RunOffline<N> {
+    type Answer = Result<Box<Ran<N>>, NotRun>;
+}
+
+/// A run that has been made.
+pub struct Ran<const N: usize> {
+    /// The run.
+    pub run: Rollout<N>,
+    /// The time of a worker that it took, alone.
+    pub took: Duration,
+}
+
+/// Why nothing was run.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum NotRun {
+    /// There can't be such an arm.
+    #[error("params {0}")]
+    Params(#[from] ArmError),
+    /// There can't be such a run.
+    #[error(transparent)]
+    Plan(#[from] RolloutError),
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+/// Samples encoded between two looks at the clock: some tens of microseconds.
+const SAMPLES_PER_LOOK: usize = 256;
+
+impl<const N: usize> Callable for RunOffline<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            q0: fields.array("q0", Bound::Finite),
+            qdot0: fields.array("qdot0", Bound::Finite),
+            duration: fields.number("duration", Bound::Positive),
+            timestep: fields.number("timestep", Bound::Positive),
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            params: fields.object("params", SetParams::of),
+            gains: fields.object("gains", SetGains::of),
+            setpoint: fields.array("setpoint", Bound::Finite),
+            samples: fields.count("samples", MAX_SAMPLES),
+            reference: fields.boolean("reference"),
+        };
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Streamed for RunOffline<N> {
+    type Writer = Result<RolloutWriter<N>, Bytes>;
+
+    fn begin(answer: Result<Box<Ran<N>>, NotRun>, to: &Address) -> Self::Writer {
+        match answer {
+            Ok(ran) => Ok(RolloutWriter::new(*ran, to)),
+            Err(why) => Err(to.failure(&why.to_string())),
+        }
+    }
+
+    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
+        match writer {
+            Ok(encoding) => encoding.advance(),
+            Err(failure) => Some(failure.clone()),
+        }
+    }
+}
+
+/// The answer, written a slice at a time: it may be 30 MB.
+pub struct RolloutWriter<const N: usize> {
+    run: Rollout<N>,
+    took: Duration,
+    writer: StreamedResponse,
+    /// Which of the arrays is being written.
+    column: usize,
+    /// Its next entry.
+    entry: usize,
+}
+
+/// The arrays, in the order in which they are written.
+const ARRAYS: [&str; 5] = [
+    "{\"times\":[",
+    "],\"positions\":[",
+    "],\"velocities\":[",
+    "],\"efforts\":[",
+    "],\"energy\":[",
+];
+
+impl<const N: usize> RolloutWriter<N> {
+    fn new(Ran { run, took }: Ran<N>, to: &Address) -> Self {
+        Self {
+            run,
+            took,
+            writer: StreamedResponse::new(to.name(), to.id()),
+            column: 0,
+            entry: 0,
+        }
+    }
+
+    /// Writes some more; the frame, once it is whole.
+    fn advance(&mut self) -> Option<Bytes> {
+        let Some(head) = ARRAYS.get(self.column) else {
+            return Some(self.finish());
+        };
+        if self.entry == 0 {
+            self.writer.raw(head);
+        }
+        let samples = self.run.times().len();
+        let end = samples.min(self.entry + SAMPLES_PER_LOOK);
+        for entry in self.entry..end {
+            if entry > 0 {
+                self.writer.raw(",");
+            }
+            let run = &self.run;
+            match self.column {
+                0 => number(&mut self.writer, run.times().get(entry)),
+                1 => row(&mut self.writer, run.positions().get(entry)),
+                2 => row(&mut self.writer, run.velocities().get(entry)),
+                3 => row(&mut self.writer, run.efforts().get(entry)),
+                _ => number(&mut self.writer, run.energy().get(entry)),
+            }
+        }
+        self.entry = end;
+        if end == samples {
+            self.column += 1;
+            self.entry = 0;
+        }
+        None
+    }
+
+    fn finish(&mut self) -> Bytes {
+        // An error that is known for a part of the samples only is none that could be compared with another method's.
+        let followed = self
+            .run
+            .deviation()
+            .filter(|deviation| deviation.errors.len() == self.run.times().len());
+        let error = followed.and_then(Deviation::known).unwrap_or(f64::NAN);
+        let uncertainty = followed.map_or(f64::NAN, Deviation::largest_uncertainty);
+        let writer = &mut self.writer;
+        writer.raw(&format!(
+            "],\"evaluations\":{},\"wall_time\":",
+            self.run.evaluations()
+        ));
+        writer.number(self.took.as_secs_f64());
+        writer.raw(",\"error\":");
+        writer.number(error);
+        writer.raw(",\"error_uncertainty\":");
+        writer.number(uncertainty);
+        writer.raw("}");
+        std::mem::take(writer).finish(true, "")
+    }
+}
+
+fn number(writer: &mut StreamedResponse, value: Option<&f64>) {
+    writer.number(value.copied().unwrap_or(f64::NAN));
+}
+
+fn row<const N: usize>(writer: &mut StreamedResponse, values: Option<&[f64; N]>) {
+    for (joint, value) in values.into_iter().flatten().enumerate() {
+        writer.raw(if joint == 0 { "[" } else { "," });
+        writer.number(*value);
+    }
+    writer.raw("]");
+}
+// ---- work -----------------------------------------------------------------------------------------------------------
 
 /// How long a run is unless it is said \[s\].
 const DEFAULT_DURATION: f64 = 10.0;

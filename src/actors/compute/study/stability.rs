@@ -6,14 +6,132 @@
 //!
 //! **Invariant:** a limit is there only where something limits, and 0 where no timestep is stable; never made up.
 
-use super::{PredictStability, Predicted};
-use crate::actors::arm::sim::Present;
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::reading::taken;
+use crate::actors::arm::sim::{FieldByField as _, Present, SetGains, SetParams};
 use crate::actors::compute::answering::Work;
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Answered, Callable};
 use crate::math::arm::ArmError;
+use crate::math::integrator::Method;
 use crate::math::pid::Setpoint;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::study::control_loop::ControlLoop;
 use crate::study::motion::Motion;
-use crate::study::stability::LimitSearch;
+use crate::study::stability::{ADVISED_PART, LimitSearch, Limits};
+
+// ---- question -------------------------------------------------------------------------------------------------------
+
+/// Predicts the largest stable timesteps of a control loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PredictStability<const N: usize> {
+    /// The method that takes the steps.
+    pub method: Option<Method>,
+    /// Gains that are to be others.
+    pub gains: Option<SetGains<N>>,
+    /// Parameters of the arm that are to be others.
+    pub params: Option<SetParams<N>>,
+    /// The setpoint \[rad\], at rest.
+    pub setpoint: Option<[f64; N]>,
+}
+
+impl<const N: usize> Ask for PredictStability<N> {
+    type Answer = Result<Box<Predicted<N>>, ArmError>;
+}
+
+/// A prediction.
+pub struct Predicted<const N: usize> {
+    /// The largest stable timesteps.
+    pub limits: Limits<N>,
+    /// The motion that is ahead of the arm as it is now, and what timestep it bears.
+    pub motion: Motion,
+}
+
+// ---- reading and writing --------------------------------------------------------------------------------------------
+
+impl<const N: usize> Callable for PredictStability<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let ask = Self {
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            gains: fields.object("gains", SetGains::of),
+            params: fields.object("params", SetParams::of),
+            setpoint: fields.array("setpoint", Bound::Finite),
+        };
+        taken(ask, fields)
+    }
+}
+
+impl<const N: usize> Answered for PredictStability<N> {
+    fn write(answer: Result<Box<Predicted<N>>, ArmError>, to: &Address) -> Bytes {
+        match answer {
+            Ok(predicted) => {
+                let Predicted { limits, motion } = *predicted;
+                to.response(&StabilityValues::new(limits, motion), "")
+            }
+            Err(why) => to.failure(&format!("params {why}")),
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct StabilityValues {
+    timestep_limit_held: Option<f64>,
+    timestep_limit_continuous: Option<f64>,
+    equilibrium: Vec<f64>,
+    equilibrium_kind: &'static str,
+    minimum_over_poses_held: Option<f64>,
+    minimum_over_poses_continuous: Option<f64>,
+    minimum_over_poses_bound: Option<f64>,
+    certified: bool,
+    worst_pose: Option<Vec<f64>>,
+    critical: Option<CriticalValues>,
+    timestep_limit_motion: Option<f64>,
+    motion_speed: f64,
+    advised_timestep: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct CriticalValues {
+    growth_per_step: f64,
+    frequency: f64,
+    joint: usize,
+}
+
+impl StabilityValues {
+    fn new<const N: usize>(limits: Limits<N>, motion: Motion) -> Self {
+        let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
+        let advised = [
+            limits.advised,
+            bears.map(|timestep| ADVISED_PART * timestep),
+        ];
+        Self {
+            timestep_limit_held: limits.held,
+            timestep_limit_continuous: limits.continuous,
+            equilibrium: limits.equilibrium.to_vec(),
+            equilibrium_kind: limits.rest.name(),
+            minimum_over_poses_held: limits.minimum_held,
+            minimum_over_poses_continuous: limits.minimum_continuous,
+            minimum_over_poses_bound: limits.bound,
+            certified: limits.certified,
+            worst_pose: limits.worst_pose.map(|pose| pose.to_vec()),
+            critical: limits.critical.map(|critical| CriticalValues {
+                growth_per_step: critical.growth_per_step,
+                frequency: critical.frequency,
+                joint: critical.joint,
+            }),
+            timestep_limit_motion: bears,
+            motion_speed: motion.speed,
+            advised_timestep: advised.into_iter().flatten().reduce(f64::min),
+        }
+    }
+}
+
+// ---- work -----------------------------------------------------------------------------------------------------------
 
 /// A prediction on its way.
 pub(super) enum StabilityWork<const N: usize> {

@@ -1,22 +1,29 @@
 //! Whose turn it is on the workers: whoever has had least of their time.
 //!
-//! Fair queueing by a clock that advances, while work is done, at the pace at which each client would be served if all who
-//! are there were served at once (Demers, Keshav and Shenker, *Analysis and Simulation of a Fair Queueing Algorithm*, 1989).
-//! Each piece of work has its own reading, which begins at the clock's and advances by the time that it has had; the least
-//! reading is next. So a newcomer does not wait for what others have begun, nor is it served before them for ever: who has
-//! had more than a share stays behind until the clock has caught up, also when it leaves and comes back.
+//! Fair queueing by a clock that advances, while work is done, at the pace at which each client would be served if all
+//! who are there were served at once (Demers, Keshav and Shenker, *Analysis and Simulation of a Fair Queueing
+//! Algorithm*, 1989). Each piece of work has its own reading, which begins at the clock's and advances by the time that
+//! it has had; the least reading is next. So a newcomer does not wait for what others have begun, nor is it served
+//! before them for ever: who has had more than a share stays behind until the clock has caught up, also when it leaves
+//! and comes back.
 //!
-//! **Invariant:** while several wait, none has had more than another that came with it by more than what each had in one turn.
+//! **Invariant:** while several wait, none has had more than another that came with it by more than what each had in
+//! one turn.
 
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
-use super::Owner;
+use crate::actors::ConnectionId;
+
+/// The client for which a computation is done; none for the runtime's own.
+pub type Owner = Option<ConnectionId>;
+/// For whom the runtime's own computations are done.
+pub const RUNTIME: Owner = None;
 
 /// Pieces of work that take turns.
 pub(super) struct Turns<T> {
     /// Work that waits for its turn; of equal readings the first is next.
-    waiting: VecDeque<(Place, T)>,
+    waiting: VecDeque<(Ticket, T)>,
     /// Pieces of work that have their turn.
     running: u32,
     clock: Duration,
@@ -26,7 +33,7 @@ pub(super) struct Turns<T> {
 
 /// Whose a piece of work is, and its reading.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Place {
+pub(super) struct Ticket {
     of: Owner,
     reading: Duration,
 }
@@ -47,17 +54,17 @@ impl<T> Turns<T> {
     pub(super) fn enter(&mut self, of: impl Into<Owner>, work: T) {
         let of = of.into();
         let reading = self.ahead.remove(&of).unwrap_or_default();
-        self.wait(Place { of, reading }, work);
+        self.wait(Ticket { of, reading }, work);
     }
 
     /// Puts work back that was kept away, and so claims nothing for that time.
-    pub(super) fn wait(&mut self, mut place: Place, work: T) {
+    pub(super) fn wait(&mut self, mut place: Ticket, work: T) {
         place.reading = place.reading.max(self.clock);
         self.waiting.push_back((place, work));
     }
 
     /// Whose turn it is; to be given back by [`Turns::again`] or [`Turns::leave`].
-    pub(super) fn next(&mut self) -> Option<(Place, T)> {
+    pub(super) fn next(&mut self) -> Option<(Ticket, T)> {
         let readings = self.waiting.iter().enumerate();
         let (least, _) = readings.min_by_key(|(_, (place, _))| place.reading)?;
         let next = self.waiting.remove(least)?;
@@ -66,14 +73,14 @@ impl<T> Turns<T> {
     }
 
     /// The turn is over and took so long; the work wants another.
-    pub(super) fn again(&mut self, mut place: Place, work: T, took: Duration) {
+    pub(super) fn again(&mut self, mut place: Ticket, work: T, took: Duration) {
         place.reading += took;
         self.end(took);
         self.waiting.push_back((place, work));
     }
 
     /// The turn is over and took so long; the work is done, or kept away for a while.
-    pub(super) fn leave(&mut self, mut place: Place, took: Duration) -> Place {
+    pub(super) fn leave(&mut self, mut place: Ticket, took: Duration) -> Ticket {
         place.reading += took;
         self.end(took);
         self.ahead.retain(|_, reading| *reading > self.clock);
@@ -94,7 +101,7 @@ impl<T> Turns<T> {
         self.waiting.drain(..).map(|(_, work)| work).collect()
     }
 
-    /// Those of them that are not to wait any more.
+    /// Takes out the work that is not to wait any more.
     pub(super) fn take_waiting_if(&mut self, is_done: impl Fn(&T) -> bool) -> Vec<T> {
         let waiting = std::mem::take(&mut self.waiting).into_iter();
         let (taken, left) = waiting.partition::<VecDeque<_>, _>(|(_, work)| is_done(work));
@@ -116,7 +123,6 @@ impl<T> Turns<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::actors::ConnectionId;
 
     const SLICE: Duration = Duration::from_millis(1);
 
@@ -165,7 +171,8 @@ mod tests {
         assert!(*most - *least <= 30 * SLICE, "{had:?}");
     }
 
-    /// Five that have computed for minutes: the sixth waits for one turn of each at most, and has a sixth of the time from then on.
+    /// Five that have computed for minutes: the sixth waits for one turn of each at most, and has a sixth of the time
+    /// from then on.
     #[test]
     fn a_newcomer_begins_at_once_and_gets_its_share_and_no_more() {
         let mut turns = entered(1..=5);

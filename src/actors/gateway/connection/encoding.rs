@@ -1,10 +1,8 @@
 //! Topic messages that wait to be encoded for the client, one after the other, on another thread.
 //!
 //! **Invariant:** a client's topic messages keep their order: what comes behind one that is being encoded waits for
-//! it. At most
-//! [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
+//! it.
 
-use std::collections::VecDeque;
 use std::rc::{Rc, Weak};
 
 use tokio::time::sleep;
@@ -13,51 +11,11 @@ use super::outgoing::Outgoing;
 use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN};
 use crate::actors::gateway::messages::{Deliver, Frames};
 use crate::actors::gateway::turns;
-use crate::protocol::outbox::{MAX_TOPIC_BYTES, PLACE_BYTES};
+use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 /// While more bytes of topic messages than this wait for the client, nothing more is encoded for it: it might be
 /// dropped unread.
 const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
-
-/// The messages of one connection that wait.
-#[derive(Default)]
-pub(super) struct Encoding {
-    waiting: VecDeque<Deliver>,
-    /// Their bytes, as they came.
-    bytes: usize,
-    /// Whether there is a task at work.
-    at_work: bool,
-}
-
-impl Encoding {
-    /// Adds a message; gives how many had to go for it.
-    fn push(&mut self, message: Deliver) -> u64 {
-        self.bytes += message.frames.plain_length();
-        self.waiting.push_back(message);
-        self.keep(MAX_TOPIC_BYTES)
-    }
-
-    /// Drops the oldest messages until those that are left, and their places, take no more than `most` bytes; gives
-    /// how many went.
-    pub(super) fn keep(&mut self, most: usize) -> u64 {
-        let mut dropped = 0;
-        while self.bytes + self.waiting.len() * PLACE_BYTES > most && self.pop().is_some() {
-            dropped += 1;
-        }
-        dropped
-    }
-
-    /// How many messages wait, and their bytes.
-    pub(super) fn size(&self) -> (usize, usize) {
-        (self.waiting.len(), self.bytes)
-    }
-
-    fn pop(&mut self) -> Option<Deliver> {
-        let message = self.waiting.pop_front()?;
-        self.bytes -= message.frames.plain_length();
-        Some(message)
-    }
-}
 
 impl Outgoing {
     /// Takes topic messages for the client: into the outbox if they are ready and nothing waits to be encoded, else
@@ -66,16 +24,16 @@ impl Outgoing {
         if !self.is_encoding() && self.pass(&message) {
             return;
         }
-        let mut encoding = self.encoding.borrow_mut();
-        self.count_dropped(encoding.push(message));
-        if !std::mem::replace(&mut encoding.at_work, true) {
-            actix_rt::spawn(Work(Rc::downgrade(self)).run());
+        let mut unencoded = self.unencoded.borrow_mut();
+        self.count_dropped(unencoded.push(message));
+        if !std::mem::replace(&mut unencoded.at_work, true) {
+            actix_rt::spawn(EncodingTask(Rc::downgrade(self)).run());
         }
     }
 
     /// Whether messages wait to be encoded.
     pub(super) fn is_encoding(&self) -> bool {
-        self.encoding.borrow().at_work
+        self.unencoded.borrow().at_work
     }
 
     /// Puts messages that are ready into the outbox; returns false if these are not.
@@ -99,22 +57,22 @@ impl Outgoing {
 }
 
 /// The task; the connection may end before it.
-struct Work(Weak<Outgoing>);
+struct EncodingTask(Weak<Outgoing>);
 
-impl Drop for Work {
+impl Drop for EncodingTask {
     fn drop(&mut self) {
         if let Some(outgoing) = self.0.upgrade() {
-            outgoing.encoding.borrow_mut().at_work = false;
+            outgoing.unencoded.borrow_mut().at_work = false;
             // The writer may have waited for this to end.
             outgoing.tell();
         }
     }
 }
 
-impl Work {
+impl EncodingTask {
     async fn run(self) {
         while let Some(outgoing) = self.0.upgrade() {
-            let next = outgoing.encoding.borrow_mut().pop();
+            let next = outgoing.unencoded.borrow_mut().pop();
             let Some(message) = next else {
                 return;
             };

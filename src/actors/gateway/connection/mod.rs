@@ -21,6 +21,7 @@ mod reception;
 mod shared;
 mod talk;
 mod transport;
+mod unencoded;
 mod unfinished;
 #[cfg(feature = "web")]
 mod watched;
@@ -41,10 +42,10 @@ use self::gate::Gate;
 use self::reception::Reception;
 use self::shared::Shared;
 pub use super::ends::Ends;
-use super::gauges::Gauges;
 use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
 use super::registry::Registry;
 use crate::actors::panics::{contain, contained};
+use crate::actors::resources::gauges::Gauges;
 use crate::protocol::catalog::{Node, Service, Topic};
 
 /// Topics that a response of the arm makes old: after the response to a pause, no message from before it may follow.
@@ -107,6 +108,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             respond: address.clone().recipient(),
             configure: address.clone().recipient(),
             finish: address.recipient(),
+            wants_text: Arc::clone(&self.shared.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
             backlog: Arc::clone(&self.shared.outgoing.backlog),
             account: Arc::clone(&self.shared.account),

@@ -18,11 +18,11 @@ use bytes::Bytes;
 use tokio::sync::Notify;
 use tokio::time::Instant;
 
-use super::encoding::Encoding;
-use crate::actors::gateway::budget::{Account, MESSAGES_LEFT, free_elsewhere};
-use crate::actors::gateway::gauges::Gauges;
+use super::unencoded::Unencoded;
 use crate::actors::gateway::limits::{BATCH_BYTES, BATCH_FRAMES, LINGER, STALL_LIMIT};
 use crate::actors::gateway::messages::{Throttle, Underway};
+use crate::actors::resources::budget::{Account, MESSAGES_LEFT, free_elsewhere};
+use crate::actors::resources::gauges::Gauges;
 use crate::protocol::outbox::Outbox;
 
 /// An outbox of no more is freed where it stands: that takes a fraction of a millisecond.
@@ -32,7 +32,7 @@ const FEW_BYTES: usize = 256 * 1024;
 pub(super) struct Outgoing {
     outbox: RefCell<Outbox>,
     /// Topic messages that have to be encoded first.
-    pub(super) encoding: RefCell<Encoding>,
+    pub(super) unencoded: RefCell<Unencoded>,
     /// Messages whose publishers wait until they have been offered to the socket.
     underway: RefCell<Vec<Underway>>,
     /// The writer waits for its turn.
@@ -55,7 +55,7 @@ impl Outgoing {
     pub(super) fn new(gauges: Arc<Gauges>, account: Arc<Account>) -> Rc<Self> {
         Rc::new(Self {
             outbox: RefCell::new(Outbox::new()),
-            encoding: RefCell::default(),
+            unencoded: RefCell::default(),
             underway: RefCell::default(),
             in_line: Cell::new(false),
             singly: Cell::new(false),
@@ -239,7 +239,7 @@ impl Outgoing {
     /// Tells what waits now. Responses are in the account already, each by itself.
     fn recount(&self) {
         let outbox = self.outbox.borrow();
-        let (count, bytes) = self.encoding.borrow().size();
+        let (count, bytes) = self.unencoded.borrow().size();
         self.backlog
             .store(outbox.response_cost(), Ordering::Relaxed);
         self.account
@@ -253,7 +253,7 @@ impl Outgoing {
             let mut outbox = self.outbox.borrow_mut();
             let before = outbox.dropped();
             outbox.keep_topics(MESSAGES_LEFT);
-            let unencoded = self.encoding.borrow_mut().keep(0);
+            let unencoded = self.unencoded.borrow_mut().keep(0);
             let dropped = outbox.dropped() - before + unencoded;
             drop(outbox);
             self.count_dropped(dropped);
@@ -265,7 +265,7 @@ impl Outgoing {
 
     /// Forgets what waits for the client.
     pub(super) fn empty(&self) {
-        self.encoding.borrow_mut().keep(0);
+        self.unencoded.borrow_mut().keep(0);
         self.recount();
         let freed = self.account.freeing();
         let waiting = self.outbox.take();

@@ -51,7 +51,7 @@ enum Greeting {
 }
 
 /// How a client is served.
-enum Verdict {
+enum HowServed {
     /// It is spoken with; what has been read of it so far is in here.
     Json(FrameReader),
     /// Its request is answered.
@@ -100,7 +100,7 @@ impl Reception {
 
     /// Has the client show the token, and gives what is to be done about it then. Who does not show it in time, or
     /// has waited longest of too many, is closed.
-    async fn admit<S>(&self, token: &Token, stream: &mut S, first: &mut First) -> Option<Verdict>
+    async fn admit<S>(&self, token: &Token, stream: &mut S, first: &mut First) -> Option<HowServed>
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
@@ -116,8 +116,8 @@ impl Reception {
             }
         };
         match verdict {
-            Verdict::Gone => None,
-            Verdict::Refused { farewell, is_guess } => {
+            HowServed::Gone => None,
+            HowServed::Refused { farewell, is_guess } => {
                 tokio::select! {
                     () = self.dismiss(stream, farewell, is_guess) => {}
                     () = place.lost() => {}
@@ -162,17 +162,17 @@ impl Reception {
         stream: &mut S,
         first: &mut First,
         locked: Option<(&Token, Instant)>,
-    ) -> Verdict
+    ) -> HowServed
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
         let due = locked.map(|(_, due)| due);
         match self.greet(stream, first, due).await {
             Greeting::Json => match locked {
-                None => Verdict::Json(FrameReader::new()),
+                None => HowServed::Json(FrameReader::new()),
                 Some((token, due)) => match unlock(token, stream, first, due).await {
-                    Ok(frames) => Verdict::Json(frames),
-                    Err(why) => Verdict::Refused {
+                    Ok(frames) => HowServed::Json(frames),
+                    Err(why) => HowServed::Refused {
                         farewell: Farewell::Status(why.to_string()),
                         is_guess: why == LockedOut::Wrong,
                     },
@@ -192,35 +192,35 @@ impl Reception {
                     }
                 };
                 match received {
-                    Some(Ok(outcome)) => Verdict::Web(outcome),
-                    Some(Err(refused)) => Verdict::Refused {
+                    Some(Ok(outcome)) => HowServed::Web(outcome),
+                    Some(Err(refused)) => HowServed::Refused {
                         farewell: Farewell::Answer(refused.response),
                         is_guess: refused.is_guess,
                     },
-                    None => Verdict::Gone,
+                    None => HowServed::Gone,
                 }
             }
-            Greeting::Foreign(why) => Verdict::Refused {
+            Greeting::Foreign(why) => HowServed::Refused {
                 farewell: Farewell::Status(why),
                 is_guess: false,
             },
             Greeting::Finished => {
                 let _ = timeout(LINGER, stream.shutdown()).await;
-                Verdict::Gone
+                HowServed::Gone
             }
         }
     }
 
     /// Does what is to be done about a client that the registry knows.
-    async fn serve<S>(self, mut stream: S, id: ConnectionId, first: First, verdict: Verdict)
+    async fn serve<S>(self, mut stream: S, id: ConnectionId, first: First, verdict: HowServed)
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         match verdict {
-            Verdict::Json(frames) => self.serve_json(stream, id, frames, first).await,
+            HowServed::Json(frames) => self.serve_json(stream, id, frames, first).await,
             #[cfg(feature = "web")]
-            Verdict::Web(outcome) => self.serve_web(stream, id, outcome, first).await,
-            Verdict::Refused { farewell, .. } => match farewell {
+            HowServed::Web(outcome) => self.serve_web(stream, id, outcome, first).await,
+            HowServed::Refused { farewell, .. } => match farewell {
                 Farewell::Status(why) => {
                     let _ = self.shared.registry.send(Disconnect(id)).await;
                     self.refuse(&mut stream, &why).await;
@@ -228,7 +228,7 @@ impl Reception {
                 #[cfg(feature = "web")]
                 Farewell::Answer(response) => serve::answer(&mut stream, &response).await,
             },
-            Verdict::Gone => {}
+            HowServed::Gone => {}
         }
     }
 

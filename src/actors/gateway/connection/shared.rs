@@ -7,6 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -14,11 +15,11 @@ use tokio::sync::Notify;
 
 use super::outgoing::Outgoing;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::{Account, Share};
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::limits::{MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING};
 use crate::actors::gateway::messages::Request;
 use crate::actors::gateway::registry::Registry;
+use crate::actors::resources::budget::{Account, Share};
+use crate::actors::resources::gauges::Gauges;
 
 /// The state that the actor, its writer and the reading task share; one thread, so plain cells do.
 pub(super) struct Shared {
@@ -29,6 +30,8 @@ pub(super) struct Shared {
     pub(super) account: Arc<Account>,
     pub(super) outgoing: Rc<Outgoing>,
     computations: RefCell<Computations>,
+    /// Set while the client is told why a call failed in `values` too.
+    pub(super) wants_text: Arc<AtomicBool>,
     /// Something was written or computed: the reader may go on.
     pub(super) room: Notify,
     /// Notified when the client loses its place to one that comes.
@@ -72,6 +75,7 @@ impl Shared {
             outgoing: Outgoing::new(gauges, Arc::clone(&account)),
             account,
             computations: RefCell::default(),
+            wants_text: Arc::default(),
             room: Notify::new(),
             displaced: Arc::default(),
             finishing: Cell::new(false),

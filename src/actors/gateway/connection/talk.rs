@@ -17,10 +17,10 @@ use super::transport::{Inbound, Outbound};
 use super::unfinished::Unfinished;
 use super::writer;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::MODEST;
 use crate::actors::gateway::limits::LINGER;
 use crate::actors::gateway::messages::{Disconnect, Finish, Respond};
 use crate::actors::panics::contained;
+use crate::actors::resources::budget::MODEST;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::wire::frame::FrameReader;
 

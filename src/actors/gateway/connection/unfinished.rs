@@ -10,8 +10,8 @@ use std::time::Duration;
 
 use bytes::BytesMut;
 
-use crate::actors::gateway::budget::{Account, Share};
 use crate::actors::gateway::limits::FRAME_TIME;
+use crate::actors::resources::budget::{Account, Share};
 use crate::protocol::limits::MAX_FRAME;
 
 /// The unfinished input of one client.
@@ -22,7 +22,7 @@ pub(super) struct Unfinished {
     received: usize,
 }
 
-/// What a client has sent before it is clear how it is to be served.
+/// The bytes that a client has sent before it is clear how it is to be served.
 pub(super) struct First {
     pub(super) bytes: BytesMut,
     /// Counts them.
@@ -78,7 +78,7 @@ impl Unfinished {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::actors::gateway::budget::Memory;
+    use crate::actors::resources::budget::Memory;
 
     #[test]
     fn a_frame_has_its_time_and_a_longer_one_as_much_again() {

@@ -14,8 +14,8 @@ use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
 use super::unfinished::Unfinished;
-use crate::actors::gateway::budget::Share;
 use crate::actors::gateway::limits::FRAME_TIME;
+use crate::actors::resources::budget::Share;
 use crate::protocol::limits::MAX_FRAME;
 
 /// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.

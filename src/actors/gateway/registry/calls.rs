@@ -10,9 +10,9 @@ use tokio::time::{Instant, sleep_until};
 
 use super::refusal::Refusal;
 use super::services::{Forwarded, Services, TimedOut};
-use super::state::{Origin, Registry};
+use super::state::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{CALL_BYTES, DEFAULT_TIMEOUT, MAX_BACKLOG, MAX_WAITING_CALLS};
-use crate::actors::gateway::messages::Handled;
+use crate::actors::gateway::messages::{Handled, Overheard};
 use crate::actors::wire::{Caller, ServiceCall};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages;
@@ -24,7 +24,7 @@ impl Registry {
     /// Sends a call to the node or the client that serves it; whatever fails is the call's one response.
     pub(super) fn call(
         &mut self,
-        origin: Origin,
+        origin: FrameOrigin,
         call: CallService,
         ctx: &mut Context<Self>,
     ) -> Handled {
@@ -37,6 +37,12 @@ impl Registry {
         } else if let Some(service) = own {
             match self.nodes.services.get(&service) {
                 Some(node) => {
+                    self.ear.hear(Overheard::Called {
+                        from: origin.from,
+                        service,
+                        id: origin.id.as_ref(),
+                        args: call.args.payload(),
+                    });
                     let name = call.service.into_boxed_str();
                     let registry = ctx.address().recipient();
                     let (caller, ended) = Caller::new(
@@ -50,7 +56,9 @@ impl Registry {
                     node(ServiceCall {
                         service,
                         arguments: call.args,
-                        caller: caller.within(Arc::clone(&client.outlets.account)),
+                        caller: caller
+                            .within(Arc::clone(&client.outlets.account))
+                            .with_errors(client.outlets.error_form()),
                     });
                     return Handled::by_node(ended);
                 }
@@ -68,7 +76,7 @@ impl Registry {
     /// Passes a call on to the client that provides the service.
     fn forward(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         call: &CallService,
         ctx: &mut Context<Self>,
     ) -> Result<(), Refusal> {
@@ -129,7 +137,7 @@ impl Registry {
     /// A provider's answer goes back under the caller's own id.
     pub(super) fn complete(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         service: &str,
         encode: impl FnOnce(&str, Option<&Payload>) -> Bytes,
     ) -> Result<(), Refusal> {

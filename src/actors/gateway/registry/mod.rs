@@ -6,9 +6,12 @@
 mod actions;
 mod calls;
 mod census;
+mod ear;
 mod fan_out;
 mod nodes;
 mod ops;
+mod pursuers;
+mod pursuit;
 mod refusal;
 mod services;
 mod state;
@@ -23,11 +26,12 @@ use self::services::TimedOut;
 use self::state::Client;
 pub use self::state::Registry;
 use super::messages::{
-    Connect, Disconnect, Ended, Finish, FinishAll, Handled, RefuseCalls, Refused, Request, Retire,
-    TakeCensus,
+    Connect, Disconnect, Ended, Finish, FinishAll, Handled, Overhear, Overheard, RefuseCalls,
+    Refused, Request, Retire, TakeCensus,
 };
 use crate::actors::ConnectionId;
 use crate::actors::node::{Publish, Respond};
+use crate::protocol::catalog::Topic;
 use crate::protocol::messages as frames;
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -117,10 +121,11 @@ impl Handler<Publish> for Registry {
 
     fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
         let name = topic.name();
-        if !self.topics.has_subscribers(name) {
+        if !self.is_wanted(name) {
             return;
         }
         let frame = frame.write();
+        self.ear.hear(Overheard::Published(topic, &frame));
         self.fan_out(name, None, |spelling| {
             frames::respelled(name, spelling, &frame)
         });
@@ -140,7 +145,12 @@ impl Handler<Respond> for Registry {
                 .is_none_or(|level| client.verbosity.wants(level))
         {
             let frame = respond.frame.write();
-            if respond.service.is_some() {
+            if let Some(service) = respond.service {
+                self.ear.hear(Overheard::Answered {
+                    to: respond.connection,
+                    service,
+                    frame: &frame,
+                });
                 // A `Caller` has counted it.
                 client.pass(frame, respond.service);
             } else {
@@ -155,6 +165,32 @@ impl Handler<TakeCensus> for Registry {
 
     fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
         MessageResult(self.tally.take())
+    }
+}
+
+impl Handler<Overhear> for Registry {
+    type Result = ();
+
+    fn handle(&mut self, Overhear(eavesdropper): Overhear, _: &mut Context<Self>) {
+        let unwanted: Vec<&str> = Topic::ALL
+            .map(Topic::name)
+            .into_iter()
+            .filter(|topic| !self.topics.has_subscribers(topic))
+            .collect();
+        let was_open = self.ear.is_open();
+        self.ear.lend(eavesdropper);
+        for topic in unwanted {
+            match (was_open, self.ear.is_open()) {
+                (_, true) => self.tell_owner(topic, true),
+                (true, false) => self.let_rest(topic),
+                (false, false) => {}
+            }
+        }
+        for (topic, frame) in &self.latched {
+            if self.topics.has_subscribers(topic.name()) {
+                self.ear.hear(Overheard::Published(*topic, frame));
+            }
+        }
     }
 }
 

@@ -11,24 +11,25 @@ use super::census::Use;
 use super::fan_out::Pace;
 use super::refusal::Refusal;
 use super::services::Provider;
-use super::state::{Origin, Registry};
+use super::state::{FrameOrigin, Registry};
 use super::topics::{Subscription, throttle_of};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS};
-use crate::actors::gateway::messages::{Configure, Handled, Request};
+use crate::actors::gateway::messages::{Configure, Handled, Overheard, Request};
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{Compression, Op, Subscribe};
+use crate::protocol::op::{Compression, Encoding, Op, Subscribe};
+use crate::protocol::ros::stamps::is_ros1_name;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
 
 impl Registry {
     /// Performs one op of a client that is known.
     pub(super) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
-        let origin = Origin {
+        let origin = FrameOrigin {
             from: request.from,
             id: request.id,
         };
@@ -60,9 +61,11 @@ impl Registry {
                 self.advertise_service(&origin, &service, type_name.as_deref())
             }
             Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
-            Op::SetLevel(verbosity) => {
+            Op::Pursue { action, pursuit } => self.pursue(&origin, &action, pursuit),
+            Op::SetLevel { verbosity, errors } => {
                 if let Some(client) = self.clients.get_mut(&origin.from) {
                     client.verbosity = verbosity;
+                    client.set_error_form(errors);
                 }
                 Ok(())
             }
@@ -94,7 +97,7 @@ impl Registry {
 
     fn advertise(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         topic: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -122,7 +125,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unadvertise(&mut self, origin: &Origin, topic: &str) {
+    fn unadvertise(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
@@ -138,7 +141,7 @@ impl Registry {
     /// Delivers a client's message to the topic's subscribers, and to the runtime's own listener if it has one.
     fn publish(
         &mut self,
-        origin: Origin,
+        origin: FrameOrigin,
         topic: &str,
         msg: &Payload,
         heard: Option<Payload>,
@@ -170,6 +173,9 @@ impl Registry {
         let Some(listener) = listener else {
             return Handled::at_once().and_by_subscribers(pace.end());
         };
+        if let Some(topic) = Topic::from_name(topic) {
+            self.ear.hear(Overheard::Heard(topic, msg));
+        }
         let (done, ended) = oneshot::channel();
         listener(TopicMessage {
             msg: heard.unwrap_or_else(|| msg.clone()),
@@ -194,7 +200,7 @@ impl Registry {
         Handled::at_once().and_by_subscribers(pace.end())
     }
 
-    fn subscribe(&mut self, origin: &Origin, subscribe: &Subscribe) -> Result<(), Refusal> {
+    fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
@@ -227,11 +233,11 @@ impl Registry {
             }
             None => None,
         };
+        let first = !self.is_wanted(&absolute);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
         let share = client.register(topic.len() + bytes);
-        let first = !self.topics.has_subscribers(&absolute);
         let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());
@@ -245,7 +251,10 @@ impl Registry {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
-            encoding: subscribe.encoding,
+            encoding: Encoding {
+                ros1_stamps: has_ros1_stamps(subscribe),
+                ..subscribe.encoding
+            },
             _size: size,
             _share: share,
         });
@@ -267,7 +276,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unsubscribe(&mut self, origin: &Origin, topic: &str) {
+    fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };
@@ -295,7 +304,7 @@ impl Registry {
 
     fn advertise_service(
         &mut self,
-        origin: &Origin,
+        origin: &FrameOrigin,
         spelling: &str,
         type_name: Option<&str>,
     ) -> Result<(), Refusal> {
@@ -306,7 +315,8 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains_key(service) {
+        let provided = client.provided.len() + client.pursued.len();
+        if provided >= MAX_PROVIDED && !client.provided.contains_key(service) {
             return Err(Refusal::TooManyProvided);
         }
         let Some(client) = self.clients.get_mut(&origin.from) else {
@@ -334,7 +344,7 @@ impl Registry {
         Ok(())
     }
 
-    fn unadvertise_service(&mut self, origin: &Origin, service: &str) -> Result<(), Refusal> {
+    fn unadvertise_service(&mut self, origin: &FrameOrigin, service: &str) -> Result<(), Refusal> {
         let name = &*names::absolute(service);
         if !self.withdraw_service(name, origin.from) {
             return Err(Refusal::NotProvider(service.to_owned()));
@@ -352,6 +362,17 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
         Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
         _ => Ok(()),
     }
+}
+
+/// Whether stamps are to have the names of ROS 1 too: on a topic of the runtime's own that was asked for by its type of
+/// ROS 1. CDR has no names.
+fn has_ros1_stamps(subscribe: &Subscribe) -> bool {
+    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
+    let asked = subscribe.type_name.as_deref();
+    subscribe.encoding.compression != Compression::CborRaw
+        && own
+            .zip(asked)
+            .is_some_and(|(topic, asked)| is_ros1_name(asked, topic.type_name()))
 }
 
 /// Whether the runtime itself subscribes to the topic.

@@ -10,18 +10,20 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 
 use super::census::{Tally, Use};
+use super::ear::Ear;
 use super::nodes::Nodes;
+use super::pursuers::Pursuers;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
 use super::topics::{Subscription, Topics};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
-use crate::actors::gateway::gauges::Gauges;
 use crate::actors::gateway::limits::{MAX_CONNECTIONS, REGISTRATION_BYTES};
 use crate::actors::gateway::messages::{Outlets, Response};
 use crate::actors::node::Interest;
+use crate::actors::resources::budget::Share;
+use crate::actors::resources::gauges::Gauges;
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::{self as frames, Level};
+use crate::protocol::messages::{self as frames, ErrorForm, Level};
 use crate::protocol::names;
 use crate::protocol::op::Verbosity;
 use crate::protocol::wire::payload::Payload;
@@ -31,6 +33,7 @@ pub struct Registry {
     pub(super) clients: HashMap<ConnectionId, Client>,
     pub(super) topics: Topics,
     pub(super) services: Services,
+    pub(super) pursuers: Pursuers,
     pub(super) nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     pub(super) latched: HashMap<Topic, Bytes>,
@@ -44,6 +47,8 @@ pub struct Registry {
     /// Clients at once.
     pub(super) max_connections: usize,
     pub(super) connections_made: u64,
+    /// Overhears what passes, if anybody does.
+    pub(super) ear: Ear,
     /// Why no call is taken any more, once the runtime is ending.
     pub(super) closed: Option<&'static str>,
 }
@@ -59,6 +64,8 @@ pub(super) struct Client {
     /// In order of their names: the topics' owners hear of its going in that order.
     pub(super) subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
     pub(super) provided: HashMap<Box<str>, Share>,
+    /// Actions.
+    pub(super) pursued: HashMap<Box<str>, Share>,
     /// Which statuses it wants.
     pub(super) verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
@@ -73,6 +80,7 @@ impl Registry {
             clients: HashMap::new(),
             topics: Topics::default(),
             services: Services::default(),
+            pursuers: Pursuers::default(),
             nodes: Nodes::default(),
             latched: HashMap::new(),
             fragmented: Arc::default(),
@@ -81,6 +89,7 @@ impl Registry {
             ended: BTreeSet::new(),
             max_connections: MAX_CONNECTIONS,
             connections_made: 0,
+            ear: Ear::default(),
             closed: None,
         }
     }
@@ -103,6 +112,7 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: BTreeMap::new(),
             provided: HashMap::new(),
+            pursued: HashMap::new(),
             verbosity: Verbosity::ALL,
             answered: None,
         }
@@ -121,6 +131,14 @@ impl Client {
     /// The same with one that has been counted already.
     pub(super) fn pass(&self, frame: Bytes, service: Option<Service>) {
         self.outlets.respond.do_send(Response { frame, service });
+    }
+
+    /// From now on the client is told in this form why a call failed, if one is given.
+    pub(super) fn set_error_form(&self, form: Option<ErrorForm>) {
+        if let Some(form) = form {
+            let wants_text = form == ErrorForm::Text;
+            self.outlets.wants_text.store(wants_text, Ordering::Relaxed);
+        }
     }
 
     /// Takes what a registration costs whose names have so many bytes.
@@ -143,6 +161,7 @@ impl Registry {
         let advertised = std::mem::take(&mut client.advertised);
         let subscriptions = std::mem::take(&mut client.subscriptions);
         let provided = std::mem::take(&mut client.provided);
+        let pursued = std::mem::take(&mut client.pursued);
         for topic in advertised.keys() {
             self.tally.remove(topic, Use::Advertised);
         }
@@ -151,6 +170,13 @@ impl Registry {
         }
         for service in provided.keys() {
             self.withdraw_service(service, id);
+        }
+        for action in pursued.keys() {
+            self.withdraw_action(action, id);
+        }
+        for goal in self.pursuers.take_pursued_by(id) {
+            let why = Refusal::ProviderGone(goal.action.to_string());
+            self.abort(&goal, &why);
         }
         for call in self.services.take_provided_by(id) {
             let why = Refusal::ProviderGone(call.service.to_string());
@@ -162,6 +188,7 @@ impl Registry {
     pub(super) fn forget(&mut self, id: ConnectionId) {
         self.withdraw(id);
         self.services.forget_caller(id);
+        self.pursuers.forget_sender(id);
         self.ended.remove(&id);
         if let Some(client) = self.clients.remove(&id) {
             client.outlets.gone.store(true, Ordering::Relaxed);
@@ -187,11 +214,10 @@ impl Registry {
         self.topics.remove(topic, connection);
         self.tally.remove(&name, Use::Subscribed);
         if !self.topics.has_subscribers(&name) {
-            if let Some(topic) = Topic::from_name(topic) {
-                self.latched.remove(&topic);
-            }
             self.topics.forget_sizes(&name);
-            self.tell_owner(topic, false);
+        }
+        if !self.is_wanted(&name) {
+            self.let_rest(&name);
         }
     }
 
@@ -202,6 +228,19 @@ impl Registry {
             self.tally.withdraw(service);
         }
         provided
+    }
+
+    /// Whether messages on the topic of that absolute name are to be made.
+    pub(super) fn is_wanted(&self, topic: &str) -> bool {
+        self.ear.is_open() || self.topics.has_subscribers(topic)
+    }
+
+    /// Nobody wants messages on that topic any more.
+    pub(super) fn let_rest(&mut self, topic: &str) {
+        if let Some(topic) = Topic::from_name(topic) {
+            self.latched.remove(&topic);
+        }
+        self.tell_owner(topic, false);
     }
 
     pub(super) fn tell_owner(&self, topic: &str, wanted: bool) {
@@ -253,14 +292,15 @@ impl Registry {
         why: &Refusal,
     ) {
         if let Some(client) = self.clients.get(&to) {
-            let frame = frames::failure(service, id, &why.to_string());
+            let form = client.outlets.error_form();
+            let frame = frames::failure(service, id, &why.to_string(), form);
             client.respond(frame, Service::from_name(service));
         }
     }
 }
 
 /// Who sent the frame that is being performed, and its `id`.
-pub(super) struct Origin {
+pub(super) struct FrameOrigin {
     pub(super) from: ConnectionId,
     pub(super) id: Option<Payload>,
 }

@@ -10,9 +10,9 @@ use std::time::Duration;
 use actix::prelude::*;
 
 use crate::actors::ConnectionId;
-use crate::actors::gateway::budget::Share;
 use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
 use crate::actors::gateway::messages::{Deliver, Throttle};
+use crate::actors::resources::budget::Share;
 use crate::protocol::names;
 use crate::protocol::op::Encoding;
 

@@ -1,25 +1,28 @@
-//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the arm.
+//! `/rosapi/*`: what there is. Topics and services of clients are asked of the registry; parameters and time of the
+//! arm.
 //!
 //! Parameters are read and set by the arm's own questions: the same checks, the same words.
 //!
-//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the arm.
+//! **Invariant:** nothing is kept between two questions: topics and services are asked of the registry, values of the
+//! arm.
 
-mod messages;
-mod wire;
+mod services;
 
 use actix::prelude::*;
 
-pub use self::messages::{
-    Change, DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted,
-    NotSet, ParameterValue, SetParam, Unknown,
+pub(super) use self::services::read_change;
+pub use self::services::{
+    DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
+    ParamChange, ParameterValue, SetParam, Unknown,
 };
 use crate::actors::arm::sim::{
     ArmSim, SetGains, SetIntegrator, SetParams, SimulationTime, joint_names,
 };
-use crate::actors::gateway::aside::{Errand, aside};
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
-use crate::protocol::catalog::Node;
+use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::wire::Nodes;
+use crate::protocol::catalog::{self, Node, Service};
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;
 use crate::protocol::ros::urdf;
@@ -66,6 +69,23 @@ impl<const N: usize> Rosapi<N> {
     #[must_use]
     pub fn new(registry: Recipient<TakeCensus>, arm: ArmParameters<N>) -> Self {
         Self { registry, arm }
+    }
+
+    /// Enters this node's services into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        for question in catalog::Rosapi::ALL {
+            let service = Service::Rosapi(question);
+            let node = address.clone();
+            match question {
+                catalog::Rosapi::GetTime => nodes.serve::<GetTime>(service, node),
+                catalog::Rosapi::GetParam => nodes.serve::<GetParam<N>>(service, node),
+                catalog::Rosapi::SetParam => nodes.serve::<SetParam<N>>(service, node),
+                catalog::Rosapi::HasParam => nodes.serve::<HasParam>(service, node),
+                catalog::Rosapi::DeleteParam => nodes.serve::<DeleteParam>(service, node),
+                catalog::Rosapi::GetParamNames => nodes.serve::<GetParamNames>(service, node),
+                _ => nodes.serve_long::<Look>(service, node),
+            }
+        }
     }
 }
 
@@ -141,14 +161,7 @@ impl<const N: usize> Handler<Call<SetParam<N>>> for Rosapi<N> {
         };
         let rejected = change_parameter(change, self.arm.clone()).into_actor(self);
         ctx.spawn(rejected.map(|rejected, _, _| {
-            let outcome = rejected.map(|rejected| {
-                if rejected.is_empty() {
-                    Ok(())
-                } else {
-                    Err(NotSet::Rejected(rejected))
-                }
-            });
-            give(reply, outcome);
+            give(reply, rejected.map(NotSet::unless_empty));
         }));
     }
 }
@@ -188,7 +201,7 @@ fn no_arm() -> Unserved {
 }
 
 /// Passes on what has come of a question to the arm.
-fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
+pub(super) fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
     match answer {
         Ok(answer) => reply.answer(answer),
         Err(_) => reply.refuse(no_arm()),
@@ -196,7 +209,7 @@ fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
 }
 
 /// The present value of a parameter.
-async fn value<const N: usize>(
+pub(super) async fn value<const N: usize>(
     parameter: Parameter,
     arm: ArmParameters<N>,
 ) -> Result<ParameterValue<N>, Unserved> {
@@ -237,13 +250,13 @@ async fn value<const N: usize>(
 }
 
 /// Has the arm change a parameter; gives what was not taken.
-async fn change_parameter<const N: usize>(
-    change: Change<N>,
+pub(super) async fn change_parameter<const N: usize>(
+    change: ParamChange<N>,
     arm: ArmParameters<N>,
 ) -> Result<Rejections, Unserved> {
     Ok(match change {
-        Change::Params(params) => ask(&arm.params, params).await?.rejected,
-        Change::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
-        Change::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
+        ParamChange::Params(params) => ask(&arm.params, params).await?.rejected,
+        ParamChange::Gains(gains) => ask(&arm.gains, gains).await?.rejected,
+        ParamChange::Integrator(integrator) => ask(&arm.integrator, integrator).await?.rejected,
     })
 }

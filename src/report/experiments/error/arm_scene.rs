@@ -1,9 +1,9 @@
 //! An arm in motion: free, under the law in every stage, or under an effort that is held for the step.
 //!
-//! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the law in
-//! every stage).
+//! **Invariant:** the steps are those of the live arm, bit for bit, wherever the live arm can take them (all but the
+//! law in every stage).
 
-use super::scene::{OUTPUTS, Outcome, SAMPLES, Scene, Worst};
+use super::scene::{OUTPUTS, RunOutcome, SAMPLES, Scene, Worst};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, forward_dynamics, kinetic_energy, potential_energy};
@@ -11,7 +11,9 @@ use crate::math::integrator::{Method, increment, two_sum};
 use crate::math::kinematics::forward;
 use crate::math::pid::{Gains, Pid, Setpoint};
 use crate::math::simulation::Simulation;
-use crate::report::experiments::reference::{DoubleDouble, Law, Reference, largest_difference};
+use crate::report::experiments::reference::{
+    DoubleDouble, Law, ReferenceMotion, largest_difference,
+};
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Linear;
 use crate::study::stability::{Sampling, largest_timestep};
@@ -36,7 +38,7 @@ pub struct ArmScene<const N: usize> {
     start: State<N>,
     drive: Drive<N>,
     duration: f64,
-    reference: Reference<N>,
+    reference: ReferenceMotion<N>,
     energy_scale: f64,
 }
 
@@ -58,7 +60,7 @@ impl<const N: usize> ArmScene<N> {
             }
         };
         let spacing = duration / in_f64(OUTPUTS);
-        let reference = Reference::of(&arm, &start, &law, spacing, SAMPLES);
+        let reference = ReferenceMotion::of(&arm, &start, &law, spacing, SAMPLES);
         let energy_scale = energy_scale(&arm, &start);
         Self {
             name,
@@ -115,9 +117,9 @@ impl<const N: usize> ArmScene<N> {
         }
     }
 
-    fn tip_distance(&self, exact: &[DoubleDouble; N], position: &[f64; N]) -> f64 {
-        let tip = |q| forward(self.arm.lengths(), q).position;
-        tip(&exact.map(DoubleDouble::to_f64)).distance(tip(position))
+    fn end_effector_distance(&self, exact: &[DoubleDouble; N], position: &[f64; N]) -> f64 {
+        let end_effector = |q| forward(self.arm.lengths(), q).position;
+        end_effector(&exact.map(DoubleDouble::to_f64)).distance(end_effector(position))
     }
 
     /// The control loop that the live arm would have.
@@ -150,12 +152,12 @@ impl<const N: usize> Scene for ArmScene<N> {
         let law = match &self.drive {
             Drive::Free => "no control".to_owned(),
             Drive::Continuous(gains, setpoint) => {
-                format!("law in every stage, {}", told(gains, setpoint))
+                format!("law in every stage, {}", describe(gains, setpoint))
             }
             Drive::Held(gains, setpoint) => {
                 format!(
                     "effort held for each step, {}, error against the continuous law",
-                    told(gains, setpoint)
+                    describe(gains, setpoint)
                 )
             }
         };
@@ -194,7 +196,7 @@ impl<const N: usize> Scene for ArmScene<N> {
             .fold(0.0, f64::max)
     }
 
-    fn run(&self, method: Method, steps: u64) -> Outcome {
+    fn run(&self, method: Method, steps: u64) -> RunOutcome {
         let start_energy = energy(&self.arm, &self.start);
         let spacing = self.duration / in_f64(OUTPUTS);
         let every = (steps / OUTPUTS).max(1);
@@ -217,18 +219,18 @@ impl<const N: usize> Scene for ArmScene<N> {
                 worst.take(
                     spacing * in_f64(step / every),
                     largest_difference(exact, &state.position),
-                    self.tip_distance(exact, &state.position),
+                    self.end_effector_distance(exact, &state.position),
                 )
             },
         );
         let conserved = matches!(self.drive, Drive::Free) && worst.diverged.is_none();
-        Outcome {
+        RunOutcome {
             steps,
             timestep: self.duration / in_f64(steps),
             evaluations,
             error: worst.error,
             end_error: worst.end_error,
-            tip_error: worst.tip_error,
+            end_effector_error: worst.end_effector_error,
             energy_drift: conserved.then_some(drift / self.energy_scale),
             diverged: worst.diverged,
         }
@@ -293,7 +295,7 @@ fn law<const N: usize>(
     pid.control(&state, 0.0).effort
 }
 
-fn told<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> String {
+fn describe<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> String {
     format!(
         "kp {:?}, kd {:?}, to {:?} rad",
         gains.kp, gains.kd, setpoint.position

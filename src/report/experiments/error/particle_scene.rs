@@ -1,9 +1,9 @@
 //! The 1-DOF service against its closed form: `ẍ = cos 2t`, so `x = x₀ + v₀ t + sin² t / 2`.
 //!
-//! **Invariant:** what is run is the computation behind `/arm_sim/integration_step`, expression and all; the closed form is
-//! evaluated with 106 bits.
+//! **Invariant:** what is run is the computation behind `/arm_sim/integration_step`, expression and all; the closed
+//! form is evaluated with 106 bits.
 
-use super::scene::{OUTPUTS, Outcome, Scene, Worst};
+use super::scene::{OUTPUTS, RunOutcome, Scene, Worst};
 use crate::math::count::in_f64;
 use crate::math::expression::Expression;
 use crate::math::integrator::Method;
@@ -62,7 +62,7 @@ impl Scene for ParticleScene {
         1e-30
     }
 
-    fn run(&self, method: Method, steps: u64) -> Outcome {
+    fn run(&self, method: Method, steps: u64) -> RunOutcome {
         let mut worst = Worst::NONE;
         let mut evaluations = 0;
         if let Some(mut particle) = Self::particle(method, steps) {
@@ -77,13 +77,13 @@ impl Scene for ParticleScene {
             }
             evaluations = particle.evaluations();
         }
-        Outcome {
+        RunOutcome {
             steps,
             timestep: DURATION / in_f64(steps),
             evaluations,
             error: worst.error,
             end_error: worst.end_error,
-            tip_error: worst.tip_error,
+            end_effector_error: worst.end_effector_error,
             energy_drift: None,
             diverged: worst.diverged,
         }

@@ -1,4 +1,4 @@
-//! What is computed by every method, and the outcome of a run.
+//! A scene, which every method computes, and the outcome of a run.
 //!
 //! **Invariant:** every run lands on the same output times, whatever its timestep.
 
@@ -16,7 +16,7 @@ pub const LOST: f64 = std::f64::consts::TAU;
 
 /// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct RunOutcome {
     /// Steps that were to be taken.
     pub steps: u64,
     /// Length of each \[s\].
@@ -27,8 +27,8 @@ pub struct Outcome {
     pub error: f64,
     /// Largest angle error at the last output \[rad\].
     pub end_error: f64,
-    /// Largest distance of the tip from where it should be \[m\].
-    pub tip_error: f64,
+    /// Largest distance of the end effector from where it should be \[m\].
+    pub end_effector_error: f64,
     /// Largest `|E - E(0)|` over the scene's energy scale; `None` where energy is not conserved.
     pub energy_drift: Option<f64>,
     /// The output time at which the run was lost or left the finite numbers \[s\], if it was.
@@ -52,7 +52,7 @@ pub trait Scene {
     /// How far the reference itself may be off \[rad\].
     fn uncertainty(&self) -> f64;
     /// Runs `steps` steps, a multiple of [`OUTPUTS`], and compares.
-    fn run(&self, method: Method, steps: u64) -> Outcome;
+    fn run(&self, method: Method, steps: u64) -> RunOutcome;
     /// The same steps without counting or comparing. What comes back only keeps them from being optimised away.
     fn replay(&self, method: Method, steps: u64) -> f64;
     /// The value that [`Scene::replay`] must come back with, taken from the run that is judged.
@@ -69,7 +69,7 @@ pub trait Scene {
 pub(super) struct Worst {
     pub(super) error: f64,
     pub(super) end_error: f64,
-    pub(super) tip_error: f64,
+    pub(super) end_effector_error: f64,
     pub(super) diverged: Option<f64>,
 }
 
@@ -77,22 +77,22 @@ impl Worst {
     pub(super) const NONE: Self = Self {
         error: 0.0,
         end_error: 0.0,
-        tip_error: 0.0,
+        end_effector_error: 0.0,
         diverged: None,
     };
 
     /// Takes in one output; `false` once there is nothing left to compare.
-    pub(super) fn take(&mut self, time: f64, error: f64, tip_error: f64) -> bool {
+    pub(super) fn take(&mut self, time: f64, error: f64, end_effector_error: f64) -> bool {
         if error.is_nan() || error > LOST {
             self.diverged = Some(time);
             self.error = f64::INFINITY;
             self.end_error = f64::INFINITY;
-            self.tip_error = f64::INFINITY;
+            self.end_effector_error = f64::INFINITY;
             return false;
         }
         self.error = self.error.max(error);
         self.end_error = error;
-        self.tip_error = self.tip_error.max(tip_error);
+        self.end_effector_error = self.end_effector_error.max(end_effector_error);
         true
     }
 }

@@ -4,8 +4,9 @@
 //!
 //! `Σ_j μ_ij l_i l_j (cos(φ_i - φ_j) φ̈_j + sin(φ_i - φ_j) φ̇_j²) + g γ_i l_i cos φ_i = τ_i - τ_{i+1}`
 //!
-//! with `γ_i = m_i/2 + Σ_{k>i} m_k`, `μ_ij = γ_max(i,j)` off the diagonal and `μ_ii = m_i/3 + Σ_{k>i} m_k`. Solved as a dense
-//! linear system: the arm's own kernel is a recursion along the links and shares neither formula nor code with it.
+//! with `γ_i = m_i/2 + Σ_{k>i} m_k`, `μ_ij = γ_max(i,j)` off the diagonal and `μ_ii = m_i/3 + Σ_{k>i} m_k`. Solved as a
+//! dense linear system: the arm's own kernel is a recursion along the links and shares neither formula nor code with
+//! it.
 //!
 //! **Invariant:** parameters and states given as doubles are taken exactly.
 

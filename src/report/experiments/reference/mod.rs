@@ -1,10 +1,10 @@
 //! Reference motions: the same arm, another derivation, twice the digits, and a bound on their own error.
 //!
 //! An error, in the study, is a distance to one of these. A motion is expanded in Taylor series of high order in
-//! double-double arithmetic from the Lagrangian ([`Reference::of`]), twice with different order and tolerance; the distance of
-//! the two is [`Reference::uncertainty`]. Control is either the law at every instant, or its effort held from one control
-//! instant to the next as the live arm holds it. [`exact_steps`] takes the steps of the four methods in the same arithmetic:
-//! their truncation error without rounding.
+//! double-double arithmetic from the Lagrangian ([`ReferenceMotion::of`]), twice with different order and tolerance;
+//! the distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every instant, or its
+//! effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the steps of the
+//! four methods in the same arithmetic: their truncation error without rounding.
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 
@@ -19,7 +19,7 @@ pub use steps::exact_steps;
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use lagrangian::Lagrangian;
-use taylor::{Drive, Exact, Setting, Taylor};
+use taylor::{Exact, JointDrive, Setting, Taylor};
 
 /// The setting whose motion is kept.
 const FINE: Setting = Setting {
@@ -58,13 +58,13 @@ impl<const N: usize> Law<N> {
 
 /// A motion at chosen times.
 #[derive(Debug, Clone)]
-pub struct Reference<const N: usize> {
+pub struct ReferenceMotion<const N: usize> {
     /// Joint angles \[rad\] and rates \[rad/s\].
     samples: Vec<([DoubleDouble; N], [DoubleDouble; N])>,
     uncertainty: Vec<f64>,
 }
 
-impl<const N: usize> Reference<N> {
+impl<const N: usize> ReferenceMotion<N> {
     /// The motion from `start` under `law`, at multiples of `spacing` \[s\]: `count` samples, the start not among them.
     ///
     /// With a held effort the samples are the control instants nearest to these times. A spacing of less than a control
@@ -175,7 +175,7 @@ fn motion<const N: usize>(
     for &interval in intervals {
         match law {
             Law::Constant(effort) => {
-                let drive = Drive::Constant(effort.map(DoubleDouble::from));
+                let drive = JointDrive::Constant(effort.map(DoubleDouble::from));
                 taylor.advance(&mut state, &drive, interval);
             }
             Law::Continuous(gains, setpoint) => {
@@ -188,7 +188,7 @@ fn motion<const N: usize>(
             } => {
                 for _ in 0..whole_periods(interval, *period) {
                     let effort = held(gains, setpoint, &mut state, *period);
-                    taylor.advance(&mut state, &Drive::Constant(effort), *period);
+                    taylor.advance(&mut state, &JointDrive::Constant(effort), *period);
                 }
             }
         }
@@ -206,8 +206,8 @@ fn whole_periods(interval: f64, period: f64) -> u64 {
     ((interval / period).round() as u64).max(1)
 }
 
-fn continuous<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> Drive<N> {
-    Drive::Law {
+fn continuous<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> JointDrive<N> {
+    JointDrive::Law {
         kp: gains.kp.map(DoubleDouble::from),
         ki: gains.ki.map(DoubleDouble::from),
         kd: gains.kd.map(DoubleDouble::from),

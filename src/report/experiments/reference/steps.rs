@@ -1,7 +1,7 @@
 //! The four methods stepped in double-double arithmetic: truncation without rounding.
 //!
-//! The maps are those of `math::integrator`, written again for another number type. The effort comes from the law, held over
-//! the step or asked for in every stage; it has no integral here.
+//! The maps are those of `math::integrator`, written again for another number type. The effort comes from the law, held
+//! over the step or asked for in every stage; it has no integral here.
 //!
 //! **Invariant:** a step here and a step of the live arm differ by rounding alone.
 
@@ -19,7 +19,8 @@ use crate::report::experiments::reference::taylor::Exact;
 
 type Pair<const N: usize> = ([Real; N], [Real; N]);
 
-/// Joint angles \[rad\] and rates \[rad/s\] after every `every` steps of `h` \[s\] with `method`, `count` samples in all.
+/// Joint angles \[rad\] and rates \[rad/s\] after every `every` steps of `h` \[s\] with `method`, `count` samples in
+/// all.
 ///
 /// Under [`Law::Held`] the period is taken to be `h`; under [`Law::Continuous`] the integral gains must be 0.
 #[must_use]

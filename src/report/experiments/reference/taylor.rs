@@ -1,13 +1,14 @@
 //! Taylor series of the arm's motion, coefficient by coefficient, in double-double arithmetic.
 //!
-//! Every unknown is a power series in time. With `s' = c φ'` and `c' = -s φ'` sine and cosine cost one recurrence each, products of
-//! series are convolutions, and the equations of motion give one linear system per coefficient, always with the same
-//! matrix. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
+//! Every unknown is a power series in time. With `s' = c φ'` and `c' = -s φ'` sine and cosine cost one recurrence each,
+//! products of series are convolutions, and the equations of motion give one linear system per coefficient, always with
+//! the same matrix. The step is chosen from the last two coefficients, so that what is cut off stays below a tolerance.
 //!
-//! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor methods*,
-//! Experimental Mathematics 14 (2005).
+//! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
+//! methods*, Experimental Mathematics 14 (2005).
 //!
-//! **Invariant:** a step never leaves out more than its tolerance by its own estimate; whoever wants proof compares two settings.
+//! **Invariant:** a step never leaves out more than its tolerance by its own estimate; whoever wants proof compares two
+//! settings.
 
 #![allow(
     clippy::indexing_slicing,
@@ -38,7 +39,7 @@ pub(super) struct Exact<const N: usize> {
 
 /// The drive of the joints for the length of a step.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Drive<const N: usize> {
+pub(super) enum JointDrive<const N: usize> {
     /// Efforts that do not change \[N m\].
     Constant([Real; N]),
     /// `kp (q* - q) + ki ∫(q* - q) + kd (q̇* - q̇)` at every instant.
@@ -52,20 +53,20 @@ pub(super) enum Drive<const N: usize> {
 }
 
 /// Coefficients of one series per link or joint.
-type Series<const N: usize> = Vec<[Real; N]>;
+type Coefficients<const N: usize> = Vec<[Real; N]>;
 
 /// The series of one motion. Kept between steps, so that a step allocates nothing.
 #[derive(Debug, Clone)]
 pub(super) struct Taylor<const N: usize> {
     lagrangian: Lagrangian<N>,
     setting: Setting,
-    angle: Series<N>,
-    rate: Series<N>,
-    acceleration: Series<N>,
-    squared_rate: Series<N>,
-    integral: Series<N>,
-    sin: Series<N>,
-    cos: Series<N>,
+    angle: Coefficients<N>,
+    rate: Coefficients<N>,
+    acceleration: Coefficients<N>,
+    squared_rate: Coefficients<N>,
+    integral: Coefficients<N>,
+    sin: Coefficients<N>,
+    cos: Coefficients<N>,
     /// `cos(φ_i - φ_j)` and `sin(φ_i - φ_j)`.
     along: Vec<[[Real; N]; N]>,
     across: Vec<[[Real; N]; N]>,
@@ -91,7 +92,7 @@ impl<const N: usize> Taylor<N> {
     }
 
     /// Moves `state` on by `time` \[s\], in as many steps as the tolerance asks for.
-    pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &Drive<N>, time: f64) {
+    pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &JointDrive<N>, time: f64) {
         let mut rest = Real::from(time);
         while rest.to_f64() > 0.0 {
             self.expand(state, drive);
@@ -111,7 +112,7 @@ impl<const N: usize> Taylor<N> {
     }
 
     /// The series about `state`.
-    fn expand(&mut self, state: &Exact<N>, drive: &Drive<N>) {
+    fn expand(&mut self, state: &Exact<N>, drive: &JointDrive<N>) {
         self.angle[0] = sums(&state.position);
         self.rate[0] = sums(&state.velocity);
         self.integral[0] = state.integral;
@@ -196,11 +197,11 @@ impl<const N: usize> Taylor<N> {
     }
 
     /// Coefficient `k` of the joint efforts.
-    fn effort(&self, drive: &Drive<N>, k: usize) -> [Real; N] {
+    fn effort(&self, drive: &JointDrive<N>, k: usize) -> [Real; N] {
         match drive {
-            Drive::Constant(_) if k > 0 => [Real::ZERO; N],
-            Drive::Constant(effort) => *effort,
-            Drive::Law {
+            JointDrive::Constant(_) if k > 0 => [Real::ZERO; N],
+            JointDrive::Constant(effort) => *effort,
+            JointDrive::Law {
                 kp,
                 ki,
                 kd,
@@ -218,8 +219,8 @@ impl<const N: usize> Taylor<N> {
     }
 
     /// Coefficient `k` of the position error; zeros where nothing is asked for.
-    fn error(&self, drive: &Drive<N>, k: usize) -> [Real; N] {
-        let Drive::Law { position, .. } = drive else {
+    fn error(&self, drive: &JointDrive<N>, k: usize) -> [Real; N] {
+        let JointDrive::Law { position, .. } = drive else {
             return [Real::ZERO; N];
         };
         let angle = differences(&self.angle[k]);
@@ -252,7 +253,7 @@ impl<const N: usize> Taylor<N> {
     }
 }
 
-fn evaluate<const N: usize>(series: &Series<N>, order: usize, step: Real) -> [Real; N] {
+fn evaluate<const N: usize>(series: &Coefficients<N>, order: usize, step: Real) -> [Real; N] {
     let mut value = series[order];
     for coefficient in series[..order].iter().rev() {
         value = std::array::from_fn(|i| value[i] * step + coefficient[i]);

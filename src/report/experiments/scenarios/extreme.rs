@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::support::{apart, free, held, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -28,7 +28,8 @@ pub(super) const SCENES: [Scenario; 9] = [
         id: "S27",
         name: "gravity from 0 to 1000",
         parameters: "2 links, 9.81, 981, 1e-12 and negative gravity; Runge-Kutta 4",
-        expected: "the error goes with (timestep² gravity)²; tiny gravity lets the arm fall by it; negative gravity is refused",
+        expected: "the error goes with (timestep² gravity)²; tiny gravity lets the arm fall by it; negative gravity is \
+                   refused",
         slow: false,
         check: gravity,
     },
@@ -100,7 +101,7 @@ pub(super) const SCENES: [Scenario; 9] = [
 
 const NO_ARM: &str = "no such arm";
 
-fn gravity() -> Verdict {
+fn gravity() -> Observation {
     let error = |gravity: f64, timestep: f64, duration: f64| {
         let plan = Plan {
             control: ControlLoop::free(Arm::new([1.0; 2], [1.0; 2], gravity).ok()?)
@@ -148,7 +149,7 @@ fn tiny_gravity() -> Option<f64> {
     Some(simulation.state().position[0] / (0.5 * start[0] * 100.0))
 }
 
-fn tiny_steps() -> Verdict {
+fn tiny_steps() -> Observation {
     let plan = Plan {
         control: ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6),
         start: State::at_rest([0.3 - FRAC_PI_2, 0.0]),
@@ -172,7 +173,7 @@ fn tiny_steps() -> Verdict {
     )
 }
 
-fn huge_steps() -> Verdict {
+fn huge_steps() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     let hanging = [-FRAC_PI_2, 0.0];
@@ -206,7 +207,7 @@ fn huge_steps() -> Verdict {
 }
 
 /// The first joint at 1e8 rad, and at what is left of that without its whole turns.
-fn wound() -> Verdict {
+fn wound() -> Observation {
     /// The part of 2π that a double falls short of.
     const TAU_LOW: f64 = 2.449_293_598_294_706_4e-16;
     let angle = 1e8;
@@ -238,7 +239,7 @@ fn wound() -> Verdict {
     )
 }
 
-fn huge_setpoints() -> Verdict {
+fn huge_setpoints() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     for far in [1e6, 1e300] {
@@ -257,7 +258,7 @@ fn huge_setpoints() -> Verdict {
     verdict(holds, observed.join("; "))
 }
 
-fn subnormal_start() -> Verdict {
+fn subnormal_start() -> Observation {
     let Some(arm) = super::support::arm([1.0; 2], 0.0) else {
         return verdict(false, NO_ARM.to_owned());
     };
@@ -283,7 +284,7 @@ fn subnormal_start() -> Verdict {
     )
 }
 
-fn subnormal_inertia() -> Verdict {
+fn subnormal_inertia() -> Observation {
     let Ok(arm) = Arm::new([1e-160; 2], [1.0; 2], 9.81) else {
         return verdict(false, NO_ARM.to_owned());
     };
@@ -299,7 +300,7 @@ fn subnormal_inertia() -> Verdict {
     )
 }
 
-fn refused() -> Verdict {
+fn refused() -> Observation {
     let values = [f64::NAN, f64::INFINITY, -1.0, 0.0];
     let errors = values.map(|bad| {
         [
@@ -329,7 +330,7 @@ fn refused() -> Verdict {
     verdict(named, format!("11 of 11 by name, such as: {first}"))
 }
 
-fn massless() -> Verdict {
+fn massless() -> Observation {
     let error = Arm::new([1.0; 2], [0.0, 1.0], 9.81).err();
     verdict(
         error.is_some(),

@@ -8,7 +8,7 @@
 )]
 
 use super::support::{held, short, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
@@ -50,7 +50,8 @@ pub(super) const SCENES: [Scenario; 4] = [
         id: "S09",
         name: "overdamped",
         parameters: "2 links, kp 200, kd 500, setpoint (0.5, 0.8); all methods, held and continuous",
-        expected: "measured limit within 1 % of the predicted one; 1 % beyond it the held arm chatters with period 2, bounded",
+        expected: "measured limit within 1 % of the predicted one; 1 % beyond it the held arm chatters with period 2, \
+                   bounded",
         slow: false,
         check: overdamped,
     },
@@ -58,7 +59,8 @@ pub(super) const SCENES: [Scenario; 4] = [
         id: "S10",
         name: "undamped",
         parameters: "2 links, gravity as usual, kp 1e4, kd 0, setpoint (0.5, 0.8)",
-        expected: "held: every method unstable at every timestep; continuous: Euler and midpoint too, Verlet up to 2/ω, Runge-Kutta 4 up to 2.828/ω",
+        expected: "held: every method unstable at every timestep; continuous: Euler and midpoint too, Verlet up to \
+                   2/ω, Runge-Kutta 4 up to 2.828/ω",
         slow: false,
         check: undamped,
     },
@@ -88,7 +90,7 @@ fn compare(gains: Gains<2>) -> (f64, [Option<f64>; 2]) {
     (worst, rk4)
 }
 
-fn limits_hold(gains: Gains<2>) -> Verdict {
+fn limits_hold(gains: Gains<2>) -> Observation {
     let (worst, [held, continuous]) = compare(gains);
     verdict(
         worst < 0.01,
@@ -101,7 +103,7 @@ fn limits_hold(gains: Gains<2>) -> Verdict {
     )
 }
 
-fn overdamped() -> Verdict {
+fn overdamped() -> Observation {
     let gains = Gains {
         kp: [200.0; 2],
         ki: [0.0; 2],
@@ -136,7 +138,7 @@ fn chatter(control: &ControlLoop<2>) -> Option<f64> {
     alternates.then_some(before.abs())
 }
 
-fn undamped() -> Verdict {
+fn undamped() -> Observation {
     let gains = Gains {
         kp: [1e4; 2],
         ki: [0.0; 2],

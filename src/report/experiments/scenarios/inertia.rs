@@ -1,4 +1,4 @@
-//! S16 to S26: light and heavy tips, short and long links, stretched, folded, whirling.
+//! S16 to S26: light and heavy outer links, short and long links, stretched, folded, whirling.
 //!
 //! **Invariant:** accelerations are compared with ones in twice the digits, measured limits with predicted ones.
 
@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::support::{arm, digits_lost, free, held, short, states, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -24,7 +24,8 @@ use crate::study::stability::{Sampling, largest_timestep, limits};
 /// Digits that a rod arm may lose: a half-unit change of an angle alone changes accelerations by up to 1.6 digits.
 const DIGITS: f64 = 2.5;
 
-const LIGHT: &str = "worst of 200 states loses at most 2.5 digits; the limit falls with the tip's inertia, measured within 1 % of predicted";
+const LIGHT: &str = "worst of 200 states loses at most 2.5 digits; the limit falls with the tip's inertia, measured \
+                     within 1 % of predicted";
 const HEAVY: &str = "worst of 200 states loses at most 2.5 digits";
 
 pub(super) const SCENES: [Scenario; 11] = [
@@ -34,7 +35,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "2 links, outer mass 1e-3 kg, kp 200 and 100, kd 30 and 12",
         expected: LIGHT,
         slow: false,
-        check: || light_tip(1e-3),
+        check: || light_outer_link(1e-3),
     },
     Scenario {
         id: "S17",
@@ -42,7 +43,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "2 links, outer mass 1e-6 kg, kp 200 and 100, kd 30 and 12",
         expected: LIGHT,
         slow: false,
-        check: || light_tip(1e-6),
+        check: || light_outer_link(1e-6),
     },
     Scenario {
         id: "S18",
@@ -50,7 +51,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "2 links, outer mass 1e-9 kg, kp 200 and 100, kd 30 and 12",
         expected: LIGHT,
         slow: false,
-        check: || light_tip(1e-9),
+        check: || light_outer_link(1e-9),
     },
     Scenario {
         id: "S19",
@@ -58,7 +59,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "3 links, outer mass 1e3 kg, anywhere",
         expected: HEAVY,
         slow: false,
-        check: || heavy_tip(1e3),
+        check: || heavy_outer_link(1e3),
     },
     Scenario {
         id: "S20",
@@ -66,7 +67,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "3 links, outer mass 1e6 kg, anywhere",
         expected: HEAVY,
         slow: false,
-        check: || heavy_tip(1e6),
+        check: || heavy_outer_link(1e6),
     },
     Scenario {
         id: "S21",
@@ -74,13 +75,14 @@ pub(super) const SCENES: [Scenario; 11] = [
         parameters: "3 links, outer mass 1e9 kg, anywhere",
         expected: HEAVY,
         slow: false,
-        check: || heavy_tip(1e9),
+        check: || heavy_outer_link(1e9),
     },
     Scenario {
         id: "S22",
         name: "heavy tip, stretched",
         parameters: "3 links, outer mass 1e9 kg, hanging within 1e-6 rad of straight",
-        expected: "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 swings on at 1.6e-5 s and flies apart at 2e-5 s",
+        expected: "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 \
+                   swings on at 1.6e-5 s and flies apart at 2e-5 s",
         slow: false,
         check: heavy_tip_stretched,
     },
@@ -112,14 +114,15 @@ pub(super) const SCENES: [Scenario; 11] = [
         id: "S26",
         name: "whirl",
         parameters: "2 and 3 links stretched, no gravity, 1000 rad/s",
-        expected: "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 %, predicted and measured",
+        expected: "limit of timestep times rate 0.76376 and 0.42370 (Verlet), 1.0801 and 0.59920 (Runge-Kutta 4), to 1 \
+                   %, predicted and measured",
         slow: false,
         check: whirl,
     },
 ];
 
-fn light_tip(tip: f64) -> Verdict {
-    let Some(arm) = arm([1.0, tip], 9.81) else {
+fn light_outer_link(mass: f64) -> Observation {
+    let Some(arm) = arm([1.0, mass], 9.81) else {
         return verdict(false, "no such arm".to_owned());
     };
     let digits = digits_lost(&arm, &states([0.0, 0.0], PI));
@@ -141,7 +144,7 @@ fn light_tip(tip: f64) -> Verdict {
         .map(|(measured, predicted)| measured / predicted);
     let agree = ratio.is_some_and(|ratio| (ratio - 1.0).abs() < 0.01);
     // A rod alone turns about its end with m l²/3; under held damping its limit is 2 inertia / kd.
-    let alone = 2.0 * (tip / 3.0) / gains.kd[1];
+    let alone = 2.0 * (mass / 3.0) / gains.kd[1];
     let as_light = predicted.is_some_and(|limit| (limit / alone - 1.0).abs() < 0.01);
     verdict(
         digits <= DIGITS && agree && as_light,
@@ -153,15 +156,15 @@ fn light_tip(tip: f64) -> Verdict {
     )
 }
 
-fn heavy_tip(tip: f64) -> Verdict {
-    let digits = arm([1.0, 1.0, tip], 9.81).map(|arm| digits_lost(&arm, &states([0.0; 3], PI)));
+fn heavy_outer_link(mass: f64) -> Observation {
+    let digits = arm([1.0, 1.0, mass], 9.81).map(|arm| digits_lost(&arm, &states([0.0; 3], PI)));
     verdict(
         digits.is_some_and(|digits| digits <= DIGITS),
         digits.map_or_else(String::new, |digits| format!("{digits:.1} digits lost")),
     )
 }
 
-fn heavy_tip_stretched() -> Verdict {
+fn heavy_tip_stretched() -> Observation {
     let Some(arm) = arm([1.0, 1.0, 1e9], 9.81) else {
         return verdict(false, "no such arm".to_owned());
     };
@@ -193,7 +196,7 @@ fn heavy_tip_stretched() -> Verdict {
     )
 }
 
-fn length_ratio() -> Verdict {
+fn length_ratio() -> Observation {
     let lost = [1e3, 1e-3].map(|length| {
         Arm::new([1.0, 1.0, length], [1.0; 3], 9.81).map_or(f64::INFINITY, |arm| {
             digits_lost(&arm, &states([0.0; 3], PI))
@@ -208,7 +211,7 @@ fn length_ratio() -> Verdict {
     )
 }
 
-fn in_line(pose: [f64; 3]) -> Verdict {
+fn in_line(pose: [f64; 3]) -> Observation {
     let digits = digits_lost(&Arm::default(), &states(pose, 0.0));
     verdict(
         digits.is_finite() && digits <= DIGITS,
@@ -216,7 +219,7 @@ fn in_line(pose: [f64; 3]) -> Verdict {
     )
 }
 
-fn folded() -> Verdict {
+fn folded() -> Observation {
     let straight = in_line([0.0, PI, -PI]);
     let control = held(Gains::<3>::default(), [0.0; 3]);
     let smallest = limits(&control).minimum_held;
@@ -236,14 +239,15 @@ fn folded() -> Verdict {
     verdict(
         straight.holds && covers,
         format!(
-            "{}; limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, minimum over poses {} s",
+            "{}; limit folded {folded:.4e} s, stretched {stretched:.4e} s, least of 50 others {anywhere:.4e} s, \
+             minimum over poses {} s",
             straight.observed,
             short(smallest)
         ),
     )
 }
 
-fn whirl() -> Verdict {
+fn whirl() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     let mut judge = |limits: [(Method, f64, Option<f64>, Option<f64>); 2]| {

@@ -8,7 +8,7 @@
 )]
 
 use super::support::{Noise, apart, free, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
@@ -88,7 +88,7 @@ fn closed_form(method: Method, w: f64, d: f64) -> bool {
     }
 }
 
-fn one_joint() -> Verdict {
+fn one_joint() -> Observation {
     let mut noise = Noise::new();
     let (mut off, mut mismatches, mut close) = (0.0_f64, 0_u32, 0_u32);
     for _ in 0..20_000 {
@@ -131,7 +131,7 @@ fn swinging() -> State<3> {
     }
 }
 
-fn changes() -> Verdict {
+fn changes() -> Observation {
     let mut simulation = free(Arm::default(), swinging(), Method::Verlet, 0.001);
     let mut kept = true;
     for (method, timestep) in [
@@ -172,7 +172,7 @@ fn changes() -> Verdict {
     )
 }
 
-fn there_and_back() -> Verdict {
+fn there_and_back() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     for method in Method::ALL {
@@ -199,7 +199,7 @@ fn there_and_back() -> Verdict {
     verdict(holds, format!("missed at 2 ms by {}", observed.join(", ")))
 }
 
-fn step_doubling() -> Verdict {
+fn step_doubling() -> Observation {
     let h = 0.001;
     let arm = Arm::<3>::default();
     let mut holds = true;

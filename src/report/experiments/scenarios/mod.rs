@@ -1,8 +1,8 @@
 //! Named scenes, stiff and extreme, each with what is expected of it, what is observed, and whether that holds.
 //!
-//! Expectations come from theory or from the arm's own prediction, never from an earlier run. Some are verdicts of the study
-//! alone: efforts that are capped or late, and arms that the live one takes as the contract wants but a careful user would
-//! not. A scene that falls short says so.
+//! Expectations come from theory or from the arm's own prediction, never from an earlier run. Some are verdicts of the
+//! study alone: efforts that are capped or late, and arms that the live one takes as the contract wants but a careful
+//! user would not. A scene that falls short says so.
 //!
 //! **Invariant:** 39 scenes, in order, each deterministic and bounded; `slow` ones take seconds.
 
@@ -15,7 +15,7 @@ mod sampling;
 mod scenario;
 mod support;
 
-pub use scenario::{Scenario, Verdict};
+pub use scenario::{Observation, Scenario};
 
 /// All scenes, in order.
 #[must_use]

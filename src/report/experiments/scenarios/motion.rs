@@ -10,7 +10,7 @@
 use std::f64::consts::FRAC_PI_2;
 
 use super::support::{apart, arm, free, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
@@ -32,7 +32,8 @@ pub(super) const SCENES: [Scenario; 6] = [
         id: "S02",
         name: "hanging at rest",
         parameters: "3 links hanging at the double next to -π/2; 10^6 steps of 1 ms",
-        expected: "midpoint, Verlet and Runge-Kutta 4 drift less than 1e-12 rad; under Euler rounding grows at the rate of its step matrix, to 2 %",
+        expected: "midpoint, Verlet and Runge-Kutta 4 drift less than 1e-12 rad; under Euler rounding grows at the \
+                   rate of its step matrix, to 2 %",
         slow: true,
         check: hanging_at_rest,
     },
@@ -48,7 +49,8 @@ pub(super) const SCENES: [Scenario; 6] = [
         id: "S04",
         name: "regular swing",
         parameters: "2 links, 0.3 rad from hanging, 1000 s at 1 ms, all methods",
-        expected: "energy: Euler gains over 1 J, midpoint gains under 1e-3 J, Verlet stays within 1e-4 J, Runge-Kutta 4 within 1e-9 J",
+        expected: "energy: Euler gains over 1 J, midpoint gains under 1e-3 J, Verlet stays within 1e-4 J, Runge-Kutta \
+                   4 within 1e-9 J",
         slow: true,
         check: regular_swing,
     },
@@ -70,7 +72,7 @@ pub(super) const SCENES: [Scenario; 6] = [
     },
 ];
 
-fn rest_without_gravity() -> Verdict {
+fn rest_without_gravity() -> Observation {
     let start = State::at_rest([0.3, -1.2, 2.0]);
     let kept = arm([1.0; 3], 0.0).is_some_and(|arm| {
         Method::ALL.into_iter().all(|method| {
@@ -84,7 +86,7 @@ fn rest_without_gravity() -> Verdict {
 }
 
 /// `-π/2` is no double, so the arm hangs 6e-17 rad off and swings by that much.
-fn hanging_at_rest() -> Verdict {
+fn hanging_at_rest() -> Observation {
     let start = State::at_rest([-FRAC_PI_2, 0.0, 0.0]);
     let linear = Linear::at_pose(&ControlLoop::free(Arm::<3>::default()), &start.position);
     let mut holds = true;
@@ -116,7 +118,7 @@ fn hanging_at_rest() -> Verdict {
     verdict(holds, format!("drift {}", observed.join(", ")))
 }
 
-fn upright() -> Verdict {
+fn upright() -> Observation {
     let pose = [FRAC_PI_2, 0.0];
     let h = 0.001;
     let linear = Linear::at_pose(&ControlLoop::free(Arm::default()), &pose);
@@ -155,7 +157,7 @@ fn order(method: Method) -> i32 {
     }
 }
 
-fn regular_swing() -> Verdict {
+fn regular_swing() -> Observation {
     let mut holds = true;
     let mut observed = vec![];
     for method in Method::ALL {
@@ -181,7 +183,7 @@ fn regular_swing() -> Verdict {
 }
 
 /// The rate at which two neighbours part, brought back together every tenth of a second.
-fn chaotic<const N: usize>(position: [f64; N], expected: f64) -> Verdict {
+fn chaotic<const N: usize>(position: [f64; N], expected: f64) -> Observation {
     const APART: f64 = 1e-8;
     let start = State::at_rest(position);
     let mut one = free(Arm::default(), start, Method::Rk4, 0.001);

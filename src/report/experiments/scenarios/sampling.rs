@@ -10,7 +10,7 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use super::support::{held, short, verdict};
-use super::{Scenario, Verdict};
+use super::{Observation, Scenario};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
@@ -25,7 +25,8 @@ pub(super) const SCENES: [Scenario; 5] = [
     Scenario {
         id: "S11",
         name: "slow control",
-        parameters: "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); control period of 1, 10 and 100 steps, measured with 1 and 10",
+        parameters: "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); control period of 1, 10 and 100 \
+                     steps, measured with 1 and 10",
         expected: "midpoint, Verlet and Runge-Kutta 4 share one limit of the period to 1 %, predicted and measured",
         slow: false,
         check: slow_control,
@@ -33,8 +34,10 @@ pub(super) const SCENES: [Scenario; 5] = [
     Scenario {
         id: "S12",
         name: "held control turns into push",
-        parameters: "2 links without gravity, kp 1000, kd 5 and 2; control period 20 ms of 100 steps of 0.2 ms, Runge-Kutta 4",
-        expected: "unstable in period 20 ms although stable with control in every step of 0.2 ms: the controller, not the integrator",
+        parameters: "2 links without gravity, kp 1000, kd 5 and 2; control period 20 ms of 100 steps of 0.2 ms, \
+                     Runge-Kutta 4",
+        expected: "unstable in period 20 ms although stable with control in every step of 0.2 ms: the controller, not \
+                   the integrator",
         slow: false,
         check: held_push,
     },
@@ -42,15 +45,18 @@ pub(super) const SCENES: [Scenario; 5] = [
         id: "S13",
         name: "control one period late",
         parameters: "2 links, kp 200 and 100, kd 30 and 12, setpoint (0.5, 0.8); each effort acts one period late",
-        expected: "measured limit of the period within 1 % of the predicted one, and less than half of that without delay",
+        expected: "measured limit of the period within 1 % of the predicted one, and less than half of that without \
+                   delay",
         slow: false,
         check: late_control,
     },
     Scenario {
         id: "S14",
         name: "windup",
-        parameters: "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a setpoint in reach",
-        expected: "the integral stops at its limit of 50 rad s, while an unlimited one grows with the error; after release the arm comes back",
+        parameters: "2 links, kp 100, ki 50, kd 20, setpoint horizontal, effort capped at 10 N m for 60 s; then a \
+                     setpoint in reach",
+        expected: "the integral stops at its limit of 50 rad s, while an unlimited one grows with the error; after \
+                   release the arm comes back",
         slow: false,
         check: windup,
     },
@@ -72,7 +78,7 @@ const MODERATE: Gains<2> = Gains {
     kd: [30.0, 12.0],
 };
 
-fn slow_control() -> Verdict {
+fn slow_control() -> Observation {
     let (mut lowest, mut highest) = (f64::INFINITY, 0.0_f64);
     let mut worst: f64 = 0.0;
     for method in [Method::Midpoint, Method::Verlet, Method::Rk4] {
@@ -98,7 +104,7 @@ fn slow_control() -> Verdict {
     )
 }
 
-fn held_push() -> Verdict {
+fn held_push() -> Observation {
     let gains = Gains {
         kp: [1000.0; 2],
         ki: [0.0; 2],
@@ -129,7 +135,7 @@ fn held_push() -> Verdict {
     )
 }
 
-fn late_control() -> Verdict {
+fn late_control() -> Observation {
     let control = held(MODERATE, POSE);
     let linear = Linear::at_setpoint(&control);
     let prompt = largest_period(&linear, Method::Rk4, 1);
@@ -153,7 +159,7 @@ fn late_control() -> Verdict {
 }
 
 /// The shipped law has no cap on the effort; this scene puts one behind it.
-fn windup() -> Verdict {
+fn windup() -> Observation {
     const CAP: f64 = 10.0;
     const H: f64 = 0.001;
     let blocked = held(
@@ -203,7 +209,7 @@ fn windup() -> Verdict {
     )
 }
 
-fn too_much_integral() -> Verdict {
+fn too_much_integral() -> Observation {
     let gains = Gains {
         kp: [100.0; 2],
         ki: [2000.0; 2],
@@ -227,8 +233,8 @@ fn too_much_integral() -> Verdict {
     )
 }
 
-/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]: from the largest deviation within two
-/// periods to that within the next two, once other modes have died out.
+/// How fast a small swing of the given period grows, in the live loop's way \[1/s\]: from the largest deviation within
+/// two periods to that within the next two, once other modes have died out.
 fn growth_rate(control: &ControlLoop<2>, swing: f64) -> f64 {
     const STEPS: u32 = 20_000;
     let h = 2.0 * swing / f64::from(STEPS);

@@ -15,20 +15,20 @@ pub struct Scenario {
     pub expected: &'static str,
     /// Whether it takes seconds.
     pub slow: bool,
-    pub(super) check: fn() -> Verdict,
+    pub(super) check: fn() -> Observation,
 }
 
 impl Scenario {
     /// Runs the scene.
     #[must_use]
-    pub fn run(&self) -> Verdict {
+    pub fn run(&self) -> Observation {
         (self.check)()
     }
 }
 
 /// The outcome of a scene.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Verdict {
+pub struct Observation {
     /// The observation, with its figures.
     pub observed: String,
     /// Whether that is what was expected.

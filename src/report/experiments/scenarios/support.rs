@@ -7,7 +7,7 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
-use super::Verdict;
+use super::Observation;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::forward_dynamics;
 use crate::math::integrator::Method;
@@ -20,8 +20,8 @@ use crate::study::matrix::largest;
 /// Unit roundoff: half a unit in the last place of 1.
 pub(super) const ROUND_OFF: f64 = f64::EPSILON / 2.0;
 
-pub(super) fn verdict(holds: bool, observed: String) -> Verdict {
-    Verdict { observed, holds }
+pub(super) fn verdict(holds: bool, observed: String) -> Observation {
+    Observation { observed, holds }
 }
 
 /// A number as a table shows it.

@@ -2,20 +2,21 @@
 //!
 //! **Invariant:** the same error axis in every panel.
 
+use super::data::{Data, Run};
 use super::words::{headline_evaluations, headline_time, headline_timestep};
-use super::{Data, Run, in_f64};
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
-use crate::report::experiments::error::Outcome;
+use crate::report::experiments::error::RunOutcome;
 use crate::report::section::Figure;
-use crate::report::svg::{Axis, Key, Mark, Plot, Point, Series, Unit, scientific, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Plot, Point, Unit, scientific, seconds};
 
 /// All panels share this, so that scenes can be compared. An exact hit is drawn on the lower edge.
 fn error_axis() -> Axis {
     Axis::log_between("largest error [rad]", Unit::Number, 1e-17, 10.0)
 }
 
-fn told(data: &Data, run: &Run) -> String {
-    let Outcome {
+fn tooltip(data: &Data, run: &Run) -> String {
+    let RunOutcome {
         timestep,
         evaluations,
         error,
@@ -45,9 +46,9 @@ fn panels(data: &[Data], x: &Axis, of: impl Fn(&Run) -> f64) -> Vec<Plot> {
                 let points = data.of(method).map(|run| {
                     // An error of exactly 0 has no logarithm: it is drawn at the lower edge.
                     let error = run.outcome.error.max(1e-17);
-                    Point::new(of(run), error, told(data, run))
+                    Point::new(of(run), error, tooltip(data, run))
                 });
-                plot.series.push(Series::of(method, points.collect()));
+                plot.series.push(Curve::of(method, points.collect()));
             }
             plot
         })
@@ -74,9 +75,9 @@ pub(super) fn against_evaluations(data: &[Data]) -> Figure {
     Figure::new(
         "work-precision",
         headline_evaluations(data),
-        "Down and left is better. One mark per timestep, halved from mark to mark; every method takes the same timesteps. \
-         Crosses at the top edge are runs that diverged. The three strokes show orders 1, 2 and 4; the dotted line is one unit in \
-         the last place of 1 rad.",
+        "Down and left is better. One mark per timestep, halved from mark to mark; every method takes the same \
+         timesteps. Crosses at the top edge are runs that diverged. The three strokes show orders 1, 2 and 4; the \
+         dotted line is one unit in the last place of 1 rad.",
         &Key::methods(),
         &plots,
     )
@@ -111,8 +112,8 @@ pub(super) fn against_time(data: &[Data]) -> Figure {
     Figure::new(
         "work-precision-time",
         headline_time(data),
-        "As above, with the clock instead of the count: the minimum of repeats, whiskers from first to third quartile. The scale at \
-         the top is the real-time factor, simulated time over computing time.",
+        "As above, with the clock instead of the count: the minimum of repeats, whiskers from first to third quartile. \
+         The scale at the top is the real-time factor, simulated time over computing time.",
         &Key::methods(),
         &plots,
     )
@@ -132,7 +133,7 @@ pub(super) fn against_timestep(data: &[Data]) -> Figure {
                 plot.marks.push(Mark::Vertical {
                     x: limit,
                     class: method.name(),
-                    told: format!("{method}: predicted stability limit {}", seconds(limit)),
+                    tooltip: format!("{method}: predicted stability limit {}", seconds(limit)),
                 });
             }
         }
@@ -147,7 +148,8 @@ pub(super) fn against_timestep(data: &[Data]) -> Figure {
     Figure::new(
         "convergence",
         headline_timestep(data),
-        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep at the setpoint, one per method.",
+        "The slope is the order, until rounding ends it. Dotted upright lines: the predicted largest stable timestep \
+         at the setpoint, one per method.",
         &Key::methods(),
         &plots,
     )

@@ -1,9 +1,10 @@
-//! The tables: cheapest methods, orders, real-time factors, scenes.
+//! The tables: cheapest methods, orders, real-time factors, scenes, and every run in numbers.
 //!
 //! **Invariant:** what no run reached is called not reached.
 
-use super::{Data, TARGETS, best};
+use super::data::{Data, Run, TARGETS, best};
 use crate::math::integrator::Method;
+use crate::report::csv::{Csv, CsvField};
 use crate::report::section::{Cell, Table};
 use crate::report::svg::{number, power, scientific, seconds};
 
@@ -14,9 +15,9 @@ pub(super) fn cheapest(data: &[Data]) -> Table {
     let mut table = Table::new(
         "cheapest",
         "At a glance: the cheapest method for each error",
-        "Fewest evaluations; under it the timestep, and evaluations and computing time for one simulated second; last how \
-         many times more evaluations the next best method needs. Between two measured timesteps the values are interpolated. \
-         The particle's errors are in m.",
+        "Fewest evaluations; under it the timestep, and evaluations and computing time for one simulated second; last \
+         how many times more evaluations the next best method needs. Between two measured timesteps the values are \
+         interpolated. The particle's errors are in m.",
         &head,
     );
     for data in data {
@@ -47,7 +48,8 @@ pub(super) fn orders(data: &[Data]) -> Table {
     let mut table = Table::new(
         "orders",
         "Fitted orders",
-        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the smallest error that any timestep gave.",
+        "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the \
+         smallest error that any timestep gave.",
         &["Scene", "euler", "midpoint", "verlet", "rk4"],
     );
     for data in data {
@@ -79,8 +81,9 @@ pub(super) fn real_time(data: &[Data]) -> Table {
     let mut table = Table::new(
         "real-time",
         "Faster than the clock",
-        "Time of one step, the least of all runs of a thousand steps and more; simulated over computing time at three timesteps; and what share of a 1 kHz loop \
-         (1 ms per cycle, one step each) the step itself takes. Stepping only: no messages.",
+        "Time of one step, the least of all runs of a thousand steps and more; simulated over computing time at three \
+         timesteps; and what share of a 1 kHz loop (1 ms per cycle, one step each) the step itself takes. Stepping \
+         only: no messages.",
         &[
             "Scene",
             "Method",
@@ -129,4 +132,47 @@ pub(super) fn scene_list(data: &[Data]) -> Table {
         ]);
     }
     table
+}
+
+/// Every run in numbers, for the file beside the page.
+pub(super) fn table_of_runs(data: &[Data]) -> Csv {
+    let mut csv = Csv::new(
+        "scene,links,method,variant,control,dt,n_steps,rhs_evals,wall_min_s,wall_med_s,wall_iqr_s,repeats,\
+         err_max_rad,err_end_rad,err_tip_m,dE_max_scaled,status,ref_uncertainty",
+    );
+    for data in data {
+        for run in &data.runs {
+            let Run {
+                method,
+                outcome,
+                timing,
+            } = run;
+            let (low, high) = timing.quartiles;
+            csv.row(&[
+                data.scene.name().into(),
+                (data.scene.links() as u64).into(),
+                method.name().into(),
+                "as shipped".into(),
+                data.scene.control().into(),
+                outcome.timestep.into(),
+                outcome.steps.into(),
+                outcome.evaluations.into(),
+                timing.minimum.into(),
+                timing.median.into(),
+                (high - low).into(),
+                timing.repeats.into(),
+                outcome.error.into(),
+                outcome.end_error.into(),
+                outcome.end_effector_error.into(),
+                outcome.energy_drift.into(),
+                CsvField::Text(if outcome.diverged.is_some() {
+                    "diverged"
+                } else {
+                    "finished"
+                }),
+                data.scene.uncertainty().into(),
+            ]);
+        }
+    }
+    csv
 }

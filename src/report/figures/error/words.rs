@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
-use super::{Data, best};
+use super::data::{Data, best};
 use crate::math::integrator::Method;
 use crate::report::section::Verdict;
 use crate::report::svg::{number, scientific, seconds};
@@ -57,8 +57,8 @@ pub(super) fn findings(data: &[Data]) -> Vec<String> {
         let (euler, verlet, rk4) = (cost(Method::Euler), cost(Method::Verlet), cost(Method::Rk4));
         if let (Some(euler), Some(verlet), Some(rk4)) = (euler, verlet, rk4) {
             findings.push(format!(
-                "**For 10⁻⁴ rad on a free 2-link swing RK4 takes steps of {}**, and {} evaluations per simulated second; Verlet needs {} times \
-                 as many and Euler {} times.",
+                "**For 10⁻⁴ rad on a free 2-link swing RK4 takes steps of {}**, and {} evaluations per simulated \
+                 second; Verlet needs {} times as many and Euler {} times.",
                 seconds(rk4.timestep),
                 number((rk4.evaluations / swing.scene.duration()).round()),
                 number(verlet.evaluations / rk4.evaluations),
@@ -75,8 +75,8 @@ pub(super) fn findings(data: &[Data]) -> Vec<String> {
         // 2 s in 2048 steps: the power of two next to the default timestep.
         if let (Some(rk4), Some(verlet)) = (at(Method::Rk4, 2048), at(Method::Verlet, 2048)) {
             findings.push(format!(
-                "**With the effort held for each step, as the live arm does, RK4 is no better than Verlet**: at dt = {} they are {} and {} rad from the \
-                 continuous law. What counts is the control period.",
+                "**With the effort held for each step, as the live arm does, RK4 is no better than Verlet**: at dt = \
+                 {} they are {} and {} rad from the continuous law. What counts is the control period.",
                 seconds(rk4.timestep),
                 scientific(rk4.error),
                 scientific(verlet.error)
@@ -87,7 +87,8 @@ pub(super) fn findings(data: &[Data]) -> Vec<String> {
     let slowest = of("swing-3").and_then(|data| data.step_time(Method::Rk4));
     if let (Some(two), Some(three)) = (fastest, slowest) {
         findings.push(format!(
-            "**One RK4 step takes {} with 2 links and {} with 3**: at the default 1 ms the arm runs {} and {} times faster than the clock.",
+            "**One RK4 step takes {} with 2 links and {} with 3**: at the default 1 ms the arm runs {} and {} times \
+             faster than the clock.",
             seconds(two),
             seconds(three),
             number(1e-3 / two),
@@ -133,7 +134,8 @@ pub(super) fn verdicts(data: &[Data]) -> Vec<Verdict> {
         .fold(0.0, f64::max);
     vec![
         Verdict {
-            claim: "Every method converges at its order, and at order 1 where the effort is held (slopes within 0.35)".to_owned(),
+            claim: "Every method converges at its order, and at order 1 where the effort is held (slopes within \
+                    0.35)".to_owned(),
             seen: worst.1,
             holds: worst.0 <= 0.35,
         },

@@ -2,14 +2,14 @@
 //!
 //! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
 
-use super::{Meter, stiffened};
+use super::line::{Meter, stiffened};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::measure::{STEPS, growth};
 use crate::report::making::Making;
 use crate::report::section::Figure;
-use crate::report::svg::{Axis, Heat, Key, Marker, Plot, Point, Series, Unit, seconds};
+use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Plot, Point, Unit, seconds};
 use crate::study::linear::Linear;
 use crate::study::matrix::Matrix;
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
@@ -82,8 +82,8 @@ impl Map {
             y: self.factors.clone(),
             rows,
         });
-        plot.series.push(Series::line("ink", line));
-        plot.series.push(Series {
+        plot.series.push(Curve::line("ink", line));
+        plot.series.push(Curve {
             class: "ink",
             marker: Marker::Circle,
             line: false,
@@ -124,8 +124,8 @@ impl Map {
             row.push(level(growth));
             self.cells += 1;
             if growth.is_some_and(|growth| growth < 1.0) != (h < limit) {
-                let told = format!("predicted limit {}", seconds(limit));
-                disagreeing.push(Point::new(h, factor, told));
+                let tooltip = format!("predicted limit {}", seconds(limit));
+                disagreeing.push(Point::new(h, factor, tooltip));
             }
         }
         (limit, row)
@@ -140,20 +140,20 @@ impl Map {
                 self.cells,
                 self.undecided
             ),
-            "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power of 3/2: \
-             the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows (orange), the darker \
-             the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: not judged, because by the prediction the \
-             slowest mode changes its energy by less than a factor e in the 4000 steps watched; that is asked of every cell alike, before \
-             looking at whether it agrees. In the lowest rows the gains are too \
-             weak to carry the arm against gravity: no timestep is stable.",
+            "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power \
+             of 3/2: the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows \
+             (orange), the darker the faster. LimitRow: the predicted limit. Dots: cells where the two disagree. Grey: \
+             not judged, because by the prediction the slowest mode changes its energy by less than a factor e in the \
+             4000 steps watched; that is asked of every cell alike, before looking at whether it agrees. In the lowest \
+             rows the gains are too weak to carry the arm against gravity: no timestep is stable.",
             &[Key::line("ink", "predicted limit")],
             &self.plots,
         )
     }
 }
 
-/// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor e
-/// meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
+/// Whether the watch is too short to tell: by the prediction the slowest mode changes its energy by less than a factor
+/// e meanwhile, so that where in its swing it is looked at decides. What was measured has no part in this.
 fn undecided(step: &Matrix) -> bool {
     let watched = in_f64(STEPS);
     2.0 * watched * step.spectral_radius().ln().abs() < 1.0

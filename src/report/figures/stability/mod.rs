@@ -2,14 +2,20 @@
 //!
 //! **Invariant:** prediction and measurement share the arm and the gains, and nothing else.
 
+mod line;
 mod map;
 mod period;
 mod radius;
+mod regions;
+mod tables;
 mod words;
 
+use line::{LimitRow, Meter, stiffened};
 use map::map;
 use period::{growth, period_table, periods};
 use radius::radius_figure;
+use regions::regions_figure;
+use tables::{edges, table};
 use words::{findings, verdicts};
 
 use crate::math::arm::Arm;
@@ -17,31 +23,9 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::report::experiments::measure::measured_limit;
 use crate::report::making::Making;
-use crate::report::section::{Block, Cell, Section, Table};
-use crate::report::svg::seconds;
+use crate::report::section::{Block, Section};
 use crate::study::control_loop::ControlLoop;
 use crate::study::stability::{Sampling, limits};
-
-/// Measured and predicted limits may differ by this part.
-const AGREEMENT: f64 = 0.01;
-
-/// One line of the table of limits.
-struct Line {
-    links: usize,
-    gains: &'static str,
-    method: Method,
-    sampling: Sampling,
-    predicted: f64,
-    measured: Option<f64>,
-    over_poses: Option<f64>,
-    advised: Option<f64>,
-}
-
-impl Line {
-    fn ratio(&self) -> Option<f64> {
-        Some(self.measured? / self.predicted)
-    }
-}
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let cells = making.choose(48, 16);
@@ -74,12 +58,14 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let periods = periods(making, &mut meter);
     let (radius, csv) = radius_figure(&lines);
     making.keep("spectral-radius", csv);
+    let (regions, csv) = regions_figure(&stiffened(1.0));
+    making.keep("regions", csv);
     let growth = growth(making, &mut meter);
     making.keep("control-period", growth.csv.clone());
     Section {
         findings: findings(&lines),
         verdicts: verdicts(&lines, &map, &periods, &growth),
-        glance: vec![edges(&lines)],
+        glance: vec![Block::Table(edges(&lines)), Block::Figure(regions)],
         blocks: vec![
             Block::Figure(radius),
             Block::Figure(growth.figure()),
@@ -88,18 +74,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
             Block::Table(period_table(&periods)),
         ],
         ..Section::default()
-    }
-}
-
-struct Meter {
-    done: usize,
-    of: usize,
-}
-
-impl Meter {
-    fn add(&mut self, making: &mut Making<'_>, work: usize) {
-        self.done += work;
-        making.at(self.done, self.of);
     }
 }
 
@@ -131,7 +105,7 @@ fn gains_three() -> [(&'static str, Gains<3>); 3] {
 fn lines_of<const N: usize>(
     making: &mut Making<'_>,
     meter: &mut Meter,
-    lines: &mut Vec<Line>,
+    lines: &mut Vec<LimitRow>,
     name: &'static str,
     control: &ControlLoop<N>,
 ) {
@@ -147,7 +121,7 @@ fn lines_of<const N: usize>(
             let Some(predicted) = predicted.filter(|limit| *limit > 0.0) else {
                 continue;
             };
-            lines.push(Line {
+            lines.push(LimitRow {
                 links: N,
                 gains: name,
                 method,
@@ -159,128 +133,4 @@ fn lines_of<const N: usize>(
             });
         }
     }
-}
-
-fn told(sampling: Sampling) -> &'static str {
-    match sampling {
-        Sampling::Held => "effort held for the step (as shipped)",
-        Sampling::Continuous => "law in every stage",
-    }
-}
-
-fn capital(words: &str) -> String {
-    let mut letters = words.chars();
-    letters.next().map_or_else(String::new, |first| {
-        first.to_uppercase().chain(letters).collect()
-    })
-}
-
-fn table(lines: &[Line]) -> Table {
-    let mut table = Table::new(
-        "limits",
-        "Largest stable timesteps",
-        "Predicted from the loop linearised where it rests, at (0.4, 0.8), with 3 links (0.4, 0.8, -0.5), measured by nudging the arm itself and watching whether \
-         it settles; the smallest limit of all poses, proven where it can be, and 0.8 times that as advice. Prediction and measurement must agree to 1 %.",
-        &[
-            "Links",
-            "Gains",
-            "Method",
-            "Control",
-            "Predicted",
-            "Measured",
-            "Measured / predicted",
-            "Over all poses",
-            "Advised",
-        ],
-    );
-    for line in lines {
-        let time = |limit: Option<f64>| {
-            limit.map_or_else(|| Cell::new("–"), |limit| Cell::new(seconds(limit)))
-        };
-        let ratio = line.ratio();
-        let good = ratio.is_some_and(|ratio| (ratio - 1.0).abs() <= AGREEMENT);
-        table.rows.push(vec![
-            Cell::new(line.links.to_string()),
-            Cell::new(line.gains),
-            Cell::method(line.method),
-            Cell::new(told(line.sampling)),
-            Cell::new(seconds(line.predicted)),
-            line.measured.map_or_else(
-                || Cell::new("none found").class("bad"),
-                |measured| Cell::new(seconds(measured)),
-            ),
-            ratio.map_or_else(Cell::default, |ratio| {
-                Cell::new(format!("{ratio:.5}")).class(if good { "good" } else { "bad" })
-            }),
-            time(line.over_poses),
-            time(line.advised),
-        ]);
-    }
-    table
-}
-
-fn edges(lines: &[Line]) -> Table {
-    let mut table = Table::new(
-        "edges",
-        "At a glance: where it goes unstable, and why",
-        "Largest stable timestep with the shipped gains. Held for the step, the limit belongs to the control period: the effort answers a state that is \
-         up to a step old. In every stage it belongs to the method.",
-        &[
-            "Arm", "Control", "euler", "midpoint", "verlet", "rk4", "Why",
-        ],
-    );
-    for links in [2, 3] {
-        for sampling in Sampling::ALL {
-            let of = |method| {
-                lines.iter().find(|line| {
-                    line.links == links
-                        && line.gains == "shipped"
-                        && line.sampling == sampling
-                        && line.method == method
-                })
-            };
-            let mut row = vec![
-                Cell::new(format!("{links} links, shipped gains")),
-                Cell::new(told(sampling)),
-            ];
-            for method in Method::ALL {
-                row.push(match of(method) {
-                    Some(line) => {
-                        let measured = line.measured.map_or_else(
-                            || "not measured".to_owned(),
-                            |m| format!("measured {}", seconds(m)),
-                        );
-                        Cell::new(seconds(line.predicted)).detail(measured)
-                    }
-                    None => Cell::new("none").class("bad"),
-                });
-            }
-            row.push(Cell::new(match sampling {
-                Sampling::Held => "the control period: damping answers too late",
-                Sampling::Continuous => "the method's stability region",
-            }));
-            table.rows.push(row);
-        }
-    }
-    table
-}
-
-/// The 2-link arm with the shipped gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
-fn stiffened(factor: f64) -> ControlLoop<2> {
-    let Gains { kp, ki, kd } = Gains::<2>::default();
-    let gains = Gains {
-        kp: kp.map(|kp| kp * factor),
-        ki: ki.map(|ki| ki * factor.powf(1.5)),
-        kd: kd.map(|kd| kd * factor.sqrt()),
-    };
-    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
-}
-
-fn shipped(lines: &[Line], sampling: Sampling, method: Method) -> Option<&Line> {
-    lines.iter().find(|line| {
-        line.links == 2
-            && line.gains == "shipped"
-            && line.sampling == sampling
-            && line.method == method
-    })
 }

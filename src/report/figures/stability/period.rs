@@ -2,14 +2,14 @@
 //!
 //! **Invariant:** what takes too long to measure is called not measured.
 
-use super::{Meter, stiffened};
+use super::line::{Meter, stiffened};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::growth::growth_per_period;
 use crate::report::experiments::measure::measured_period;
 use crate::report::making::Making;
 use crate::report::section::{Cell, Figure, Table};
-use crate::report::svg::{Axis, Key, Mark, Marker, Plot, Point, Series, Unit, number, seconds};
+use crate::report::svg::{Axis, Curve, Key, Mark, Marker, Plot, Point, Unit, number, seconds};
 use crate::study::linear::Linear;
 use crate::study::stability::{largest_period, period_matrix};
 
@@ -45,8 +45,9 @@ pub(super) fn period_table(periods: &[Period]) -> Table {
     let mut table = Table::new(
         "period-limits",
         "The limit belongs to the control period",
-        "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the method (2 links, shipped gains). Smaller steps at the \
-         same control period buy nothing; Euler only moves to the limit of the others.",
+        "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the \
+         method (2 links, shipped gains). Smaller steps at the same control period buy nothing; Euler only moves to \
+         the limit of the others.",
         &["Method", "1 step per period", "10 steps", "100 steps"],
     );
     for method in Method::ALL {
@@ -136,7 +137,7 @@ impl Growth {
                 .map(|index| between(index, 200))
                 .map(|period| (period, predicted(period)))
                 .filter(|(_, growth)| *growth <= GROWTH.1);
-            plot.series.push(Series::line(class, curve));
+            plot.series.push(Curve::line(class, curve));
             let mut points = Vec::new();
             // Along the curve in turns, so that one mark does not hide the next, and closely where it turns up.
             let turn = turn_of(substeps);
@@ -164,13 +165,13 @@ impl Growth {
                 }
                 self.dots += 1;
                 self.furthest = self.furthest.max((measured / expected - 1.0).abs());
-                let told = format!(
+                let tooltip = format!(
                     "{substeps} steps in {}: {measured:.5} measured, {expected:.5} predicted",
                     seconds(period)
                 );
-                points.push(Point::new(period, measured, told));
+                points.push(Point::new(period, measured, tooltip));
             }
-            plot.series.push(Series {
+            plot.series.push(Curve {
                 class,
                 marker,
                 line: false,
@@ -198,14 +199,15 @@ impl Growth {
         Figure::new(
             "control-period",
             format!(
-                "1, 10 and 100 steps per control period give the same growth to {} % from order 2 on; {} measurements lie on their curves to {} %",
+                "1, 10 and 100 steps per control period give the same growth to {} % from order 2 on; {} measurements \
+                 lie on their curves to {} %",
                 number(100.0 * self.apart),
                 self.dots,
                 number(100.0 * self.furthest)
             ),
-            "2 links, shipped gains, effort held over the period. Curves: spectral radius of one control period of the linearised loop. \
-             Dots: how much a nudge of the arm itself grows per period, over 4000 periods. Only Euler with one step per period has a \
-             curve of its own.",
+            "2 links, shipped gains, effort held over the period. Curves: spectral radius of one control period of the \
+             linearised loop. Dots: how much a nudge of the arm itself grows per period, over 4000 periods. Only Euler \
+             with one step per period has a curve of its own.",
             &keys,
             &self.plots,
         )

@@ -2,15 +2,15 @@
 //!
 //! **Invariant:** every number in a sentence is one of this run.
 
+use super::line::{AGREEMENT, LimitRow, shipped};
 use super::map::Map;
 use super::period::{Growth, Period};
-use super::{AGREEMENT, Line, shipped};
 use crate::math::integrator::Method;
 use crate::report::section::Verdict;
 use crate::report::svg::{number, seconds};
 use crate::study::stability::Sampling;
 
-pub(super) fn findings(lines: &[Line]) -> Vec<String> {
+pub(super) fn findings(lines: &[LimitRow]) -> Vec<String> {
     let mut findings = Vec::new();
     let at = |sampling, method| shipped(lines, sampling, method).map(|line| line.predicted);
     if let (Some(verlet), Some(rk4), Some(continuous)) = (
@@ -19,8 +19,8 @@ pub(super) fn findings(lines: &[Line]) -> Vec<String> {
         at(Sampling::Continuous, Method::Rk4),
     ) {
         findings.push(format!(
-            "**With the shipped gains the live 2-link arm goes unstable at {} with RK4 and at {} with Verlet**: the same, since the effort is held for the step. With the law in \
-             every stage RK4 would be stable up to {}.",
+            "**With the shipped gains the live 2-link arm goes unstable at {} with RK4 and at {} with Verlet**: the \
+             same, since the effort is held for the step. With the law in every stage RK4 would be stable up to {}.",
             seconds(rk4),
             seconds(verlet),
             seconds(continuous)
@@ -28,14 +28,15 @@ pub(super) fn findings(lines: &[Line]) -> Vec<String> {
     }
     let worst = worst(lines);
     findings.push(format!(
-        "**The linearised loop predicts the arm's own limit to {} %** in {} cases: 2 and 3 links, mild to overdamped gains, all methods, both kinds of control.",
+        "**The linearised loop predicts the arm's own limit to {} %** in {} cases: 2 and 3 links, mild to overdamped \
+         gains, all methods, both kinds of control.",
         number(100.0 * worst),
         lines.len()
     ));
     findings
 }
 
-fn worst(lines: &[Line]) -> f64 {
+fn worst(lines: &[LimitRow]) -> f64 {
     lines
         .iter()
         .map(|line| {
@@ -46,7 +47,7 @@ fn worst(lines: &[Line]) -> f64 {
 }
 
 pub(super) fn verdicts(
-    lines: &[Line],
+    lines: &[LimitRow],
     map: &Map,
     periods: &[Period],
     growth: &Growth,
@@ -77,12 +78,14 @@ pub(super) fn verdicts(
             holds: map.disagreeing * 100 <= map.cells,
         },
         Verdict {
-            claim: "With a held effort midpoint, Verlet and RK4 share one limit of the control period, however many steps it is cut into (within 0.1 %)".to_owned(),
+            claim: "With a held effort midpoint, Verlet and RK4 share one limit of the control period, however many \
+                    steps it is cut into (within 0.1 %)".to_owned(),
             seen: format!("{} % between the smallest and the largest", number(100.0 * spread)),
             holds: spread <= 1e-3,
         },
         Verdict {
-            claim: "A deviation of the arm grows per control period as the spectral radius says (within 0.1 %)".to_owned(),
+            claim: "A deviation of the arm grows per control period as the spectral radius says (within 0.1 \
+                    %)".to_owned(),
             seen: format!(
                 "furthest off {} % in {} measurements with 1, 10 and 100 steps per period",
                 number(100.0 * growth.furthest),

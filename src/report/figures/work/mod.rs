@@ -1,54 +1,43 @@
 //! Work that a scene does not need, and whether it is left out.
 //!
 //! Times and bits are measured here. Instructions, allocations and the server's own work are counted by
-//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be unmeasured.
+//! `scripts/measure-work.sh`, which leaves them in `work.csv` beside the page; what is not there is said to be
+//! unmeasured.
 //!
 //! **Invariant:** no number in here that was not measured for this report.
 
 mod cells;
+mod counts;
 mod server;
 mod tables;
 
-use std::collections::HashMap;
 use std::hint::black_box;
 
+use counts::{Counts, Kind, STEPS, read};
 use tables::{steps_table, table};
 
-use crate::math::arm::{Arm, State};
+use crate::math::arm::State;
 use crate::math::count::in_f64;
+use crate::math::dynamics::forward_dynamics;
 use crate::math::expression::Expression;
-use crate::math::integrator::Method;
+use crate::math::integrator::{Method, increment};
 use crate::math::particle::Particle;
-use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::Simulation;
+use crate::math::pid::Gains;
+use crate::math::simulation::{Simulation, step_under};
 use crate::report::csv::Csv;
+use crate::report::experiments::step_scene::{ready, undamped};
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Bars, number};
-use crate::report::timing::{Effort, Timing, time};
-
-const STEPS: u64 = 20_000;
-
-/// One kind of step, by the name that `benches/src/bin/work.rs` knows it by.
-struct Kind {
-    name: &'static str,
-    timing: Timing,
-}
-
-impl Kind {
-    /// Time of one step \[s\].
-    fn step_time(&self) -> f64 {
-        self.timing.minimum / in_f64(STEPS)
-    }
-}
-
-/// Counts by name, as the script left them.
-type Counts = HashMap<String, f64>;
+use crate::report::timing::{Effort, time};
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let counts = read(making);
     let kinds = time_kinds(making);
-    let same_bits = off_is_zero_gains::<2>() && off_is_zero_gains::<3>();
+    let same_bits = [
+        off_is_zero_gains::<2>() && off_is_zero_gains::<3>(),
+        weightless_is_gravity_zero::<2>() && weightless_is_gravity_zero::<3>(),
+    ];
     let mut csv = Csv::new("name,ns_per_step,ns_iqr,instructions_per_step");
     for kind in &kinds {
         let per_step = 1e9 / in_f64(STEPS);
@@ -74,46 +63,6 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     }
 }
 
-fn read(making: &Making<'_>) -> Counts {
-    let text = std::fs::read_to_string(making.out.join("work.csv")).unwrap_or_default();
-    text.lines()
-        .skip(1)
-        .filter_map(|line| {
-            let mut fields = line.split(',');
-            let name = fields.next()?.to_owned();
-            Some((name, fields.next()?.parse().ok()?))
-        })
-        .collect()
-}
-
-fn start<const N: usize>(
-    gravity: f64,
-    integral: bool,
-    control: bool,
-    method: Method,
-) -> Simulation<N>
-where
-    Gains<N>: Default,
-{
-    let arm = Arm::new([1.0; N], [1.0; N], gravity).unwrap_or_default();
-    let mut gains = Gains::default();
-    if !integral {
-        gains.ki = [0.0; N];
-    }
-    let mut simulation = Simulation::new(arm, gains);
-    simulation.set_method(method);
-    simulation.set_state(State {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.set_setpoint(Setpoint {
-        position: [0.4; N],
-        velocity: [0.0; N],
-    });
-    simulation.enable(control);
-    simulation
-}
-
 fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
     let effort = making.choose(
         Effort {
@@ -133,14 +82,14 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
             name,
             timing: time(effort, work),
         });
-        making.at(kinds.len(), 12);
+        making.at(kinds.len(), 14);
     };
     let two = |gravity, integral, control, method| {
-        let ready = start::<2>(gravity, integral, control, method);
+        let ready = ready::<2>(gravity, integral, control, method);
         move || run(&ready)
     };
     let three = |gravity, control| {
-        let ready = start::<3>(gravity, true, control, Method::Rk4);
+        let ready = ready::<3>(gravity, true, control, Method::Rk4);
         move || run(&ready)
     };
     add(
@@ -161,6 +110,12 @@ fn time_kinds(making: &mut Making<'_>) -> Vec<Kind> {
         &mut two(0.0, true, false, Method::Rk4),
     );
     add("step-2-rk4-pd", &mut two(9.81, false, true, Method::Rk4));
+    let mut without_damping = ready::<2>(9.81, true, true, Method::Rk4);
+    without_damping.set_gains(undamped());
+    add("step-2-rk4-pi", &mut || run(&without_damping));
+    let mut pushed = ready::<2>(9.81, true, true, Method::Rk4);
+    pushed.disturb([0.0; 2], 1e9);
+    add("step-2-rk4-pushed", &mut || run(&pushed));
     add("step-2-rk4-pid", &mut two(9.81, true, true, Method::Rk4));
     add("step-3-rk4-free", &mut three(9.81, false));
     add("step-3-rk4-weightless", &mut three(0.0, false));
@@ -193,8 +148,8 @@ where
     Gains<N>: Default,
 {
     Method::ALL.into_iter().all(|method| {
-        let mut off = start::<N>(9.81, true, false, method);
-        let mut zero = start::<N>(9.81, true, true, method);
+        let mut off = ready::<N>(9.81, true, false, method);
+        let mut zero = ready::<N>(9.81, true, true, method);
         zero.set_gains(Gains {
             kp: [0.0; N],
             ki: [0.0; N],
@@ -204,6 +159,33 @@ where
         zero.advance(5000);
         let bits = |simulation: &Simulation<N>| simulation.state().position.map(f64::to_bits);
         bits(&off) == bits(&zero)
+    })
+}
+
+/// Whether a live arm at gravity 0, which does not look at its first angle, moves by the same bits as steps that do.
+fn weightless_is_gravity_zero<const N: usize>() -> bool
+where
+    Gains<N>: Default,
+{
+    Method::ALL.into_iter().all(|method| {
+        let mut live = ready::<N>(0.0, true, false, method);
+        let mut state = State {
+            position: [0.4; N],
+            velocity: [1.5; N],
+        };
+        live.set_state(state);
+        let (arm, h) = (*live.arm(), live.timestep());
+        (0..5000).all(|_| {
+            // From the same state each: the live arm carries its rounding, these steps do not.
+            let State { position, velocity } = &state;
+            let acceleration =
+                |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&arm, q, v, &[0.0; N]);
+            let looked_at = increment(method, acceleration, 0.0, position, velocity, h);
+            let left_out = step_under(&arm, method, &state, &[0.0; N], h);
+            live.advance(1);
+            state = *live.state();
+            looked_at == left_out
+        })
     })
 }
 
@@ -262,7 +244,8 @@ fn findings(counts: &Counts) -> Vec<String> {
         server::encoded(counts, "server-11-subscribers"),
     ) {
         findings.push(format!(
-            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} instructions each, for eleven {} at {}.",
+            "**While nobody listens the server encodes {} messages a second**, for one subscriber {} at {} \
+             instructions each, for eleven {} at {}.",
             number(none),
             number(one),
             number(each.round()),
@@ -272,7 +255,8 @@ fn findings(counts: &Counts) -> Vec<String> {
     }
     if let (Some(off), Some(on)) = (counts.get("step-2-rk4-free"), counts.get("step-2-rk4-pid")) {
         findings.push(format!(
-            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} instructions instead of {}.",
+            "**The arm is what a step costs, not what is around it**: without the control law a 2-link RK4 step is {} \
+             instructions instead of {}.",
             number(off.round()),
             number(on.round())
         ));
@@ -314,12 +298,16 @@ const BELOW: [(&str, &str, &str, f64); 5] = [
     ),
 ];
 
-fn verdicts(counts: &Counts, same_bits: bool) -> Vec<Verdict> {
-    let mut verdicts = vec![Verdict {
-        claim: "Leaving out the control law changes no bit".to_owned(),
+fn verdicts(counts: &Counts, [off, weightless]: [bool; 2]) -> Vec<Verdict> {
+    let no_bit = |work: &str, holds| Verdict {
+        claim: format!("Leaving out {work} changes no bit"),
         seen: "5000 steps of every method, 2 and 3 links".to_owned(),
-        holds: same_bits,
-    }];
+        holds,
+    };
+    let mut verdicts = vec![
+        no_bit("the control law", off),
+        no_bit("the first angle at gravity 0", weightless),
+    ];
     for (claim, name, unit, bound) in BELOW {
         if let Some(count) = counts.get(name) {
             verdicts.push(Verdict {

@@ -2,8 +2,8 @@
 //!
 //! **Invariant:** what was not counted for this report is called not measured.
 
-use super::Counts;
 use super::cells::{percent_saved, unmeasured};
+use super::counts::Counts;
 use crate::report::section::Cell;
 use crate::report::svg::number;
 

@@ -94,7 +94,7 @@ pub fn push_integration(client: &mut Client, rng: &mut fastrand::Rng, steps: u64
         Ok(())
     };
     client.world.count("computations asked", 1);
-    // What the program sets aside for three numbers of up to 32 characters for every step.
+    // The program sets this aside: three numbers of up to 32 characters for every step.
     client.expect_bytes(100 * (steps as usize + 1));
     client.push_call(
         "/arm_sim/integration_step",
@@ -158,7 +158,7 @@ fn push_stability(client: &mut Client, rng: &mut fastrand::Rng) {
         let advised = response["values"]["advised_timestep"]
             .as_f64()
             .unwrap_or(f64::NAN);
-        // What is advised is the smaller of what the loop bears in every pose and what the live arm's motion bears, which others push.
+        // The advice is the smaller of two: the loop's limit in every pose, and that of the live arm's motion, which others push.
         let motion = response["values"]["timestep_limit_motion"]
             .as_f64()
             .map_or(f64::INFINITY, |motion| ADVISED_PART * motion);

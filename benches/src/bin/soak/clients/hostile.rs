@@ -30,13 +30,13 @@ pub async fn attack(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Faul
         .filter(|attack| is_wanted(attack.name))
         .copied()
         .collect();
-    // Whoever asks for a kind of clients alone has any of the attacks.
+    // A run with this kind of clients alone has any of the attacks.
     let attacks = if wanted.is_empty() { attacks } else { wanted };
     let attack = *attacks[rng.usize(..attacks.len())];
     let (address, time) = (world.address, Duration::from_millis(rng.u64(500..2000)));
     let playing = tokio::task::spawn_blocking(move || {
         let cast = (attack.cast)();
-        // Whoever is deaf comes first in an attack, whoever floods last.
+        // The deaf come first in an attack, those that flood last.
         let cast = &cast[cast.len().saturating_sub(MOST)..];
         let (deeds, ends) = (Deeds::default(), Instant::now() + time);
         play(cast, address, &deeds, || Instant::now() >= ends);

@@ -20,7 +20,7 @@ use std::rc::Rc;
 
 use crate::world::{Fault, World};
 
-/// What a client does, from its beginning to its end.
+/// A client's life, from its beginning to its end.
 pub type Life = Pin<Box<dyn Future<Output = Result<(), Fault>>>>;
 
 /// A kind of client.
@@ -31,7 +31,7 @@ pub struct Kind {
     pub weight: u32,
     /// How many of it there may be at once: what costs the machine most comes one at a time.
     pub at_once: usize,
-    /// What it does.
+    /// Its actions.
     pub live: fn(Rc<World>, fastrand::Rng) -> Life,
 }
 

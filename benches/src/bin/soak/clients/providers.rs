@@ -114,7 +114,7 @@ async fn advertise(
     Ok(provider)
 }
 
-/// What a provider answers to the call with this number.
+/// The provider's answer to the call with this number.
 fn content(n: u64, by: u64) -> Value {
     json!({"n": n, "by": by, "thrice": 3 * n})
 }

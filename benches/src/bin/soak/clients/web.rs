@@ -15,7 +15,7 @@ use crate::wire::{Client, Door};
 use crate::world::{Fault, PATIENCE, World};
 use pendularm_client::websocket::{LAST, append, append_close, opcode};
 
-/// What HTTP has for those who take too long, and what the README says of it.
+/// HTTP's status for those who take too long, and the README's word for it.
 const HEAD_TIME: Duration = Duration::from_secs(5);
 
 /// The mask where any will do.

@@ -1,0 +1,137 @@
+"""Steps a second beside Acrobot and MuJoCo, in one run on one core: environments.py [seconds per row].
+
+Needs gymnasium and mujoco beside the wheel (`requirements.txt` in this folder). Every row is measured in turn, three rounds,
+in processor time of this process, which other programs on the machine disturb less than the clock; the best round counts.
+A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python, one of pendularm and of MuJoCo two over 0.025 s.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+
+import gymnasium
+import mujoco
+import mujoco.rollout
+import numpy as np
+
+import pendularm
+import pendularm.envs
+
+ARMS = 1024
+ROUNDS = 3
+
+ROD = """<body pos="{at} 0 0"><joint axis="0 0 1"/><geom type="capsule" size=".01" fromto="0 0 0 1 0 0" mass="0"/>
+<inertial pos=".5 0 0" mass="1" diaginertia="1e-6 .083333333333 .083333333333"/>{further}</body>"""
+ARM = f"""<mujoco><option timestep=".025" integrator="RK4" gravity="0 -9.81 0"><flag contact="disable"/></option><worldbody>
+{ROD.format(at=0, further=ROD.format(at=1, further=""))}</worldbody></mujoco>"""
+
+
+def single(env: gymnasium.Env) -> Callable[[], int]:
+    """So many steps of one environment, which begins anew wherever it ends."""
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(64)]
+
+    def run() -> int:
+        for action in actions:
+            _, _, terminated, truncated, _ = env.step(action)
+            if terminated or truncated:
+                env.reset()
+        return len(actions)
+
+    return run
+
+
+def vector(env: gymnasium.vector.VectorEnv) -> Callable[[], int]:
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = [env.action_space.sample() for _ in range(8)]
+
+    def run() -> int:
+        for action in actions:
+            env.step(action)
+        return len(actions) * env.num_envs
+
+    return run
+
+
+def batch() -> Callable[[], int]:
+    """The library alone: no observation, no reward."""
+    arms = pendularm.Batch(ARMS, threads=1)
+    arms.set_integrator(timestep=0.025)
+    effort = np.random.default_rng(0).uniform(-1, 1, (ARMS, 2))
+
+    def run() -> int:
+        arms.step(2, effort)
+        return ARMS
+
+    return run
+
+
+def mujoco_step() -> Callable[[], int]:
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+
+    def run() -> int:
+        for _ in range(64):
+            mujoco.mj_step(model, data, 2)
+        return 64
+
+    return run
+
+
+def mujoco_rollout() -> Callable[[], int]:
+    """MuJoCo's own way with many arms: no Python between two steps."""
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    size = mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    start = np.zeros((64, size))
+    mujoco.mj_getState(model, data, start[0], mujoco.mjtState.mjSTATE_FULLPHYSICS)
+    start[:] = start[0]
+
+    def run() -> int:
+        mujoco.rollout.rollout(model, data, start, nstep=100)
+        return 64 * 100 // 2
+
+    return run
+
+
+def check() -> None:
+    """The arm in MuJoCo is the same one: a second of free fall agrees as well as its inertia is written."""
+    model = mujoco.MjModel.from_xml_string(ARM)
+    data = mujoco.MjData(model)
+    mujoco.mj_step(model, data, 40)
+    arm = pendularm.Simulation(timestep=0.025)
+    arm.step(40)
+    assert np.allclose(data.qpos, arm.position, rtol=0, atol=1e-9), (data.qpos, arm.position)
+
+
+def main() -> None:
+    check()
+    seconds = float(sys.argv[1]) if len(sys.argv) > 1 else 1.0
+    rows = {
+        "Acrobot-v1": single(gymnasium.make("Acrobot-v1")),
+        "Acrobot-v1, 8 in a SyncVectorEnv": vector(gymnasium.make_vec("Acrobot-v1", 8, vectorization_mode="sync")),
+        "MuJoCo, mj_step with nstep=2": mujoco_step(),
+        "MuJoCo, rollout of 64 arms": mujoco_rollout(),
+        "Pendularm-v0": single(gymnasium.make("Pendularm-v0")),
+        f"Pendularm-v0, {ARMS} in its vector environment": vector(gymnasium.make_vec("Pendularm-v0", ARMS, threads=1)),
+        f"PendularmReach-v0, {ARMS} likewise": vector(gymnasium.make_vec("PendularmReach-v0", ARMS, threads=1)),
+        f"pendularm.Batch of {ARMS}": batch(),
+    }
+    best = dict.fromkeys(rows, 0.0)
+    for _ in range(ROUNDS):
+        for name, run in rows.items():
+            run()
+            steps, began = 0, time.process_time()
+            while (took := time.process_time() - began) < seconds:
+                steps += run()
+            best[name] = max(best[name], steps / took)
+    acrobot = max(rate for name, rate in best.items() if name.startswith("Acrobot"))
+    print("| one core | steps a second | times Acrobot |\n| --- | --- | --- |")
+    for name, rate in best.items():
+        print(f"| {name} | {rate:,.0f} | {rate / acrobot:.1f} |")
+
+
+if __name__ == "__main__":
+    main()

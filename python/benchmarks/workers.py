@@ -1,0 +1,50 @@
+"""Settings a second of one sweep by the number of workers: workers.py [settings].
+
+On threads, as `sweep` does by itself, and on a Dask cluster on loopback whose workers are processes of one thread (needs
+`distributed` beside the wheel). Clock time, the best of three rounds; other programs on the machine count.
+"""
+
+import os
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import distributed
+import numpy as np
+
+import pendularm
+
+ROUNDS = 3
+
+
+def rate(settings: int, executor: object) -> float:
+    """Servo gains of a 2-link arm, 2 s each at 2 ms."""
+    side = round(settings**0.5)
+    grid = {"kp": np.geomspace(50, 2000, side), "kd": np.geomspace(2, 100, side)}
+    took = []
+    for _ in range(ROUNDS):
+        began = time.perf_counter()
+        pendularm.sweep(
+            grid, setpoint=[0.6, -0.4], timestep=0.002, duration=2.0, samples=101, executor=executor, progress=False
+        )
+        took.append(time.perf_counter() - began)
+    return side**2 / min(took)
+
+
+def main() -> None:
+    settings = int(sys.argv[1]) if len(sys.argv) > 1 else 40_000
+    print("| workers | threads, settings/s | Dask processes, settings/s |\n| --- | --- | --- |")
+    workers = 1
+    while workers <= (os.cpu_count() or 1):
+        with ThreadPoolExecutor(workers) as threads:
+            on_threads = rate(settings, threads)
+        with (
+            distributed.LocalCluster(workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            print(f"| {workers} | {on_threads:,.0f} | {rate(settings, client.get_executor()):,.0f} |")
+        workers *= 2
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,312 @@
+"""Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many arms
+``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
+
+The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has a random
+stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number. They truncate
+themselves, and reset an arm in the call after its end, whose action is ignored (`AutoresetMode.NEXT_STEP`). All arrays that are
+returned are fresh.
+"""
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from . import dynamics
+from ._native import Arm, Batch
+
+__all__ = [
+    "PendularmEnv",
+    "PendularmReachEnv",
+    "PendularmReachVectorEnv",
+    "PendularmVectorEnv",
+]
+
+Observation = NDArray[np.float32]
+Action = NDArray[np.float32]
+Floats = NDArray[np.float64]
+
+SUBSTEPS = 2
+TIMESTEP = 0.025
+"""Steps of Runge-Kutta 4 in a step of an environment, which thus takes 0.05 s."""
+
+FASTEST = 25.0
+"""Joint rate [rad/s] at which an arm counts as lost: the method carries twice as much."""
+
+
+class _Task:
+    """Arms that all have the same to do: how they start, what is seen of them, and what they are rewarded for."""
+
+    strength: ClassVar[float]
+    """Efforts that an action of 1 stands for, in parts of those that hold the stretched arm."""
+
+    def __init__(self, arms: int, links: int, threads: int | None) -> None:
+        self.batch = Batch(arms, links, threads=threads)
+        self.batch.set_integrator("rk4", TIMESTEP)
+        arm = Arm(links)
+        self.links = links
+        self.reach = arm.reach
+        self.efforts = self.strength * dynamics.gravity_load(arm, np.zeros(links))
+        self.action_space = spaces.Box(-1.0, 1.0, (links,), np.float32)
+        bounds = np.array([1.0] * (2 * links) + [FASTEST] * links + self.further_bounds(), np.float32)
+        self.observation_space = spaces.Box(-bounds, bounds, dtype=np.float32)
+
+    def further_bounds(self) -> list[float]:
+        return []
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        """Puts arms where they start, each from its own stream."""
+        raise NotImplementedError
+
+    def further(self) -> list[Floats]:
+        """What is seen beside the joints, a row per arm."""
+        return []
+
+    def reward(self) -> Floats:
+        """From 0 to 1, one per arm: an end that comes early is never a gain."""
+        raise NotImplementedError
+
+    def go_on(self, actions: Action) -> None:
+        self.batch.step(SUBSTEPS, np.clip(actions, -1.0, 1.0) * self.efforts)
+
+    def observe(self) -> Observation:
+        position, rate = self.batch.position, self.batch.velocity
+        seen = [np.cos(position), np.sin(position), np.clip(rate, -FASTEST, FASTEST), *self.further()]
+        return np.concatenate(seen, axis=1, dtype=np.float32, casting="same_kind")
+
+    def lost(self) -> NDArray[np.bool_]:
+        return self.batch.diverged | (np.abs(self.batch.velocity) > FASTEST).any(axis=1)
+
+
+class _SwingUp(_Task):
+    strength = 0.5
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        off = np.array([one.uniform(-0.1, 0.1, (2, self.links)) for one in random])
+        off[:, 0, 0] -= np.pi / 2
+        self.batch.reset(list(arms))
+        self.batch.set_state(off[:, 0], off[:, 1], list(arms))
+
+    def reward(self) -> Floats:
+        height: Floats = self.batch.end_effector[:, 1]
+        return 0.5 + 0.5 * height / self.reach
+
+
+class _Reach(_Task):
+    strength = 2.0
+
+    def __init__(self, arms: int, links: int, threads: int | None) -> None:
+        super().__init__(arms, links, threads)
+        self.targets = np.zeros((arms, 2))
+
+    def further_bounds(self) -> list[float]:
+        reach = float(Arm(self.links).reach)
+        return [reach] * 2 + [2 * reach] * 2
+
+    def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
+        drawn = np.array([one.uniform(0.0, 1.0, self.links + 2) for one in random])
+        # Every part of the disc that is not within a twentieth of its edge is as likely as any other of the same area.
+        distance = 0.95 * self.reach * np.sqrt(drawn[:, 0])
+        bearing = 2 * np.pi * drawn[:, 1]
+        self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
+        self.batch.reset(list(arms))
+        self.batch.set_state(np.pi * (2 * drawn[:, 2:] - 1), None, list(arms))
+
+    def further(self) -> list[Floats]:
+        return [self.targets, self.targets - self.batch.end_effector]
+
+    def reward(self) -> Floats:
+        away = self.targets - self.batch.end_effector
+        return 1.0 - np.hypot(away[:, 0], away[:, 1]) / (2 * self.reach)
+
+
+class _Single(gymnasium.Env[Observation, Action]):
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
+    task_of: ClassVar[type[_Task]]
+
+    def __init__(self, links: int = 2, render_mode: str | None = None) -> None:
+        self._task = self.task_of(1, links, 1)
+        self.render_mode = render_mode
+        self.observation_space = self._task.observation_space
+        self.action_space = self._task.action_space
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        super().reset(seed=seed, options=options)
+        self._task.begin([0], [self.np_random])
+        return self._task.observe()[0], {}
+
+    def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        self._task.go_on(np.asarray(action)[None])
+        return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, {}
+
+
+class _Vector(VectorEnv[Observation, Action, Any]):
+    metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
+    task_of: ClassVar[type[_Task]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        links: int = 2,
+        max_episode_steps: int = 200,
+        threads: int | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        if max_episode_steps < 1:
+            raise ValueError(f"max_episode_steps must be at least 1, got {max_episode_steps}")
+        self._task = self.task_of(num_envs, links, threads)
+        self._most_steps = max_episode_steps
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.single_observation_space = self._task.observation_space
+        self.single_action_space = self._task.action_space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._random: list[np.random.Generator] = []
+        self._elapsed = np.zeros(num_envs, np.int64)
+        self._ended = np.zeros(num_envs, np.bool_)
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        mask = np.ones(self.num_envs, np.bool_)
+        if options is not None and "reset_mask" in options:
+            mask = np.asarray(options["reset_mask"])
+            if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
+                raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, one of them true, got {mask!r}")
+        if seed is None or isinstance(seed, int):
+            seeds: Sequence[int | None] = [None if seed is None else seed + arm for arm in range(self.num_envs)]
+        else:
+            seeds = seed
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed must be one number, or one for each of {self.num_envs}, got {len(seeds)}")
+        if not self._random:
+            self._random = [seeding.np_random(one)[0] for one in seeds]
+        else:
+            for arm in np.flatnonzero(mask).tolist():
+                if seeds[arm] is not None:
+                    self._random[arm] = seeding.np_random(seeds[arm])[0]
+        self._begin(mask)
+        return self._task.observe(), {}
+
+    def step(
+        self, actions: Action
+    ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
+        if not self._random:
+            raise gymnasium.error.ResetNeeded("reset has to come before the first step")
+        # Arms that have ended are stepped with the others, and begin anew wherever that leads.
+        again = self._ended
+        self._task.go_on(np.asarray(actions))
+        self._elapsed += 1
+        rewards, lost = self._task.reward(), self._task.lost()
+        if again.any():
+            self._begin(again)
+            rewards[again] = 0.0
+            lost[again] = False
+        truncated = self._elapsed >= self._most_steps
+        self._ended = lost | truncated
+        return self._task.observe(), rewards, lost, truncated, {}
+
+    def _begin(self, mask: NDArray[np.bool_]) -> None:
+        arms = np.flatnonzero(mask).tolist()
+        self._task.begin(arms, [self._random[arm] for arm in arms])
+        self._elapsed[mask] = 0
+        self._ended = self._ended & ~mask
+
+
+_SWING_UP = """An arm that hangs is to swing up and stay there, with efforts half as strong as would hold it stretched out.
+
+    ## Action
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of half of what holds the stretched arm there:
+    9.81 and 2.4525 N m for 2 links.
+
+    ## Observation
+    | index (2 links) | meaning | bounds | unit |
+    | --- | --- | --- | --- |
+    | 0, 1 | cosines of the joint angles | -1, 1 | |
+    | 2, 3 | sines of the joint angles | -1, 1 | |
+    | 4, 5 | joint rates | -25, 25 | rad/s |
+
+    Angles are counter-clockwise, the first from +x, the others from the link before; gravity is along -y.
+
+    ## Reward
+    `(1 + y / reach) / 2` with the height y of the end effector: 0 hanging, 1 upright.
+
+    ## Start and end
+    Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25 rad/s; truncated
+    after 200 steps (10 s).
+
+    ## Arguments
+    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
+
+    ## Versions
+    v0: the first.
+    """
+
+_REACH = """The end effector is to come to a target and stay there, with efforts twice as strong as hold the arm stretched out.
+
+    ## Action
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of twice of what holds the stretched arm there:
+    39.24 and 9.81 N m for 2 links.
+
+    ## Observation
+    | index (2 links) | meaning | bounds | unit |
+    | --- | --- | --- | --- |
+    | 0, 1 | cosines of the joint angles | -1, 1 | |
+    | 2, 3 | sines of the joint angles | -1, 1 | |
+    | 4, 5 | joint rates | -25, 25 | rad/s |
+    | 6, 7 | target, x and y | -reach, reach | m |
+    | 8, 9 | target less end effector, x and y | -2 reach, 2 reach | m |
+
+    Angles are counter-clockwise, the first from +x, the others from the link before; gravity is along -y.
+
+    ## Reward
+    `1 - d / (2 reach)` with the distance d of the end effector from the target: 1 there.
+
+    ## Start and end
+    At rest in any pose; the target is anywhere within 0.95 of the reach, evenly by area. Terminated when a joint turns faster than
+    25 rad/s; truncated after 100 steps (5 s).
+
+    ## Arguments
+    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
+
+    ## Versions
+    v0: the first.
+    """
+
+
+class PendularmEnv(_Single):
+    __doc__ = _SWING_UP
+    task_of = _SwingUp
+
+
+class PendularmVectorEnv(_Vector):
+    __doc__ = _SWING_UP
+    task_of = _SwingUp
+
+
+class PendularmReachEnv(_Single):
+    __doc__ = _REACH
+    task_of = _Reach
+
+
+class PendularmReachVectorEnv(_Vector):
+    __doc__ = _REACH
+    task_of = _Reach
+
+
+for _name, _steps in [("Pendularm", 200), ("PendularmReach", 100)]:
+    gymnasium.register(
+        f"{_name}-v0",
+        entry_point=f"pendularm.envs:{_name}Env",
+        vector_entry_point=f"pendularm.envs:{_name}VectorEnv",
+        max_episode_steps=_steps,
+    )

@@ -1,0 +1,39 @@
+"""The numbers of a report that ``pendularm report`` has made."""
+
+import csv
+import os
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["read_report"]
+
+Column = NDArray[np.float64] | NDArray[np.str_]
+
+
+def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str, Column]]:
+    """Reads every table of the report in `folder`, by the stem of its file, as columns by their names.
+
+    A column is of doubles, the same bits as were measured, with NaN where there is none; or of text. `pandas.DataFrame` takes a
+    table as it is. Raises `FileNotFoundError` where there is no report.
+    """
+    files = sorted(Path(folder).glob("*.csv"))
+    if not files:
+        raise FileNotFoundError(f"{os.fspath(folder)} holds no report: `pendularm report --out {os.fspath(folder)}` makes one")
+    return {file.stem: _table(file) for file in files}
+
+
+def _table(file: Path) -> dict[str, Column]:
+    with file.open(encoding="utf-8", newline="") as lines:
+        rows = csv.reader(lines)
+        head = next(rows)
+        cells = list(rows)
+    return {name: _column([row[at] for row in cells]) for at, name in enumerate(head)}
+
+
+def _column(cells: list[str]) -> Column:
+    try:
+        return np.array([float(cell) if cell else np.nan for cell in cells], dtype=np.float64)
+    except ValueError:
+        return np.array(cells, dtype=np.str_)

@@ -1,0 +1,381 @@
+"""Many settings of one question: on this machine's cores, or on a cluster by way of an executor.
+
+A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor the size of a piece changes a bit of the results.
+"""
+
+import json
+import math
+import os
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._native import Batch
+
+__all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
+
+Floats = NDArray[np.float64]
+
+SETTLED = 0.02
+"""Largest distance of a joint from its setpoint at which an arm counts as settled [rad]."""
+
+IN_FLIGHT = 256
+"""Pieces that are handed to an executor before the first of them is done."""
+
+MOST_SETTINGS = 10_000_000
+"""Combinations of one sweep: their results are kept in memory, some 100 MB a metric."""
+
+MOST_SAMPLES = 100_000
+"""Samples of a run, as many as a rollout has."""
+
+MOST_ROWS = 10_000_000
+"""Samples times settings of a piece: some 1 GB where it is done."""
+
+PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
+SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
+
+
+@dataclass(frozen=True)
+class Run:
+    """The motion of a piece's arms, for a metric."""
+
+    times: Floats
+    """[s], (samples, arms): the nearest whole step of each arm."""
+    positions: Floats
+    """[rad], (samples, arms, links); of an arm that diverged, its last finite ones go on."""
+    velocities: Floats
+    """[rad/s], (samples, arms, links)."""
+    efforts: Floats
+    """Of the steps that led to the samples [N m], (samples, arms, links)."""
+    energy: Floats
+    """Kinetic plus potential [J], (samples, arms)."""
+    setpoint: Floats
+    """[rad], (arms, links)."""
+    diverged: NDArray[np.bool_]
+    """(arms,)."""
+
+
+Metric = Callable[[Run], NDArray[Any] | Mapping[str, NDArray[Any]]]
+"""One number per arm, or several by their names; it must not mix the arms."""
+
+
+class Executor(Protocol):
+    """Whatever hands out futures as `concurrent.futures` does."""
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The results, with an axis for each name of the grid, in its order."""
+
+    grid: dict[str, list[Any]]
+    values: dict[str, NDArray[Any]]
+    """By the metrics' names, each with the shape of the grid."""
+
+    def __getitem__(self, metric: str) -> NDArray[Any]:
+        return self.values[metric]
+
+
+def final_error(run: Run) -> Floats:
+    """Largest distance of a joint from its setpoint at the end [rad]; infinite where the arm diverged."""
+    away: Floats = np.abs(run.positions[-1] - run.setpoint).max(axis=1)
+    return np.where(run.diverged, np.inf, away)
+
+
+def settling_time(run: Run) -> Floats:
+    """Time from which on every joint is within 0.02 rad of its setpoint [s]; infinite where that is not so at the end."""
+    away: NDArray[np.bool_] = np.any(np.abs(run.positions - run.setpoint) > SETTLED, axis=2)
+    still = np.cumsum(away[::-1], axis=0)[::-1] == 0
+    first = np.argmax(still, axis=0)
+    time = np.take_along_axis(run.times, first[None], axis=0)[0]
+    return np.where(still[-1] & ~run.diverged, time, np.inf)
+
+
+def largest_effort(run: Run) -> Floats:
+    """Largest effort of a joint at the samples [N m]."""
+    largest: Floats = np.abs(run.efforts).max(axis=(0, 2))
+    return largest
+
+
+def energy_drift(run: Run) -> Floats:
+    """Largest distance of the energy from that at the start, at the samples [J]; infinite where the arm diverged."""
+    drift: Floats = np.abs(run.energy - run.energy[0]).max(axis=0)
+    return np.where(run.diverged, np.inf, drift)
+
+
+METRICS: dict[str, Metric] = {
+    one.__name__: one for one in (final_error, settling_time, largest_effort, energy_drift)
+}
+
+
+def sweep(
+    grid: Mapping[str, Iterable[Any]],
+    metric: str | Metric = "settling_time",
+    *,
+    links: int = 2,
+    duration: float = 4.0,
+    samples: int = 401,
+    servo: bool = True,
+    executor: Executor | None = None,
+    folder: str | os.PathLike[str] | None = None,
+    piece: int | None = None,
+    progress: bool = True,
+    **settings: Any,
+) -> Sweep:
+    """Runs an arm for every combination of the settings in `grid`, and answers what `metric` makes of each run.
+
+    Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad], `q0` [rad]
+    and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and `method`. `grid` has a
+    sequence of each that varies; those that do not are given by name, and what is left out is as in a fresh runtime. Without
+    `servo` the controller is off. Every run lasts `duration` [s] and has `samples`, start and end among them.
+
+    `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of a `Run`,
+    which an executor has to be able to send.
+
+    Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that hands out futures as `concurrent.futures` does (Dask's
+    `Client.get_executor()`, say), or to as many threads as there are cores. In `folder` every finished piece is kept, and a
+    sweep that was stopped goes on there. Raises `ValueError` for a setting that cannot be, and where the folder holds
+    another sweep.
+    """
+    axes = {name: list(values) for name, values in grid.items()}
+    for name, choices in axes.items():
+        if name in settings:
+            raise ValueError(f"{name} is both in the grid and fixed")
+        if not choices:
+            raise ValueError(f"grid[{name!r}] must have at least one value")
+    if not axes:
+        raise ValueError("grid must have at least one setting")
+    total = math.prod(len(choices) for choices in axes.values())
+    if total > MOST_SETTINGS:
+        raise ValueError(f"grid must have at most {MOST_SETTINGS} combinations, got {total}")
+    if not 2 <= samples <= MOST_SAMPLES:
+        raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
+    if piece is None:
+        piece = max(1, min(1024, MOST_ROWS // 10 // samples))
+    if not 1 <= piece <= MOST_ROWS // samples:
+        raise ValueError(f"piece must be between 1 and {MOST_ROWS // samples} with {samples} samples, got {piece}")
+    if not (np.isfinite(duration) and duration > 0):
+        raise ValueError(f"duration must be finite and greater than 0, got {duration}")
+    if isinstance(metric, str) and metric not in METRICS:
+        raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
+    question = _Question(
+        axes={name: _column(name, values, links) for name, values in axes.items()},
+        fixed={name: _column(name, [value], links) for name, value in settings.items()},
+        metric=metric,
+        links=links,
+        duration=duration,
+        samples=samples,
+        servo=servo,
+    )
+    question.check()
+    kept = None if folder is None else _Folder(Path(folder), question, piece)
+    starts = range(0, total, piece)
+    done = {} if kept is None else kept.read(starts)
+    threads = ThreadPoolExecutor() if executor is None else None
+    try:
+        _run(question, [start for start in starts if start not in done], piece, threads or executor, done, kept, progress)
+    finally:
+        if threads is not None:
+            threads.shutdown(cancel_futures=True)
+    whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
+    return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What is asked of every setting; it goes to the workers."""
+
+    axes: dict[str, Any]
+    fixed: dict[str, Any]
+    metric: str | Metric
+    links: int
+    duration: float
+    samples: int
+    servo: bool
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(len(values) for values in self.axes.values())
+
+    def check(self) -> None:
+        """Tries every value once, so that a bad one is refused here and by its own name."""
+        for name, values in {**self.axes, **self.fixed}.items():
+            _begin({name: values}, len(values), self.links)
+
+    def told(self) -> dict[str, Any]:
+        """The question as the folder keeps it."""
+        metric = self.metric if isinstance(self.metric, str) else f"{self.metric.__module__}.{self.metric.__qualname__}"
+        return {
+            "grid": {name: values.tolist() for name, values in self.axes.items()},
+            "settings": {name: values.tolist() for name, values in self.fixed.items()},
+            "metric": metric,
+            "links": self.links,
+            "duration": self.duration,
+            "samples": self.samples,
+            "servo": self.servo,
+        }
+
+
+def _column(name: str, values: Sequence[Any], links: int) -> Any:
+    """Values of a setting, a row for each."""
+    if name not in SETTINGS:
+        raise ValueError(f"there is no setting {name!r}; there are {', '.join(SETTINGS)}")
+    if name == "method":
+        return np.array([str(value) for value in values])
+    try:
+        if name in PER_JOINT:
+            return np.array([np.broadcast_to(np.asarray(value, np.float64), (links,)) for value in values])
+        return np.array([float(value) for value in values])
+    except (TypeError, ValueError):
+        each = f" or an array of {links}" if name in PER_JOINT else ""
+        raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
+
+
+def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
+    """Arms with these settings, a row for each arm."""
+    batch = Batch(arms, links, threads=1)
+
+    def of(*names: str) -> dict[str, Any]:
+        return {name: settings[name] for name in names if name in settings}
+
+    batch.set_params(**of("gravity", "masses", "lengths"))
+    if "method" in settings:
+        batch.set_integrator(settings["method"].tolist())
+    batch.set_integrator(**of("timestep"))
+    batch.set_gains(**of("kp", "ki", "kd"))
+    if "setpoint" in settings:
+        batch.set_setpoint(settings["setpoint"])
+    still = np.zeros((arms, links))
+    batch.set_state(settings.get("q0", still), settings.get("qdot0", still))
+    return batch
+
+
+def _solve(question: _Question, start: int, stop: int) -> dict[str, NDArray[Any]]:
+    """One piece, wherever it is done."""
+    places = np.unravel_index(np.arange(start, stop), question.shape)
+    arms = stop - start
+    settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
+    settings |= {name: np.repeat(values, arms, axis=0) for name, values in question.fixed.items()}
+    batch = _begin(settings, arms, question.links)
+    batch.enable(question.servo)
+    timestep = settings.get("timestep", np.full(arms, 0.001))
+    shape = (question.samples, arms, question.links)
+    positions, velocities, efforts = np.empty(shape), np.empty(shape), np.empty(shape)
+    times, energy = np.empty(shape[:2]), np.empty(shape[:2])
+    taken = np.zeros(arms, np.int64)
+    for sample, time in enumerate(np.linspace(0.0, question.duration, question.samples)):
+        due = np.rint(time / timestep).astype(np.int64)
+        batch.step(due - taken)
+        taken = due
+        positions[sample], velocities[sample], efforts[sample] = batch.position, batch.velocity, batch.effort
+        times[sample], energy[sample] = taken * timestep, batch.energy
+    setpoint = settings.get("setpoint", np.zeros((arms, question.links)))
+    run = Run(times, positions, velocities, efforts, energy, setpoint, batch.diverged.copy())
+    metric = METRICS[question.metric] if isinstance(question.metric, str) else question.metric
+    name = question.metric if isinstance(question.metric, str) else "metric"
+    found = metric(run)
+    values = {key: np.asarray(one) for key, one in (found if isinstance(found, Mapping) else {name: found}).items()}
+    for key, one in values.items():
+        if one.shape != (arms,):
+            raise ValueError(f"metric must answer one number for each of {arms} arms, got {key} of shape {one.shape}")
+    return values
+
+
+def _run(
+    question: _Question,
+    starts: Sequence[int],
+    piece: int,
+    executor: Any,
+    done: dict[int, dict[str, NDArray[Any]]],
+    kept: "_Folder | None",
+    progress: bool,
+) -> None:
+    """Has the pieces done that are left, and takes in each as it comes."""
+    total = math.prod(question.shape)
+    left = iter(starts)
+    under_way: dict[Future[Any], int] = {}
+    with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:
+        try:
+            while True:
+                while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
+                    under_way[executor.submit(_solve, question, start, min(start + piece, total))] = start
+                if not under_way:
+                    return
+                ended = wait(under_way, return_when=FIRST_COMPLETED).done
+                # Those that have failed last, so that whatever is finished is kept.
+                for future in sorted(ended, key=lambda one: one.cancelled() or one.exception() is not None):
+                    start = under_way.pop(future)
+                    done[start] = future.result()
+                    if kept is not None:
+                        kept.keep(start, done[start])
+                    bar.update(min(piece, total - start))
+        finally:
+            for future in under_way:
+                future.cancel()
+
+
+class _Bar:
+    """A progress bar where tqdm is installed and somebody is watching."""
+
+    def __init__(self, total: int, already: int, wanted: bool) -> None:
+        try:
+            from tqdm import tqdm
+        except ImportError:
+            wanted = False
+        # `None`: only on a terminal.
+        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=None) if wanted else None
+
+    def __enter__(self) -> "_Bar":
+        return self
+
+    def update(self, settings: int) -> None:
+        if self._bar is not None:
+            self._bar.update(settings)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+class _Folder:
+    """The finished pieces of one sweep, each in a file of its own that is there whole or not at all."""
+
+    def __init__(self, path: Path, question: _Question, piece: int) -> None:
+        self._path = path
+        path.mkdir(parents=True, exist_ok=True)
+        # Through JSON, so that it can be compared with what is read.
+        told = json.loads(json.dumps({**question.told(), "piece": piece}))
+        file = path / "sweep.json"
+        if not file.exists():
+            self._write("sweep.json", lambda part: part.write_text(json.dumps(told)))
+            return
+        kept = json.loads(file.read_text())
+        other = [name for name, value in told.items() if kept.get(name) != value]
+        if other:
+            raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
+
+    def _write(self, name: str, write: Callable[[Path], Any]) -> None:
+        part = self._path / f"part-{name}"
+        write(part)
+        part.replace(self._path / name)
+
+    def keep(self, start: int, values: Mapping[str, NDArray[Any]]) -> None:
+        self._write(f"{start:012}.npz", lambda part: np.savez(part, allow_pickle=False, **values))
+
+    def read(self, starts: Iterable[int]) -> dict[int, dict[str, NDArray[Any]]]:
+        found = {}
+        for start in starts:
+            try:
+                with np.load(self._path / f"{start:012}.npz", allow_pickle=False) as file:
+                    found[start] = dict(file)
+            except (FileNotFoundError, BadZipFile, ValueError, EOFError):
+                # Done again.
+                continue
+        return found

@@ -1,0 +1,136 @@
+//! The parameters of an arm.
+//!
+//! **Invariant:** an arm that exists is valid, and never changes.
+
+use numpy::{PyArray1, ToPyArray};
+use pendularm::math::arm::Arm as Rods;
+use pendularm::math::pid::Gains;
+use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pyfunction, pymethods};
+use pyo3::types::PyDict;
+
+use crate::fields::{self, Bound, Held, Object, joints_or, refused};
+
+/// Rods of 2 or 3 links.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Chain {
+    Two(Rods<2>),
+    Three(Rods<3>),
+}
+
+/// Does the same with an arm, a simulation, or whatever else there is for 2 and for 3 links.
+macro_rules! for_either {
+    ($kind:ident, $value:expr, $one:ident => $body:expr) => {
+        match $value {
+            $kind::Two($one) => $body,
+            $kind::Three($one) => $body,
+        }
+    };
+}
+pub(crate) use for_either;
+
+/// An arm: a chain of 2 or 3 uniform rods on revolute joints, and gravity along -y. It never changes.
+///
+/// Joint angles are relative to the link before (the first to +x), counter-clockwise. `lengths` [m] and `masses` [kg] have one
+/// number per link, 1 unless given; `gravity` [m/s²] is 9.81 unless given. Raises `ValueError` for a number that no arm can have.
+#[pyclass(frozen, eq, module = "pendularm")]
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Arm {
+    pub(crate) chain: Chain,
+}
+
+#[pymethods]
+impl Arm {
+    #[new]
+    #[pyo3(signature = (links=2, *, lengths=None, masses=None, gravity=9.81))]
+    fn new(
+        links: usize,
+        lengths: Option<&Object<'_>>,
+        masses: Option<&Object<'_>>,
+        gravity: f64,
+    ) -> PyResult<Self> {
+        let chain = match fields::links(links)? {
+            2 => Chain::Two(read(lengths, masses, gravity)?),
+            _ => Chain::Three(read(lengths, masses, gravity)?),
+        };
+        Ok(Self { chain })
+    }
+
+    /// Number of links, 2 or 3.
+    #[getter]
+    pub(crate) fn links(&self) -> usize {
+        for_either!(Chain, &self.chain, arm => arm.lengths().len())
+    }
+
+    /// Link lengths [m], (links,).
+    #[getter]
+    fn lengths<'py>(&self, py: Python<'py>) -> Held<'py, PyArray1<f64>> {
+        for_either!(Chain, &self.chain, arm => arm.lengths().to_pyarray(py))
+    }
+
+    /// Link masses [kg], (links,).
+    #[getter]
+    fn masses<'py>(&self, py: Python<'py>) -> Held<'py, PyArray1<f64>> {
+        for_either!(Chain, &self.chain, arm => arm.masses().to_pyarray(py))
+    }
+
+    /// Gravity along -y [m/s²].
+    #[getter]
+    fn gravity(&self) -> f64 {
+        for_either!(Chain, &self.chain, arm => arm.gravity())
+    }
+
+    /// Distance from the base to the end effector of the stretched arm [m].
+    #[getter]
+    fn reach(&self) -> f64 {
+        for_either!(Chain, &self.chain, arm => arm.reach())
+    }
+
+    fn __repr__(&self) -> String {
+        for_either!(Chain, &self.chain, arm => format!(
+            "Arm({}, lengths={:?}, masses={:?}, gravity={:?})",
+            self.links(), arm.lengths(), arm.masses(), arm.gravity()
+        ))
+    }
+
+    fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((usize,), Held<'py, PyDict>)> {
+        let given = PyDict::new(py);
+        given.set_item("lengths", self.lengths(py))?;
+        given.set_item("masses", self.masses(py))?;
+        given.set_item("gravity", self.gravity())?;
+        Ok(((self.links(),), given))
+    }
+}
+
+fn read<const N: usize>(
+    lengths: Option<&Object<'_>>,
+    masses: Option<&Object<'_>>,
+    gravity: f64,
+) -> PyResult<Rods<N>> {
+    let lengths = joints_or("lengths", lengths, Bound::Positive, [1.0; N])?;
+    let masses = joints_or("masses", masses, Bound::Positive, [1.0; N])?;
+    Rods::new(lengths, masses, gravity).map_err(refused)
+}
+
+/// The arm that is handed in, or the default one.
+pub(crate) fn or_default(arm: Option<&Held<'_, Arm>>) -> Chain {
+    arm.map_or_else(|| Chain::Two(Rods::default()), |arm| arm.get().chain)
+}
+
+/// The gains of a fresh runtime: `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each.
+#[pyfunction]
+#[pyo3(signature = (links=2))]
+pub(crate) fn default_gains(py: Python<'_>, links: usize) -> PyResult<Held<'_, PyDict>> {
+    fn listed<const N: usize>(gains: Gains<N>) -> [(&'static str, Vec<f64>); 3] {
+        [("kp", gains.kp), ("ki", gains.ki), ("kd", gains.kd)]
+            .map(|(name, gain)| (name, gain.to_vec()))
+    }
+    let gains = match fields::links(links)? {
+        2 => listed(Gains::<2>::default()),
+        _ => listed(Gains::<3>::default()),
+    };
+    let found = PyDict::new(py);
+    for (name, values) in gains {
+        found.set_item(name, values.to_pyarray(py))?;
+    }
+    Ok(found)
+}

@@ -1,0 +1,577 @@
+//! Many arms at once, with NumPy arrays in and out.
+//!
+//! The arrays that show the arms are made once and written in place; users hold views of them that they cannot write. What is
+//! handed in is read where it lies, if it is doubles side by side.
+//!
+//! **Invariant:** every row of every array shows its lane as it is, whenever no call is under way.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::available_parallelism;
+
+use numpy::{Element, IntoPyArray, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray};
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation;
+use pyo3::prelude::{
+    Py, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult, Python, pyclass, pymethods,
+};
+use pyo3::sync::MutexExt;
+use pyo3::types::PyDict;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::arm::for_either;
+use crate::fields::{self, Bound, Held, Numbers, Object, Rows, refused};
+use crate::lanes::{self, Piece, Shown, Steps};
+
+/// Lane-steps between two looks for signals: some tens of milliseconds of one core.
+const STEPS_PER_LOOK: u64 = 250_000;
+
+/// Most arms of one batch, some 500 MB: many more than a batch is any faster with.
+const MOST_ARMS: usize = 1_000_000;
+
+/// Most threads that share the work of one batch.
+const MOST_THREADS: usize = 1024;
+
+/// The number of links never changes; what does is behind a lock, since threads may share a batch.
+#[derive(Debug)]
+enum Either {
+    Two(Mutex<Vec<Simulation<2>>>),
+    Three(Mutex<Vec<Simulation<3>>>),
+}
+
+/// An array that shows the arms, and the view of it that users get.
+#[derive(Debug)]
+struct Window<T, D> {
+    array: Py<PyArray<T, D>>,
+    view: Py<PyAny>,
+}
+
+impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
+    fn onto(array: Held<'_, PyArray<T, D>>) -> PyResult<Self> {
+        let view = array.call_method0("view")?;
+        let flags = PyDict::new(array.py());
+        flags.set_item("write", false)?;
+        view.call_method("setflags", (), Some(&flags))?;
+        Ok(Self {
+            array: array.unbind(),
+            view: view.unbind(),
+        })
+    }
+
+    fn write<'py>(&self, py: Python<'py>) -> PyResult<PyReadwriteArray<'py, T, D>> {
+        let array = self.array.bind(py).try_readwrite();
+        array.map_err(|_| {
+            refused("this batch's own arrays are in use elsewhere: hand in copies of them")
+        })
+    }
+}
+
+/// The arrays that show the arms.
+#[derive(Debug)]
+struct Windows {
+    position: Window<f64, numpy::Ix2>,
+    velocity: Window<f64, numpy::Ix2>,
+    effort: Window<f64, numpy::Ix2>,
+    time: Window<f64, numpy::Ix1>,
+    diverged: Window<bool, numpy::Ix1>,
+}
+
+impl Windows {
+    /// Has them written, with the interpreter's lock released.
+    fn write(&self, py: Python<'_>, write: impl FnOnce(Shown<'_>) + Send) -> PyResult<()> {
+        let mut position = self.position.write(py)?;
+        let mut velocity = self.velocity.write(py)?;
+        let mut effort = self.effort.write(py)?;
+        let mut time = self.time.write(py)?;
+        let mut diverged = self.diverged.write(py)?;
+        let shown = Shown {
+            position: position.as_slice_mut()?,
+            velocity: velocity.as_slice_mut()?,
+            effort: effort.as_slice_mut()?,
+            time: time.as_slice_mut()?,
+            diverged: diverged.as_slice_mut()?,
+        };
+        py.detach(|| write(shown));
+        Ok(())
+    }
+}
+
+/// Threads by how many there are, of this process: a forked child has none of its parent's.
+static POOLS: Mutex<Vec<(u32, usize, Arc<ThreadPool>)>> = Mutex::new(Vec::new());
+
+/// The threads that share the work; none for one alone.
+fn pool(threads: usize) -> PyResult<Option<Arc<ThreadPool>>> {
+    if threads == 1 {
+        return Ok(None);
+    }
+    let process = std::process::id();
+    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((.., pool)) = pools
+        .iter()
+        .find(|(of, size, _)| (*of, *size) == (process, threads))
+    {
+        return Ok(Some(Arc::clone(pool)));
+    }
+    let pool = Arc::new(
+        ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .map_err(refused)?,
+    );
+    pools.push((process, threads, Arc::clone(&pool)));
+    Ok(Some(pool))
+}
+
+/// Waits for a lock without keeping the interpreter's. What is behind it is whole, also after a panic of another thread.
+fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
+    one.lock_py_attached(py)
+        .unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Many arms, advanced in whole steps; each is a `Simulation`, to the bit, whatever the number of threads.
+///
+/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and overwritten by
+/// every call that changes the arms: copy what is to be kept. They cannot be written. An array that is handed in has one row per
+/// arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where they lie. `threads` share the work, as many
+/// as there are cores unless given; with 1 the caller does it alone. Calls on one batch from several threads wait for each other.
+#[pyclass(frozen, module = "pendularm")]
+#[derive(Debug)]
+pub(crate) struct Batch {
+    own: Either,
+    arms: usize,
+    threads: usize,
+    windows: Windows,
+}
+
+#[pymethods]
+impl Batch {
+    #[new]
+    #[pyo3(signature = (n_arms, links=2, *, threads=None))]
+    fn new(py: Python<'_>, n_arms: usize, links: usize, threads: Option<usize>) -> PyResult<Self> {
+        if !(1..=MOST_ARMS).contains(&n_arms) {
+            return Err(refused(format_args!(
+                "n_arms must be between 1 and {MOST_ARMS}, got {n_arms}"
+            )));
+        }
+        if let Some(threads) = threads.filter(|threads| !(1..=MOST_THREADS).contains(threads)) {
+            return Err(refused(format_args!(
+                "threads must be between 1 and {MOST_THREADS}, got {threads}"
+            )));
+        }
+        let links = fields::links(links)?;
+        let own = match links {
+            2 => Either::Two(fresh(n_arms)),
+            _ => Either::Three(fresh(n_arms)),
+        };
+        let joints = || Window::onto(PyArray2::zeros(py, [n_arms, links], false));
+        Ok(Self {
+            own,
+            arms: n_arms,
+            threads: threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from)),
+            windows: Windows {
+                position: joints()?,
+                velocity: joints()?,
+                effort: joints()?,
+                time: Window::onto(PyArray1::zeros(py, [n_arms], false))?,
+                diverged: Window::onto(PyArray1::zeros(py, [n_arms], false))?,
+            },
+        })
+    }
+
+    /// Takes `steps` steps (1 unless given) with every arm, or so many of each, (`n_arms`,), in whole numbers. An arm that has
+    /// diverged takes no more. `effort` [N m] is added to the controller's for all these steps, as `Simulation.disturb` does.
+    /// The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
+    #[pyo3(signature = (steps=None, effort=None))]
+    fn step(
+        &self,
+        py: Python<'_>,
+        steps: Option<&Object<'_>>,
+        effort: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let counts = steps
+            .map(|steps| read_steps(steps, self.arms))
+            .transpose()?;
+        let steps = match &counts {
+            None => Steps::Alike(1),
+            Some(counts) => match counts.as_slice() {
+                [alike] => Steps::Alike(*alike),
+                each => Steps::Each(each),
+            },
+        };
+        let effort = read("effort", effort)?;
+        let effort = self.rows(effort.as_ref(), Bound::Finite)?;
+        let pool = pool(self.threads)?;
+        let arms = u64::try_from(self.arms).unwrap_or(u64::MAX);
+        let threads = u64::try_from(self.threads).unwrap_or(1);
+        let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
+        let mut done = 0;
+        while done < steps.most() {
+            let piece = Piece {
+                steps,
+                effort: effort.as_ref(),
+                done,
+                length,
+                is_shared: pool.is_some(),
+            };
+            for_either!(Either, &self.own, lanes => {
+                let mut lanes = hold(py, lanes);
+                let lanes = lanes.as_mut_slice();
+                self.windows.write(py, |shown| match &pool {
+                    None => lanes::advance(lanes, shown, piece),
+                    Some(pool) => pool.install(|| lanes::advance(lanes, shown, piece)),
+                })?;
+            });
+            done = done.saturating_add(length);
+            // No lock is held here: a signal's handler may want to look at the arms.
+            py.check_signals()?;
+        }
+        Ok(())
+    }
+
+    /// Back to the starting pose at rest, at time 0, as `Simulation.reset` does: all arms, those of a mask (`n_arms`,), or those of
+    /// some indices.
+    #[pyo3(signature = (arms=None))]
+    fn reset(&self, py: Python<'_>, arms: Option<&Object<'_>>) -> PyResult<()> {
+        let chosen = self.chosen(arms)?;
+        for_either!(Either, &self.own, lanes => {
+            let mut lanes = hold(py, lanes);
+            for &lane in &chosen {
+                if let Some(one) = lanes.get_mut(lane) {
+                    one.reset();
+                }
+            }
+            let lanes = lanes.as_mut_slice();
+            self.windows.write(py, |shown| lanes::show(lanes, shown))
+        })
+    }
+
+    /// Puts arms into other states, `position` [rad] and `velocity` [rad/s] (zeros unless given): all arms, or those that `arms`
+    /// names as in `reset`, with one row for each of them or one for all. Clocks and controllers stay.
+    #[pyo3(signature = (position, velocity=None, arms=None))]
+    fn set_state(
+        &self,
+        py: Python<'_>,
+        position: &Object<'_>,
+        velocity: Option<&Object<'_>>,
+        arms: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let chosen = self.chosen(arms)?;
+        // Owned, since they may be this batch's own arrays, which are written below.
+        let owned = |given: Numbers<'_>| {
+            Ok::<_, PyErr>(
+                given
+                    .rows(chosen.len(), self.links(), Some(Bound::Finite))?
+                    .into_owned(),
+            )
+        };
+        let position = owned(Numbers::read("position", position)?)?;
+        let velocity = read("velocity", velocity)?.map(owned).transpose()?;
+        for_either!(Either, &self.own, lanes => {
+            let mut lanes = hold(py, lanes);
+            for (row, &lane) in chosen.iter().enumerate() {
+                if let Some(one) = lanes.get_mut(lane) {
+                    one.set_state(State {
+                        position: position.row(row),
+                        velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
+                    });
+                }
+            }
+            let lanes = lanes.as_mut_slice();
+            self.windows.write(py, |shown| lanes::show(lanes, shown))
+        })
+    }
+
+    /// Where the controllers hold the arms: `positions` [rad] and `velocities` [rad/s] (zeros unless given).
+    #[pyo3(signature = (positions, velocities=None))]
+    fn set_setpoint(
+        &self,
+        py: Python<'_>,
+        positions: &Object<'_>,
+        velocities: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let positions = Numbers::read("positions", positions)?;
+        let positions = positions.rows(self.arms, self.links(), Some(Bound::Finite))?;
+        let velocities = read("velocities", velocities)?;
+        let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
+        for_either!(Either, &self.own, lanes => {
+            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
+                one.set_setpoint(Setpoint {
+                    position: positions.row(row),
+                    velocity: velocities.as_ref().map_or([0.0; _], |velocities| velocities.row(row)),
+                });
+            }
+        });
+        Ok(())
+    }
+
+    /// Changes the gains that are given: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integrals stay.
+    #[pyo3(signature = (kp=None, ki=None, kd=None))]
+    fn set_gains(
+        &self,
+        py: Python<'_>,
+        kp: Option<&Object<'_>>,
+        ki: Option<&Object<'_>>,
+        kd: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let (kp, ki, kd) = (read("kp", kp)?, read("ki", ki)?, read("kd", kd)?);
+        let kp = self.rows(kp.as_ref(), Bound::NotNegative)?;
+        let ki = self.rows(ki.as_ref(), Bound::NotNegative)?;
+        let kd = self.rows(kd.as_ref(), Bound::NotNegative)?;
+        for_either!(Either, &self.own, lanes => {
+            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
+                let present = *one.pid().gains();
+                one.set_gains(Gains {
+                    kp: kp.as_ref().map_or(present.kp, |given| given.row(row)),
+                    ki: ki.as_ref().map_or(present.ki, |given| given.row(row)),
+                    kd: kd.as_ref().map_or(present.kd, |given| given.row(row)),
+                });
+            }
+        });
+        Ok(())
+    }
+
+    /// Changes the parameters that are given: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths` [m].
+    #[pyo3(signature = (gravity=None, masses=None, lengths=None))]
+    fn set_params(
+        &self,
+        py: Python<'_>,
+        gravity: Option<&Object<'_>>,
+        masses: Option<&Object<'_>>,
+        lengths: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let (gravity, masses, lengths) = (
+            read("gravity", gravity)?,
+            read("masses", masses)?,
+            read("lengths", lengths)?,
+        );
+        let gravity = self.column(gravity.as_ref(), Bound::NotNegative)?;
+        let masses = self.rows(masses.as_ref(), Bound::Positive)?;
+        let lengths = self.rows(lengths.as_ref(), Bound::Positive)?;
+        for_either!(Either, &self.own, lanes => {
+            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
+                let present = one.arm();
+                let arm = Arm::new(
+                    lengths.as_ref().map_or(*present.lengths(), |given| given.row(row)),
+                    masses.as_ref().map_or(*present.masses(), |given| given.row(row)),
+                    gravity.as_ref().map_or(present.gravity(), |given| given.number(row)),
+                );
+                one.set_arm(arm.map_err(refused)?);
+            }
+        });
+        Ok(())
+    }
+
+    /// Changes what is given: `method`, a name or one for each arm, and `timestep` [s], a number or (`n_arms`,).
+    #[pyo3(signature = (method=None, timestep=None))]
+    fn set_integrator(
+        &self,
+        py: Python<'_>,
+        method: Option<&Object<'_>>,
+        timestep: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        let methods = method
+            .map(|method| read_methods(method, self.arms))
+            .transpose()?;
+        let timestep = read("timestep", timestep)?;
+        let timestep = self.column(timestep.as_ref(), Bound::Positive)?;
+        for_either!(Either, &self.own, lanes => {
+            for (row, one) in hold(py, lanes).iter_mut().enumerate() {
+                match methods.as_deref() {
+                    None => {}
+                    Some([alike]) => one.set_method(*alike),
+                    Some(each) => one.set_method(each.get(row).copied().unwrap_or(one.method())),
+                }
+                if let Some(timestep) = &timestep {
+                    one.set_timestep(timestep.number(row));
+                }
+            }
+        });
+        Ok(())
+    }
+
+    /// Turns the controllers on or off. From off to on an integral starts at zero.
+    #[pyo3(signature = (data=true))]
+    fn enable(&self, py: Python<'_>, data: bool) -> PyResult<()> {
+        for_either!(Either, &self.own, lanes => {
+            let mut lanes = hold(py, lanes);
+            lanes.iter_mut().for_each(|one| one.enable(data));
+            let lanes = lanes.as_mut_slice();
+            self.windows.write(py, |shown| lanes::show(lanes, shown))
+        })
+    }
+
+    /// Number of arms.
+    #[getter]
+    fn n_arms(&self) -> usize {
+        self.arms
+    }
+
+    /// Number of links of each arm, 2 or 3.
+    #[getter]
+    fn links(&self) -> usize {
+        match &self.own {
+            Either::Two(_) => 2,
+            Either::Three(_) => 3,
+        }
+    }
+
+    /// Number of threads that share the work.
+    #[getter]
+    fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// Joint positions [rad], (`n_arms`, links), never wrapped; overwritten by the next call.
+    #[getter]
+    fn position(&self, py: Python<'_>) -> Py<PyAny> {
+        self.windows.position.view.clone_ref(py)
+    }
+
+    /// Joint rates [rad/s], (`n_arms`, links); overwritten by the next call.
+    #[getter]
+    fn velocity(&self, py: Python<'_>) -> Py<PyAny> {
+        self.windows.velocity.view.clone_ref(py)
+    }
+
+    /// Efforts of the latest step [N m], (`n_arms`, links); overwritten by the next call.
+    #[getter]
+    fn effort(&self, py: Python<'_>) -> Py<PyAny> {
+        self.windows.effort.view.clone_ref(py)
+    }
+
+    /// Simulation times since the reset [s], (`n_arms`,); overwritten by the next call.
+    #[getter]
+    fn time(&self, py: Python<'_>) -> Py<PyAny> {
+        self.windows.time.view.clone_ref(py)
+    }
+
+    /// Which arms have left the finite numbers since their reset, (`n_arms`,); overwritten by the next call.
+    #[getter]
+    fn diverged(&self, py: Python<'_>) -> Py<PyAny> {
+        self.windows.diverged.view.clone_ref(py)
+    }
+
+    /// Kinetic plus potential energy [J], (`n_arms`,), in a fresh array.
+    #[getter]
+    fn energy<'py>(&self, py: Python<'py>) -> Held<'py, PyArray1<f64>> {
+        for_either!(Either, &self.own, lanes => lanes::energies(&hold(py, lanes)).into_pyarray(py))
+    }
+
+    /// Where the end effectors are [m], (`n_arms`, 2), in a fresh array.
+    #[getter]
+    fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray2<f64>>> {
+        let flat = for_either!(Either, &self.own, lanes => lanes::end_effectors(&hold(py, lanes)));
+        flat.into_pyarray(py).reshape([self.arms, 2])
+    }
+
+    fn __len__(&self) -> usize {
+        self.arms
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "<Batch of {} arms of {} links, {} threads>",
+            self.arms,
+            self.links(),
+            self.threads
+        )
+    }
+}
+
+impl Batch {
+    /// A row for each arm, or one for all, where something was handed in.
+    fn rows<'a>(&self, given: Option<&'a Numbers<'_>>, bound: Bound) -> PyResult<Option<Rows<'a>>> {
+        given
+            .map(|given| given.rows(self.arms, self.links(), Some(bound)))
+            .transpose()
+    }
+
+    /// A number for each arm, or one for all, where something was handed in.
+    fn column<'a>(
+        &self,
+        given: Option<&'a Numbers<'_>>,
+        bound: Bound,
+    ) -> PyResult<Option<Rows<'a>>> {
+        given
+            .map(|given| given.column(self.arms, bound))
+            .transpose()
+    }
+
+    /// The lanes that `arms` names: all, those that a mask has, or those of these numbers.
+    fn chosen(&self, arms: Option<&Object<'_>>) -> PyResult<Vec<usize>> {
+        let Some(arms) = arms else {
+            return Ok((0..self.arms).collect());
+        };
+        let expected = || {
+            refused(format_args!(
+                "arms must be a mask of {} or indices below that",
+                self.arms
+            ))
+        };
+        let py = arms.py();
+        let array = py
+            .import("numpy")?
+            .call_method1("asarray", (arms,))
+            .map_err(|_| expected())?;
+        if let Ok(mask) = array.cast::<PyArray1<bool>>() {
+            let mask = mask.to_vec()?;
+            if mask.len() != self.arms {
+                return Err(expected());
+            }
+            return Ok((0..self.arms)
+                .filter(|&lane| mask.get(lane) == Some(&true))
+                .collect());
+        }
+        let indices: Vec<usize> = array.extract().map_err(|_| expected())?;
+        if indices.iter().any(|&lane| lane >= self.arms) {
+            return Err(expected());
+        }
+        Ok(indices)
+    }
+}
+
+/// Arms in the starting pose, as a fresh runtime has one.
+fn fresh<const N: usize>(arms: usize) -> Mutex<Vec<Simulation<N>>>
+where
+    Gains<N>: Default,
+{
+    Mutex::new(vec![
+        Simulation::new(Arm::default(), Gains::default());
+        arms
+    ])
+}
+
+/// Numbers, where something was handed in.
+fn read<'py>(field: &str, value: Option<&Object<'py>>) -> PyResult<Option<Numbers<'py>>> {
+    value.map(|value| Numbers::read(field, value)).transpose()
+}
+
+/// One number of steps for all arms, or one for each.
+fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
+    if let Ok(alike) = steps.extract::<u64>() {
+        return Ok(vec![alike]);
+    }
+    match steps.extract::<Vec<u64>>() {
+        Ok(each) if each.len() == arms => Ok(each),
+        _ => Err(refused(format_args!(
+            "steps must be a whole number, or one for each of {arms} arms"
+        ))),
+    }
+}
+
+/// One method for all arms, or one for each.
+fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Method>> {
+    if let Ok(alike) = method.extract::<String>() {
+        return Ok(vec![fields::method("method", &alike)?]);
+    }
+    match method.extract::<Vec<String>>() {
+        Ok(each) if each.len() == arms => each
+            .iter()
+            .map(|name| fields::method("method", name))
+            .collect(),
+        _ => Err(refused(format_args!(
+            "method must be a name, or one for each of {arms} arms"
+        ))),
+    }
+}

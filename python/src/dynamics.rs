@@ -1,0 +1,281 @@
+//! The equation of motion and the kinematics, for one state or for many.
+//!
+//! **Invariant:** the numbers are those of the functions that step the live arm; nothing is reckoned a second time.
+
+use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
+use pendularm::math::arm::Arm as Rods;
+use pendularm::math::{dynamics, kinematics};
+use pyo3::IntoPyObject;
+use pyo3::prelude::{PyResult, Python, pyfunction};
+
+use crate::arm::{Arm, Chain, for_either};
+use crate::fields::{Bound, Held, Numbers, Object, Rows, joints_or, refused};
+
+/// What a function of a state answers for it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shape {
+    /// A number.
+    One,
+    /// So many numbers.
+    Many(usize),
+    /// A square of numbers.
+    Square(usize),
+}
+
+/// Applies `function` to every row of the fields; a field of one row goes with every row of the others.
+fn each_row<'py, const N: usize, const K: usize>(
+    py: Python<'py>,
+    fields: [(&str, &Object<'py>); K],
+    answer: Shape,
+    function: impl Fn([[f64; N]; K], &mut Vec<f64>),
+) -> PyResult<Object<'py>> {
+    let mut given = Vec::with_capacity(K);
+    for (field, value) in fields {
+        given.push((field, Numbers::read(field, value)?));
+    }
+    let count = given.iter().find_map(|(_, numbers)| match numbers.shape() {
+        [count, _] => Some(*count),
+        _ => None,
+    });
+    let mut rows: Vec<Rows<'_>> = Vec::with_capacity(K);
+    for (_, numbers) in &given {
+        rows.push(numbers.rows(count.unwrap_or(1), N, None)?);
+    }
+    let rows: [Rows<'_>; K] = rows
+        .try_into()
+        .map_err(|_| refused("as many rows as fields"))?;
+    let is_one = rows.iter().all(|row| row.count().is_none());
+    let mut flat = Vec::new();
+    for index in 0..count.unwrap_or(1) {
+        function(rows.each_ref().map(|row| row.row(index)), &mut flat);
+    }
+    let mut shape: Vec<usize> = count.filter(|_| !is_one).into_iter().collect();
+    match answer {
+        Shape::One => {}
+        Shape::Many(size) => shape.push(size),
+        Shape::Square(size) => shape.extend([size, size]),
+    }
+    if shape.is_empty() {
+        return Ok(flat
+            .first()
+            .copied()
+            .unwrap_or(f64::NAN)
+            .into_pyobject(py)?
+            .into_any());
+    }
+    Ok(flat.into_pyarray(py).reshape(shape)?.into_any())
+}
+
+/// Mass matrix M(q) [kg m²] at joint positions `q` [rad], of shape (links,) or (n, links): (links, links) or (n, links, links).
+#[pyfunction]
+pub(crate) fn mass_matrix<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        q: &Object<'py>,
+    ) -> PyResult<Object<'py>> {
+        each_row(
+            py,
+            [("q", q)],
+            Shape::Square(N),
+            |[q]: [[f64; N]; 1], out| {
+                out.extend(dynamics::mass_matrix(arm, &q).as_flattened());
+            },
+        )
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+}
+
+/// Coriolis and centrifugal effort C(q, qd) qd [N m] at positions `q` [rad] and rates `qd` [rad/s], of shape (links,) or (n, links).
+#[pyfunction]
+pub(crate) fn coriolis<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+    qd: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        q: &Object<'py>,
+        qd: &Object<'py>,
+    ) -> PyResult<Object<'py>> {
+        each_row(
+            py,
+            [("q", q), ("qd", qd)],
+            Shape::Many(N),
+            |[q, qd]: [[f64; N]; 2], out| {
+                out.extend(dynamics::coriolis(arm, &q, &qd));
+            },
+        )
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q, &qd))
+}
+
+/// Gravity load G(q) [N m], the effort that holds the arm still at `q` [rad], of shape (links,) or (n, links).
+#[pyfunction]
+pub(crate) fn gravity_load<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        q: &Object<'py>,
+    ) -> PyResult<Object<'py>> {
+        each_row(py, [("q", q)], Shape::Many(N), |[q]: [[f64; N]; 1], out| {
+            out.extend(dynamics::gravity_load(arm, &q));
+        })
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+}
+
+/// Joint accelerations [rad/s²] under `effort` [N m] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n, links).
+#[pyfunction]
+pub(crate) fn forward_dynamics<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+    qd: Object<'py>,
+    effort: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        given: [&Object<'py>; 3],
+    ) -> PyResult<Object<'py>> {
+        let [q, qd, effort] = given;
+        let fields = [("q", q), ("qd", qd), ("effort", effort)];
+        each_row(
+            py,
+            fields,
+            Shape::Many(N),
+            |[q, qd, effort]: [[f64; N]; 3], out| {
+                out.extend(dynamics::forward_dynamics(arm, &q, &qd, &effort));
+            },
+        )
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, [&q, &qd, &effort]))
+}
+
+/// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n, links).
+#[pyfunction]
+pub(crate) fn inverse_dynamics<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+    qd: Object<'py>,
+    qdd: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        given: [&Object<'py>; 3],
+    ) -> PyResult<Object<'py>> {
+        let [q, qd, qdd] = given;
+        let fields = [("q", q), ("qd", qd), ("qdd", qdd)];
+        each_row(
+            py,
+            fields,
+            Shape::Many(N),
+            |[q, qd, qdd]: [[f64; N]; 3], out| {
+                out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
+            },
+        )
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, [&q, &qd, &qdd]))
+}
+
+/// Kinetic energy [J] at `q` [rad] and `qd` [rad/s], of shape (links,) or (n, links): a number, or (n,).
+#[pyfunction]
+pub(crate) fn kinetic_energy<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+    qd: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        q: &Object<'py>,
+        qd: &Object<'py>,
+    ) -> PyResult<Object<'py>> {
+        each_row(
+            py,
+            [("q", q), ("qd", qd)],
+            Shape::One,
+            |[q, qd]: [[f64; N]; 2], out| {
+                out.push(dynamics::kinetic_energy(arm, &q, &qd));
+            },
+        )
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q, &qd))
+}
+
+/// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a number, or (n,).
+#[pyfunction]
+pub(crate) fn potential_energy<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        q: &Object<'py>,
+    ) -> PyResult<Object<'py>> {
+        each_row(py, [("q", q)], Shape::One, |[q]: [[f64; N]; 1], out| {
+            out.push(dynamics::potential_energy(arm, &q));
+        })
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+}
+
+/// Where the end effector is [m], (2,) or (n, 2), at `q` [rad] of shape (links,) or (n, links).
+#[pyfunction]
+pub(crate) fn end_effector<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    q: Object<'py>,
+) -> PyResult<Object<'py>> {
+    fn of<'py, const N: usize>(
+        py: Python<'py>,
+        arm: &Rods<N>,
+        q: &Object<'py>,
+    ) -> PyResult<Object<'py>> {
+        each_row(py, [("q", q)], Shape::Many(2), |[q]: [[f64; N]; 1], out| {
+            out.extend(kinematics::forward(arm.lengths(), &q).position.to_array());
+        })
+    }
+    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+}
+
+/// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].
+///
+/// `phi` [rad] is the heading of the last link of 3; `present` [rad] decides what the target leaves open, as `/ik/solve` does by
+/// the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
+#[pyfunction]
+#[pyo3(signature = (arm, x, y, phi=None, *, present=None))]
+pub(crate) fn inverse_kinematics<'py>(
+    py: Python<'py>,
+    arm: Held<'py, Arm>,
+    x: f64,
+    y: f64,
+    phi: Option<f64>,
+    present: Option<Object<'py>>,
+) -> PyResult<Held<'py, numpy::PyArray1<f64>>> {
+    let target = kinematics::Target {
+        position: [x, y].into(),
+        orientation: phi,
+    };
+    for_either!(Chain, &arm.get().chain, arm => {
+        let present = joints_or("present", present.as_ref(), Bound::Finite, [0.0; _])?;
+        let positions = kinematics::solve(arm.lengths(), &present, &target).map_err(refused)?;
+        Ok(positions.to_pyarray(py))
+    })
+}

@@ -1,0 +1,304 @@
+//! Reading what Python hands in, under the names that the runtime's services have for it.
+//!
+//! **Invariant:** a value that is refused is a `ValueError` that names its field, what it must be, and what it was.
+
+use std::borrow::Cow;
+use std::fmt::Display;
+
+use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::{PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
+use pyo3::types::PyDict;
+
+/// The numbers that a field may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Bound {
+    Finite,
+    Positive,
+    NotNegative,
+}
+
+impl Bound {
+    fn wants(self) -> &'static str {
+        match self {
+            Self::Finite => "finite",
+            Self::Positive => "finite and greater than 0",
+            Self::NotNegative => "finite and at least 0",
+        }
+    }
+
+    fn admits(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Finite => true,
+                Self::Positive => value > 0.0,
+                Self::NotNegative => value >= 0.0,
+            }
+    }
+}
+
+/// A refusal.
+pub(crate) fn refused(why: impl Display) -> PyErr {
+    PyValueError::new_err(why.to_string())
+}
+
+/// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side.
+pub(crate) struct Numbers<'py> {
+    field: String,
+    array: PyReadonlyArrayDyn<'py, f64>,
+}
+
+impl<'py> Numbers<'py> {
+    pub(crate) fn read(field: &str, value: &Object<'py>) -> PyResult<Self> {
+        let array = match value.cast::<PyArrayDyn<f64>>() {
+            Ok(array) => array.clone(),
+            Err(_) => converted(value).map_err(|_| {
+                refused(format_args!(
+                    "{field} must be an array of numbers, got {}",
+                    shown(value)
+                ))
+            })?,
+        };
+        let array = array.try_readonly().map_err(|_| {
+            refused(format_args!(
+                "{field} is being written by a batch: hand in a copy of it"
+            ))
+        })?;
+        Ok(Self {
+            field: field.to_owned(),
+            array,
+        })
+    }
+
+    pub(crate) fn shape(&self) -> &[usize] {
+        self.array.shape()
+    }
+
+    /// The numbers, row by row.
+    pub(crate) fn values(&self) -> Cow<'_, [f64]> {
+        match self.array.as_slice() {
+            Ok(values) => Cow::Borrowed(values),
+            Err(_) => Cow::Owned(self.array.as_array().iter().copied().collect()),
+        }
+    }
+
+    /// The numbers as one row of `width` for each of `arms`, or one row for all of them.
+    pub(crate) fn rows(
+        &self,
+        arms: usize,
+        width: usize,
+        bound: Option<Bound>,
+    ) -> PyResult<Rows<'_>> {
+        let field = &self.field;
+        let shape = self.shape();
+        if shape != [width] && shape != [arms, width] {
+            return Err(refused(format_args!(
+                "{field} must have the shape ({width},) or ({arms}, {width}), got {shape:?}"
+            )));
+        }
+        let is_one = shape.len() == 1;
+        let values = self.values();
+        if let Some(bound) = bound {
+            held(field, &values, bound, |at| match is_one {
+                true => format!("[{at}]"),
+                false => format!("[{}][{}]", at / width, at % width),
+            })?;
+        }
+        Ok(Rows {
+            values,
+            width,
+            is_one,
+        })
+    }
+
+    /// The numbers as one for each of `arms`, or one for all of them.
+    pub(crate) fn column(&self, arms: usize, bound: Bound) -> PyResult<Rows<'_>> {
+        let field = &self.field;
+        let shape = self.shape();
+        if !shape.is_empty() && shape != [arms] {
+            return Err(refused(format_args!(
+                "{field} must be a number or have the shape ({arms},), got {shape:?}"
+            )));
+        }
+        let values = self.values();
+        held(field, &values, bound, |arm| {
+            if shape.is_empty() {
+                String::new()
+            } else {
+                format!("[{arm}]")
+            }
+        })?;
+        Ok(Rows {
+            values,
+            width: 1,
+            is_one: shape.is_empty(),
+        })
+    }
+}
+
+/// Whatever NumPy can make doubles of.
+fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
+    let py = value.py();
+    let array = py
+        .import("numpy")?
+        .call_method1("asarray", (value, "float64"))?;
+    Ok(array.cast_into()?)
+}
+
+/// One row for each arm, or one for all of them.
+#[derive(Debug)]
+pub(crate) struct Rows<'a> {
+    values: Cow<'a, [f64]>,
+    width: usize,
+    is_one: bool,
+}
+
+impl Rows<'_> {
+    /// The same, in memory of its own.
+    pub(crate) fn into_owned(self) -> Rows<'static> {
+        Rows {
+            values: Cow::Owned(self.values.into_owned()),
+            width: self.width,
+            is_one: self.is_one,
+        }
+    }
+
+    /// How many rows there are, unless one stands for all.
+    pub(crate) fn count(&self) -> Option<usize> {
+        (!self.is_one).then(|| self.values.len() / self.width)
+    }
+
+    /// The row of an arm. `N` is the width that was asked for.
+    pub(crate) fn row<const N: usize>(&self, arm: usize) -> [f64; N] {
+        let start = if self.is_one { 0 } else { arm * N };
+        let row = self
+            .values
+            .get(start..start + N)
+            .and_then(|row| row.try_into().ok());
+        debug_assert!(row.is_some(), "the shape has been checked");
+        row.unwrap_or([f64::NAN; N])
+    }
+
+    /// The number of an arm, of a column.
+    pub(crate) fn number(&self, arm: usize) -> f64 {
+        let [number] = self.row(arm);
+        number
+    }
+}
+
+/// Something of Python's, with the proof that its lock is held.
+pub(crate) type Held<'py, T> = pyo3::Bound<'py, T>;
+
+/// Any object.
+pub(crate) type Object<'py> = pyo3::Bound<'py, PyAny>;
+
+/// An object as an error shows it: not all of a long array.
+fn shown(value: &Object<'_>) -> String {
+    let text = value
+        .repr()
+        .map(|text| text.to_string())
+        .unwrap_or_default();
+    if text.chars().count() > 60 {
+        format!("{}...", text.chars().take(60).collect::<String>())
+    } else {
+        text
+    }
+}
+
+/// Holds numbers to a bound; `place` says which of them it is.
+pub(crate) fn held(
+    field: &str,
+    values: &[f64],
+    bound: Bound,
+    place: impl Fn(usize) -> String,
+) -> PyResult<()> {
+    match values.iter().position(|&value| !bound.admits(value)) {
+        None => Ok(()),
+        Some(at) => Err(refused(format_args!(
+            "{field}{} must be {}, got {}",
+            place(at),
+            bound.wants(),
+            values.get(at).copied().unwrap_or(f64::NAN)
+        ))),
+    }
+}
+
+/// One number per joint.
+pub(crate) fn joints<const N: usize>(
+    field: &str,
+    value: &Object<'_>,
+    bound: Bound,
+) -> PyResult<[f64; N]> {
+    let numbers = Numbers::read(field, value)?;
+    if *numbers.shape() != [N] {
+        return Err(refused(format_args!(
+            "{field} must be an array of {N} numbers, got {}",
+            shown(value)
+        )));
+    }
+    let values = numbers.values();
+    held(field, &values, bound, |joint| format!("[{joint}]"))?;
+    <[f64; N]>::try_from(&*values).map_err(refused)
+}
+
+/// As [`joints`], or `missing` where nothing is handed in.
+pub(crate) fn joints_or<const N: usize>(
+    field: &str,
+    value: Option<&Object<'_>>,
+    bound: Bound,
+    missing: [f64; N],
+) -> PyResult<[f64; N]> {
+    value.map_or(Ok(missing), |value| joints(field, value, bound))
+}
+
+/// One number.
+pub(crate) fn number(field: &str, value: f64, bound: Bound) -> PyResult<f64> {
+    held(field, &[value], bound, |_| String::new())?;
+    Ok(value)
+}
+
+/// 2 or 3.
+pub(crate) fn links(value: usize) -> PyResult<usize> {
+    if (2..=3).contains(&value) {
+        Ok(value)
+    } else {
+        Err(refused(format_args!("links must be 2 or 3, got {value}")))
+    }
+}
+
+/// A method by its name.
+pub(crate) fn method(field: &str, name: &str) -> PyResult<Method> {
+    name.parse()
+        .map_err(|why| refused(format_args!("{field} {why}, got {name:?}")))
+}
+
+/// Gains by their names, `{"kp": …, "ki": …, "kd": …}`; one that is left out is that of `missing`.
+pub(crate) fn gains<const N: usize>(
+    value: Option<&Held<'_, PyDict>>,
+    missing: Gains<N>,
+) -> PyResult<Gains<N>> {
+    let Some(gains) = value else {
+        return Ok(missing);
+    };
+    for name in gains.keys() {
+        if !["kp", "ki", "kd"].contains(&name.to_string().as_str()) {
+            return Err(refused(format_args!(
+                "gains has kp, ki and kd, got {}",
+                shown(&name)
+            )));
+        }
+    }
+    let part = |name: &str, missing: [f64; N]| match gains.get_item(name)? {
+        Some(value) if !value.is_none() => {
+            joints(&format!("gains.{name}"), &value, Bound::NotNegative)
+        }
+        _ => Ok(missing),
+    };
+    Ok(Gains {
+        kp: part("kp", missing.kp)?,
+        ki: part("ki", missing.ki)?,
+        kd: part("kd", missing.kd)?,
+    })
+}

@@ -1,0 +1,33 @@
+//! The arm of pendularm for Python: what the live runtime steps, as a library that NumPy arrays go into and come out of.
+//!
+//! Thin: values are read and named here, and everything is computed by the `pendularm` crate, whose simulation every arm is
+//! stepped by. `package/pendularm/` is what users import; it words what this module answers.
+//!
+//! **Invariant:** whatever takes longer than a moment runs with the interpreter's lock released, and ends when a signal asks for it.
+
+mod arm;
+mod batch;
+mod dynamics;
+mod fields;
+mod lanes;
+mod patience;
+mod simulation;
+mod study;
+
+/// The compiled part of the package `pendularm`.
+#[pyo3::pymodule(name = "_native")]
+mod native {
+    #[pymodule_export]
+    use crate::arm::{Arm, default_gains};
+    #[pymodule_export]
+    use crate::batch::Batch;
+    #[pymodule_export]
+    use crate::dynamics::{
+        coriolis, end_effector, forward_dynamics, gravity_load, inverse_dynamics,
+        inverse_kinematics, kinetic_energy, mass_matrix, potential_energy,
+    };
+    #[pymodule_export]
+    use crate::simulation::{Divergence, Simulation};
+    #[pymodule_export]
+    use crate::study::{plan, rollout, stability, suggest_gains};
+}

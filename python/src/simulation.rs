@@ -1,0 +1,366 @@
+//! One arm under control.
+//!
+//! **Invariant:** every step is the live arm's own, so that the same calls give the same bits as the runtime.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use numpy::{PyArray1, ToPyArray};
+use pendularm::math::arm::{Arm as Rods, State};
+use pendularm::math::dynamics::energy;
+use pendularm::math::integrator::Method;
+use pendularm::math::kinematics::forward;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation as Loop;
+use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
+use pyo3::sync::MutexExt;
+use pyo3::types::PyDict;
+
+use crate::arm::{Arm, Chain, for_either, or_default};
+use crate::fields::{self, Bound, Held, Object, joints, joints_or, refused};
+use crate::patience::until_done;
+
+/// Steps between two looks at the clock: some hundred microseconds.
+const STEPS_PER_LOOK: u64 = 1000;
+
+type Numbers<'py> = Held<'py, PyArray1<f64>>;
+
+/// The number of links never changes; what does is behind a lock, since threads may share a simulation.
+#[derive(Debug)]
+enum Either {
+    Two(Mutex<Loop<2>>),
+    Three(Mutex<Loop<3>>),
+}
+
+/// Where a simulation left the finite numbers.
+#[pyclass(frozen, eq, get_all, module = "pendularm")]
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Divergence {
+    /// Number of the step since the reset that was not taken; the first step is 1.
+    step: u64,
+    /// Simulation time at which that step began [s].
+    time: f64,
+}
+
+#[pymethods]
+impl Divergence {
+    fn __repr__(&self) -> String {
+        format!("Divergence(step={}, time={:?})", self.step, self.time)
+    }
+}
+
+/// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
+///
+/// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`, `midpoint`, `verlet` or
+/// `rk4`; `timestep` [s] is the control period too; `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,)
+/// each, and what is left out of it is as in a fresh runtime. Threads may share one.
+#[pyclass(frozen, module = "pendularm")]
+#[derive(Debug)]
+pub(crate) struct Simulation {
+    own: Either,
+}
+
+/// Waits for a lock without keeping the interpreter's. What is behind it is whole, also after a panic of another thread.
+fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
+    one.lock_py_attached(py)
+        .unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A simulation of this arm.
+fn begin<const N: usize>(
+    arm: Rods<N>,
+    method: Method,
+    timestep: f64,
+    gains: Option<&Held<'_, PyDict>>,
+) -> PyResult<Mutex<Loop<N>>>
+where
+    Gains<N>: Default,
+{
+    let mut one = Loop::new(arm, fields::gains(gains, Gains::default())?);
+    one.set_method(method);
+    one.set_timestep(timestep);
+    Ok(Mutex::new(one))
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (arm=None, *, method="rk4", timestep=0.001, gains=None))]
+    fn new(
+        arm: Option<&Held<'_, Arm>>,
+        method: &str,
+        timestep: f64,
+        gains: Option<&Held<'_, PyDict>>,
+    ) -> PyResult<Self> {
+        let method = fields::method("method", method)?;
+        let timestep = fields::number("timestep", timestep, Bound::Positive)?;
+        let own = match or_default(arm) {
+            Chain::Two(arm) => Either::Two(begin(arm, method, timestep, gains)?),
+            Chain::Three(arm) => Either::Three(begin(arm, method, timestep, gains)?),
+        };
+        Ok(Self { own })
+    }
+
+    /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged. The interpreter's lock is
+    /// released meanwhile, and Ctrl-C ends it between two steps.
+    #[pyo3(signature = (steps=1))]
+    fn step(&self, py: Python<'_>, steps: u64) -> PyResult<u64> {
+        let mut left = steps;
+        let mut taken = 0;
+        until_done(py, || {
+            // Held for a piece only: a signal's handler may want to look at the arm.
+            let piece = left.min(STEPS_PER_LOOK);
+            let advanced = for_either!(Either, &self.own, one => {
+                one.lock().unwrap_or_else(PoisonError::into_inner).advance(piece)
+            });
+            taken += advanced;
+            left = if advanced < piece { 0 } else { left - piece };
+            (left == 0).then_some(taken)
+        })
+    }
+
+    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, disturbance ended, divergence cleared. On or off,
+    /// gains, arm, method and timestep stay.
+    fn reset(&self, py: Python<'_>) {
+        for_either!(Either, &self.own, one => hold(py, one).reset());
+    }
+
+    /// Turns the controller on or off. From off to on the integral starts at zero.
+    #[pyo3(signature = (data=true))]
+    fn enable(&self, py: Python<'_>, data: bool) {
+        for_either!(Either, &self.own, one => hold(py, one).enable(data));
+    }
+
+    /// Where the controller holds the arm: `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,) each.
+    #[pyo3(signature = (positions, velocities=None))]
+    fn set_setpoint(
+        &self,
+        py: Python<'_>,
+        positions: &Object<'_>,
+        velocities: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        for_either!(Either, &self.own, one => {
+            let setpoint = read_setpoint(positions, velocities)?;
+            hold(py, one).set_setpoint(setpoint);
+        });
+        Ok(())
+    }
+
+    /// Changes the gains that are given, (links,) each: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integral stays.
+    #[pyo3(signature = (kp=None, ki=None, kd=None))]
+    fn set_gains(
+        &self,
+        py: Python<'_>,
+        kp: Option<&Object<'_>>,
+        ki: Option<&Object<'_>>,
+        kd: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        for_either!(Either, &self.own, one => {
+            let present = *hold(py, one).pid().gains();
+            let gains = Gains {
+                kp: joints_or("kp", kp, Bound::NotNegative, present.kp)?,
+                ki: joints_or("ki", ki, Bound::NotNegative, present.ki)?,
+                kd: joints_or("kd", kd, Bound::NotNegative, present.kd)?,
+            };
+            hold(py, one).set_gains(gains);
+        });
+        Ok(())
+    }
+
+    /// Puts the arm into another state, `position` [rad] and `velocity` [rad/s] (zeros unless given), (links,) each. Clock and
+    /// controller stay.
+    #[pyo3(signature = (position, velocity=None))]
+    fn set_state(
+        &self,
+        py: Python<'_>,
+        position: &Object<'_>,
+        velocity: Option<&Object<'_>>,
+    ) -> PyResult<()> {
+        for_either!(Either, &self.own, one => {
+            let state = State {
+                position: joints("position", position, Bound::Finite)?,
+                velocity: joints_or("velocity", velocity, Bound::Finite, [0.0; _])?,
+            };
+            hold(py, one).set_state(state);
+        });
+        Ok(())
+    }
+
+    /// Adds `effort` [N m], (links,), to that of every step that begins within `duration` [s] from now, in place of what was added so
+    /// far. With the controller off, this is all the effort there is.
+    fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: f64) -> PyResult<()> {
+        let duration = fields::number("duration", duration, Bound::Positive)?;
+        for_either!(Either, &self.own, one => {
+            let effort = joints("effort", effort, Bound::Finite)?;
+            hold(py, one).disturb(effort, duration);
+        });
+        Ok(())
+    }
+
+    /// The arm; another with as many links may be put in its place.
+    #[getter]
+    fn arm(&self, py: Python<'_>) -> Arm {
+        let chain = match &self.own {
+            Either::Two(one) => Chain::Two(*hold(py, one).arm()),
+            Either::Three(one) => Chain::Three(*hold(py, one).arm()),
+        };
+        Arm { chain }
+    }
+
+    #[setter]
+    fn set_arm(&self, py: Python<'_>, arm: &Held<'_, Arm>) -> PyResult<()> {
+        match (&self.own, &arm.get().chain) {
+            (Either::Two(one), Chain::Two(arm)) => hold(py, one).set_arm(*arm),
+            (Either::Three(one), Chain::Three(arm)) => hold(py, one).set_arm(*arm),
+            _ => return Err(refused("arm must have as many links as the one before")),
+        }
+        Ok(())
+    }
+
+    /// Number of links, 2 or 3.
+    #[getter]
+    fn links(&self) -> usize {
+        match &self.own {
+            Either::Two(_) => 2,
+            Either::Three(_) => 3,
+        }
+    }
+
+    /// Joint positions [rad], (links,), never wrapped.
+    #[getter]
+    fn position<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        for_either!(Either, &self.own, one => hold(py, one).state().position.to_pyarray(py))
+    }
+
+    /// Joint rates [rad/s], (links,).
+    #[getter]
+    fn velocity<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        for_either!(Either, &self.own, one => hold(py, one).state().velocity.to_pyarray(py))
+    }
+
+    /// Effort of the latest step [N m], (links,), the controller's and the disturbance's together.
+    #[getter]
+    fn effort<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        for_either!(Either, &self.own, one => hold(py, one).effort().to_pyarray(py))
+    }
+
+    /// Integral of the position error [rad s], (links,).
+    #[getter]
+    fn integral<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        for_either!(Either, &self.own, one => hold(py, one).pid().integral().to_pyarray(py))
+    }
+
+    /// The setpoint: positions [rad] and velocities [rad/s], (links,) each.
+    #[getter]
+    fn setpoint<'py>(&self, py: Python<'py>) -> (Numbers<'py>, Numbers<'py>) {
+        for_either!(Either, &self.own, one => {
+            let one = hold(py, one);
+            let Setpoint { position, velocity } = one.pid().setpoint();
+            (position.to_pyarray(py), velocity.to_pyarray(py))
+        })
+    }
+
+    /// The gains in force, by name; what is written into the answer changes nothing.
+    #[getter]
+    fn gains<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyDict>> {
+        let found = PyDict::new(py);
+        for_either!(Either, &self.own, one => {
+            let one = hold(py, one);
+            let Gains { kp, ki, kd } = one.pid().gains();
+            for (name, gain) in [("kp", kp), ("ki", ki), ("kd", kd)] {
+                found.set_item(name, gain.to_pyarray(py))?;
+            }
+        });
+        Ok(found)
+    }
+
+    /// Whether the controller is on.
+    #[getter]
+    fn enabled(&self, py: Python<'_>) -> bool {
+        for_either!(Either, &self.own, one => hold(py, one).pid().is_enabled())
+    }
+
+    /// The method that takes the steps: `euler`, `midpoint`, `verlet` or `rk4`.
+    #[getter]
+    fn method(&self, py: Python<'_>) -> &'static str {
+        for_either!(Either, &self.own, one => hold(py, one).method().name())
+    }
+
+    #[setter]
+    fn set_method(&self, py: Python<'_>, method: &str) -> PyResult<()> {
+        let method = fields::method("method", method)?;
+        for_either!(Either, &self.own, one => hold(py, one).set_method(method));
+        Ok(())
+    }
+
+    /// Length of a step [s], and the control period.
+    #[getter]
+    fn timestep(&self, py: Python<'_>) -> f64 {
+        for_either!(Either, &self.own, one => hold(py, one).timestep())
+    }
+
+    #[setter]
+    fn set_timestep(&self, py: Python<'_>, timestep: f64) -> PyResult<()> {
+        let timestep = fields::number("timestep", timestep, Bound::Positive)?;
+        for_either!(Either, &self.own, one => hold(py, one).set_timestep(timestep));
+        Ok(())
+    }
+
+    /// Simulation time since the reset [s].
+    #[getter]
+    fn time(&self, py: Python<'_>) -> f64 {
+        for_either!(Either, &self.own, one => hold(py, one).time())
+    }
+
+    /// Steps taken since the reset.
+    #[getter]
+    fn steps(&self, py: Python<'_>) -> u64 {
+        for_either!(Either, &self.own, one => hold(py, one).steps())
+    }
+
+    /// Kinetic plus potential energy [J], zero at rest along the x axis.
+    #[getter]
+    fn energy(&self, py: Python<'_>) -> f64 {
+        for_either!(Either, &self.own, one => {
+            let one = hold(py, one);
+            energy(one.arm(), one.state())
+        })
+    }
+
+    /// Where the end effector is [m], (2,).
+    #[getter]
+    fn end_effector<'py>(&self, py: Python<'py>) -> Numbers<'py> {
+        for_either!(Either, &self.own, one => {
+            let one = hold(py, one);
+            forward(one.arm().lengths(), &one.state().position).position.to_array().to_pyarray(py)
+        })
+    }
+
+    /// Where the simulation left the finite numbers, if it did since the reset; from there on no step is taken.
+    #[getter]
+    fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
+        for_either!(Either, &self.own, one => hold(py, one).divergence()).map(|found| Divergence {
+            step: found.step,
+            time: found.time,
+        })
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        for_either!(Either, &self.own, one => {
+            let one = hold(py, one);
+            format!(
+                "<Simulation of {} links at {} s, {} at {} s>",
+                one.effort().len(), one.time(), one.method(), one.timestep()
+            )
+        })
+    }
+}
+
+fn read_setpoint<const N: usize>(
+    positions: &Object<'_>,
+    velocities: Option<&Object<'_>>,
+) -> PyResult<Setpoint<N>> {
+    Ok(Setpoint {
+        position: joints("positions", positions, Bound::Finite)?,
+        velocity: joints_or("velocities", velocities, Bound::Finite, [0.0; N])?,
+    })
+}

@@ -1,0 +1,320 @@
+//! The study's predictions and runs, with the questions and the answers of the services `/study/*`.
+//!
+//! **Invariant:** an answer has the members that the service's has, under the same names.
+
+use std::time::{Duration, Instant};
+
+use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
+use pendularm::math::arm::{Arm as Rods, State};
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::study::control_loop::{ControlLoop, no_control};
+use pendularm::study::gains::{GainsSearch, Wish};
+use pendularm::study::motion::Motion;
+use pendularm::study::planner::{Planned, Planning, Task};
+use pendularm::study::rollout::{Deviation, Plan, Rollout};
+use pendularm::study::stability::{ADVISED_PART, LimitSearch, Limits};
+use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
+use pyo3::types::PyDict;
+
+use crate::arm::{Arm, Chain, for_either, or_default};
+use crate::fields::{self, Bound, Held, Object, joints_or, refused};
+use crate::patience::until_done;
+
+/// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
+const EVALUATIONS_PER_LOOK: u64 = 2000;
+
+// ---- stability ------------------------------------------------------------------------------------------------------
+
+#[pyfunction]
+#[pyo3(signature = (arm=None, *, integrator="rk4", gains=None, setpoint=None, q=None, qd=None))]
+pub(crate) fn stability<'py>(
+    py: Python<'py>,
+    arm: Option<Held<'py, Arm>>,
+    integrator: &str,
+    gains: Option<Held<'py, PyDict>>,
+    setpoint: Option<Object<'py>>,
+    q: Option<Object<'py>>,
+    qd: Option<Object<'py>>,
+) -> PyResult<Held<'py, PyDict>> {
+    let method = fields::method("integrator", integrator)?;
+    for_either!(Chain, or_default(arm.as_ref()), arm => {
+        let gains = fields::gains(gains.as_ref(), Gains::default())?;
+        let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
+        let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
+        let start = read_state(("q", q.as_ref()), ("qd", qd.as_ref()))?;
+        let motion = Motion::ahead(&control, &start);
+        let mut search = LimitSearch::new(&control);
+        let limits = until_done(py, || search.advance())?;
+        listed_limits(py, &limits, motion)
+    })
+}
+
+fn listed_limits<'py, const N: usize>(
+    py: Python<'py>,
+    limits: &Limits<N>,
+    motion: Motion,
+) -> PyResult<Held<'py, PyDict>> {
+    let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
+    let advised = [
+        limits.advised,
+        bears.map(|timestep| ADVISED_PART * timestep),
+    ];
+    let critical = limits.critical.map(|critical| {
+        let found = PyDict::new(py);
+        found.set_item("growth_per_step", critical.growth_per_step)?;
+        found.set_item("frequency", critical.frequency)?;
+        found.set_item("joint", critical.joint)?;
+        PyResult::Ok(found)
+    });
+    let found = PyDict::new(py);
+    found.set_item("timestep_limit_held", limits.held)?;
+    found.set_item("timestep_limit_continuous", limits.continuous)?;
+    found.set_item("equilibrium", limits.equilibrium.to_pyarray(py))?;
+    found.set_item("equilibrium_kind", limits.rest.name())?;
+    found.set_item("minimum_over_poses_held", limits.minimum_held)?;
+    found.set_item("minimum_over_poses_continuous", limits.minimum_continuous)?;
+    found.set_item("minimum_over_poses_bound", limits.bound)?;
+    found.set_item("certified", limits.certified)?;
+    found.set_item(
+        "worst_pose",
+        limits.worst_pose.map(|pose| pose.to_pyarray(py)),
+    )?;
+    found.set_item("critical", critical.transpose()?)?;
+    found.set_item("timestep_limit_motion", bears)?;
+    found.set_item("motion_speed", motion.speed)?;
+    found.set_item(
+        "advised_timestep",
+        advised.into_iter().flatten().reduce(f64::min),
+    )?;
+    Ok(found)
+}
+
+fn read_state<const N: usize>(
+    (q, position): (&str, Option<&Object<'_>>),
+    (qd, velocity): (&str, Option<&Object<'_>>),
+) -> PyResult<State<N>> {
+    Ok(State {
+        position: joints_or(q, position, Bound::Finite, [0.0; N])?,
+        velocity: joints_or(qd, velocity, Bound::Finite, [0.0; N])?,
+    })
+}
+
+// ---- rollout --------------------------------------------------------------------------------------------------------
+
+#[pyfunction]
+#[pyo3(signature = (
+    arm=None, *, q0=None, qdot0=None, duration=10.0, timestep=0.001, integrator="rk4", gains=None, setpoint=None,
+    samples=1001, reference=false
+))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "they are the fields of the service, by name"
+)]
+pub(crate) fn rollout<'py>(
+    py: Python<'py>,
+    arm: Option<Held<'py, Arm>>,
+    q0: Option<Object<'py>>,
+    qdot0: Option<Object<'py>>,
+    duration: f64,
+    timestep: f64,
+    integrator: &str,
+    gains: Option<Held<'py, PyDict>>,
+    setpoint: Option<Object<'py>>,
+    samples: u64,
+    reference: bool,
+) -> PyResult<Held<'py, PyDict>> {
+    let method = fields::method("integrator", integrator)?;
+    for_either!(Chain, or_default(arm.as_ref()), arm => {
+        run(py, Plan {
+            control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_method(method).with_timestep(timestep),
+            start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
+            duration,
+            samples,
+            reference,
+        })
+    })
+}
+
+/// Makes the run by itself, which is timed, and again beside its reference, if one is wanted.
+fn run<const N: usize>(py: Python<'_>, plan: Plan<N>) -> PyResult<Held<'_, PyDict>> {
+    let mut alone = Rollout::new(Plan {
+        reference: false,
+        ..plan
+    })
+    .map_err(refused)?;
+    let mut took = Duration::ZERO;
+    until_done(py, || {
+        let began = Instant::now();
+        let steps = alone.advance(EVALUATIONS_PER_LOOK);
+        took += began.elapsed();
+        (steps == 0).then_some(())
+    })?;
+    if plan.reference {
+        let mut compared = Rollout::new(plan).map_err(refused)?;
+        until_done(py, || {
+            (compared.advance(EVALUATIONS_PER_LOOK) == 0).then_some(())
+        })?;
+        alone = compared;
+    }
+    listed_run(py, &alone, took)
+}
+
+fn listed_run<'py, const N: usize>(
+    py: Python<'py>,
+    run: &Rollout<N>,
+    took: Duration,
+) -> PyResult<Held<'py, PyDict>> {
+    let rows = |rows: &[[f64; N]]| {
+        rows.as_flattened()
+            .to_vec()
+            .into_pyarray(py)
+            .reshape([rows.len(), N])
+    };
+    // As in the service: an error that is known for a part of the samples only is none.
+    let followed = run
+        .deviation()
+        .filter(|deviation| deviation.errors.len() == run.times().len());
+    let divergence = run.divergence().map(|found| (found.step, found.time));
+    let found = PyDict::new(py);
+    found.set_item("times", run.times().to_pyarray(py))?;
+    found.set_item("positions", rows(run.positions())?)?;
+    found.set_item("velocities", rows(run.velocities())?)?;
+    found.set_item("efforts", rows(run.efforts())?)?;
+    found.set_item("energy", run.energy().to_pyarray(py))?;
+    found.set_item("evaluations", run.evaluations())?;
+    found.set_item("wall_time", took.as_secs_f64())?;
+    found.set_item("error", followed.and_then(Deviation::known))?;
+    found.set_item(
+        "error_uncertainty",
+        followed.map(Deviation::largest_uncertainty),
+    )?;
+    found.set_item("divergence", divergence)?;
+    Ok(found)
+}
+
+// ---- gains ----------------------------------------------------------------------------------------------------------
+
+#[pyfunction]
+#[pyo3(signature = (arm=None, *, settling_time=4.0, margin=1.25, timestep=0.001, integrator="rk4"))]
+pub(crate) fn suggest_gains<'py>(
+    py: Python<'py>,
+    arm: Option<Held<'py, Arm>>,
+    settling_time: f64,
+    margin: f64,
+    timestep: f64,
+    integrator: &str,
+) -> PyResult<Held<'py, PyDict>> {
+    let wish = Wish {
+        settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
+        margin: fields::number("margin", margin, Bound::Positive)?,
+    };
+    if margin < 1.0 {
+        return Err(refused(format_args!(
+            "margin must be at least 1, got {margin}"
+        )));
+    }
+    let method = fields::method("integrator", integrator)?;
+    let timestep = fields::number("timestep", timestep, Bound::Positive)?;
+    for_either!(Chain, or_default(arm.as_ref()), arm => {
+        let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
+        let mut search = GainsSearch::new(&control, wish).map_err(refused)?;
+        let found = until_done(py, || search.advance())?.map_err(refused)?;
+        let listed = PyDict::new(py);
+        listed.set_item("kp", found.gains.kp.to_pyarray(py))?;
+        listed.set_item("ki", found.gains.ki.to_pyarray(py))?;
+        listed.set_item("kd", found.gains.kd.to_pyarray(py))?;
+        listed.set_item("timestep_limit", found.limit)?;
+        listed.set_item("certified", found.certified)?;
+        listed.set_item("margin", found.limit.map(|limit| limit / timestep))?;
+        listed.set_item("settled_after", found.settled_after)?;
+        Ok(listed)
+    })
+}
+
+// ---- plan -----------------------------------------------------------------------------------------------------------
+
+#[pyfunction]
+#[pyo3(signature = (error, arm=None, *, duration=None, q0=None, qdot0=None, gains=None, setpoint=None))]
+#[expect(
+    clippy::too_many_arguments,
+    reason = "they are the fields of the service, by name"
+)]
+pub(crate) fn plan<'py>(
+    py: Python<'py>,
+    error: f64,
+    arm: Option<Held<'py, Arm>>,
+    duration: Option<f64>,
+    q0: Option<Object<'py>>,
+    qdot0: Option<Object<'py>>,
+    gains: Option<Held<'py, PyDict>>,
+    setpoint: Option<Object<'py>>,
+) -> PyResult<Held<'py, PyDict>> {
+    let error = fields::number("error", error, Bound::Positive)?;
+    for_either!(Chain, or_default(arm.as_ref()), arm => {
+        let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?;
+        let usual = if control.is_free() { 10.0 } else { 4.0 };
+        let mut planning = Planning::new(Task {
+            control,
+            start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
+            duration: fields::number("duration", duration.unwrap_or(usual), Bound::Positive)?,
+            error,
+        }).map_err(refused)?;
+        let planned = until_done(py, || planning.advance())?.map_err(refused)?;
+        listed_plan(py, &planned, !control.is_free())
+    })
+}
+
+fn read_loop<const N: usize>(
+    arm: Rods<N>,
+    gains: Option<&Held<'_, PyDict>>,
+    setpoint: Option<&Object<'_>>,
+) -> PyResult<ControlLoop<N>> {
+    let gains = fields::gains(gains, no_control())?;
+    let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
+    Ok(ControlLoop::new(arm, gains, setpoint))
+}
+
+fn listed_plan<'py>(
+    py: Python<'py>,
+    planned: &Planned,
+    is_controlled: bool,
+) -> PyResult<Held<'py, PyDict>> {
+    let best = planned.best().ok_or_else(|| refused("no plan was found"))?;
+    let all = || planned.candidates.iter().rev();
+    let found = PyDict::new(py);
+    found.set_item("integrator", best.method.name())?;
+    found.set_item("timestep", best.timestep)?;
+    found.set_item("control_period", is_controlled.then_some(best.timestep))?;
+    found.set_item(
+        "evaluations_per_second",
+        f64::from(best.method.evaluations()) / best.timestep,
+    )?;
+    found.set_item("error", best.error)?;
+    found.set_item("error_uncertainty", planned.uncertainty)?;
+    found.set_item(
+        "methods",
+        all().map(|one| one.method.name()).collect::<Vec<_>>(),
+    )?;
+    found.set_item(
+        "timesteps",
+        all()
+            .map(|one| one.timestep)
+            .collect::<Vec<_>>()
+            .into_pyarray(py),
+    )?;
+    found.set_item(
+        "evaluations",
+        all()
+            .map(|one| one.evaluations)
+            .collect::<Vec<_>>()
+            .into_pyarray(py),
+    )?;
+    found.set_item(
+        "errors",
+        all()
+            .map(|one| one.error)
+            .collect::<Vec<_>>()
+            .into_pyarray(py),
+    )?;
+    Ok(found)
+}

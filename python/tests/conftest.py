@@ -1,0 +1,71 @@
+"""A live runtime beside the tests, and a client for it of Python's own."""
+
+import json
+import socket
+import subprocess
+import sysconfig
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+# Far longer than anything takes; who waits so long has failed.
+PATIENCE = 60.0
+
+
+class Runtime:
+    """The program of the wheel on a free port, and a connection to it."""
+
+    def __init__(self, *arguments: str) -> None:
+        program = Path(sysconfig.get_path("scripts")) / "pendularm"
+        self.process = subprocess.Popen(
+            [str(program), "--bind", "127.0.0.1:0", "--log", "off", *arguments], stdout=subprocess.PIPE, text=True
+        )
+        assert self.process.stdout is not None
+        self.address = self.process.stdout.readline().removeprefix("listening on ").strip()
+        host, port = self.address.rsplit(":", 1)
+        self.socket = socket.create_connection((host, int(port)), timeout=PATIENCE)
+        self.lines = self.socket.makefile()
+        self.calls = 0
+
+    def send(self, **op: object) -> None:
+        self.socket.sendall(json.dumps(op).encode() + b"\n")
+
+    def call(self, service: str, **args: object) -> dict:
+        """Calls a service and answers its values."""
+        self.calls += 1
+        name = f"call-{self.calls}"
+        self.send(op="call_service", service=service, args=args, id=name)
+        for line in self.lines:
+            response = json.loads(line)
+            if response.get("op") == "service_response" and response.get("id") == name:
+                assert response["result"], response
+                return response["values"]
+        raise AssertionError("the runtime has gone")
+
+    def next_message(self, topic: str) -> dict:
+        for line in self.lines:
+            frame = json.loads(line)
+            if frame.get("op") == "publish" and frame.get("topic") == topic:
+                return frame["msg"]
+        raise AssertionError("the runtime has gone")
+
+    def end(self) -> None:
+        self.lines.close()
+        self.socket.close()
+        self.process.terminate()
+        assert self.process.wait(PATIENCE) == 0
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+
+@pytest.fixture(params=[2, 3], ids=["2 links", "3 links"])
+def links(request: pytest.FixtureRequest) -> int:
+    return request.param
+
+
+@pytest.fixture
+def runtime(links: int) -> Iterator[Runtime]:
+    one = Runtime("--links", str(links))
+    yield one
+    one.end()

@@ -1,0 +1,240 @@
+"""Many arms are as many single ones, to the bit, whatever shares the work."""
+
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import pendularm
+
+METHODS = ["euler", "midpoint", "verlet", "rk4"]
+
+
+def settings(links, arms, seed=1):
+    """Arms that differ in everything, with the single simulations that they are to be."""
+    random = np.random.default_rng(seed)
+    rows = lambda low, high: random.uniform(low, high, (arms, links))
+    given = {
+        "lengths": rows(0.5, 2.0),
+        "masses": rows(0.5, 2.0),
+        "gravity": random.uniform(0, 12, arms),
+        "kp": rows(0, 200),
+        "ki": rows(0, 50),
+        "kd": rows(0, 20),
+        "positions": rows(-2, 2),
+        "velocities": rows(-1, 1),
+        "position": rows(-3, 3),
+        "velocity": rows(-2, 2),
+        "method": [METHODS[arm % 4] for arm in range(arms)],
+        "timestep": random.uniform(1e-4, 2e-3, arms),
+    }
+    singles = []
+    for arm in range(arms):
+        one = pendularm.Simulation(
+            pendularm.Arm(
+                links, lengths=given["lengths"][arm], masses=given["masses"][arm], gravity=given["gravity"][arm]
+            ),
+            method=given["method"][arm],
+            timestep=given["timestep"][arm],
+        )
+        one.set_gains(given["kp"][arm], given["ki"][arm], given["kd"][arm])
+        one.set_setpoint(given["positions"][arm], given["velocities"][arm])
+        one.set_state(given["position"][arm], given["velocity"][arm])
+        one.enable()
+        singles.append(one)
+    return given, singles
+
+
+def batch_of(given, links, arms, threads):
+    batch = pendularm.Batch(arms, links, threads=threads)
+    batch.set_params(given["gravity"], given["masses"], given["lengths"])
+    batch.set_integrator(given["method"], given["timestep"])
+    batch.set_gains(given["kp"], given["ki"], given["kd"])
+    batch.set_setpoint(given["positions"], given["velocities"])
+    batch.set_state(given["position"], given["velocity"])
+    batch.enable()
+    return batch
+
+
+def compare(batch, singles):
+    assert batch.position.tolist() == [one.position.tolist() for one in singles]
+    assert batch.velocity.tolist() == [one.velocity.tolist() for one in singles]
+    assert batch.effort.tolist() == [one.effort.tolist() for one in singles]
+    assert batch.time.tolist() == [one.time for one in singles]
+    assert batch.diverged.tolist() == [one.divergence is not None for one in singles]
+    assert batch.energy.tolist() == [one.energy for one in singles]
+    assert batch.end_effector.tolist() == [one.end_effector.tolist() for one in singles]
+
+
+@pytest.mark.parametrize("threads", [1, 2, 3, 8])
+def test_every_lane_is_a_single_arm(links, threads):
+    arms = 70
+    given, singles = settings(links, arms)
+    batch = batch_of(given, links, arms, threads)
+    compare(batch, singles)
+    batch.step(150)
+    for one in singles:
+        one.step(150)
+    compare(batch, singles)
+
+    # An effort on top of the controllers', for all steps of the call and no longer.
+    effort = np.random.default_rng(2).uniform(-3, 3, (arms, links))
+    batch.step(40, effort)
+    for one, push in zip(singles, effort, strict=True):
+        one.disturb(push, 40 * one.timestep)
+        one.step(40)
+    compare(batch, singles)
+    batch.step()
+    for one in singles:
+        one.step()
+    compare(batch, singles)
+    assert not np.array_equal(batch.effort, effort)
+
+    each = np.arange(arms)
+    batch.step(each)
+    for one, steps in zip(singles, each, strict=True):
+        one.step(int(steps))
+    compare(batch, singles)
+
+    batch.reset(batch.position[:, 0] > 0)
+    for one in singles:
+        if one.position[0] > 0:
+            one.reset()
+    compare(batch, singles)
+
+
+def test_an_arm_that_diverges_leaves_the_others_alone():
+    batch = pendularm.Batch(3, threads=1)
+    batch.set_integrator("euler", [0.001, 0.2, 0.001])
+    batch.enable()
+    batch.set_setpoint([1.0, 1.0])
+    batch.step(2000)
+    assert batch.diverged.tolist() == [False, True, False]
+    assert np.isfinite(batch.position).all()
+    assert batch.position[0].tolist() == batch.position[2].tolist()
+    batch.reset([1])
+    assert not batch.diverged.any()
+    assert batch.time.tolist() == [2.0, 0.0, 2.0]
+
+
+def test_arrays_come_out_without_copies_and_cannot_be_written(links):
+    batch = pendularm.Batch(8, links)
+    position, time = batch.position, batch.time
+    assert position.shape == (8, links)
+    assert batch.position is position
+    batch.step(10)
+    assert position is batch.position
+    assert position[0, 0] != 0.0
+    assert time[0] == 0.01
+    for name in ["position", "velocity", "effort", "time", "diverged"]:
+        assert not getattr(batch, name).flags.writeable
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(batch, name)[0] = 1
+
+
+def test_arrays_go_in_as_they_lie():
+    batch, other = pendularm.Batch(4), pendularm.Batch(4)
+    effort = np.arange(16.0).reshape(4, 4)[:, ::2]
+    assert not effort.flags.c_contiguous
+    batch.step(5, effort)
+    other.step(5, effort.tolist())
+    assert batch.position.tolist() == other.position.tolist()
+    # A batch's own arrays too, where they are not written meanwhile.
+    other.set_state(batch.position, batch.velocity)
+    batch.set_state(batch.position[::-1], batch.velocity[::-1])
+    assert batch.position.tolist() == other.position[::-1].tolist()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda batch: pendularm.Batch(0), "n_arms must be between 1 and 1000000, got 0"),
+        (lambda batch: pendularm.Batch(1_000_001), "n_arms must be between 1 and 1000000, got 1000001"),
+        (lambda batch: pendularm.Batch(2, 5), "links must be 2 or 3, got 5"),
+        (lambda batch: pendularm.Batch(2, threads=2000), "threads must be between 1 and 1024, got 2000"),
+        (lambda batch: pendularm.Batch(2, threads=0), "threads must be between 1 and 1024, got 0"),
+        (lambda batch: batch.step([1, 2]), "steps must be a whole number, or one for each of 3 arms"),
+        (lambda batch: batch.step(-1), "steps must be a whole number, or one for each of 3 arms"),
+        (lambda batch: batch.step(1, [[1, 2]]), "effort must have the shape (2,) or (3, 2), got [1, 2]"),
+        (lambda batch: batch.step(1, [np.nan, 0]), "effort[0] must be finite, got NaN"),
+        (lambda batch: batch.step(1, batch.position), "this batch's own arrays are in use elsewhere: hand in copies of them"),
+        (lambda batch: batch.set_gains(ki=[[0, 0], [0, -1], [0, 0]]), "ki[1][1] must be finite and at least 0, got -1"),
+        (lambda batch: batch.set_params([1, 2, -3]), "gravity[2] must be finite and at least 0, got -3"),
+        (lambda batch: batch.set_params(masses=[0, 1]), "masses[0] must be finite and greater than 0, got 0"),
+        (lambda batch: batch.set_integrator(timestep=[1, 1]), "timestep must be a number or have the shape (3,), got [2]"),
+        (lambda batch: batch.set_integrator("heun"), 'method must be one of euler, midpoint, verlet, rk4, got "heun"'),
+        (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
+        (lambda batch: batch.reset([3]), "arms must be a mask of 3 or indices below that"),
+        (lambda batch: batch.reset([True]), "arms must be a mask of 3 or indices below that"),
+        (lambda batch: batch.set_state([0, "a"]), "position must be an array of numbers, got [0, 'a']"),
+    ],
+)
+def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
+    batch = pendularm.Batch(3)
+    with pytest.raises(ValueError) as refusal:
+        wrong(batch)
+    assert str(refusal.value) == said
+    batch.step()
+    assert batch.time.tolist() == [0.001] * 3
+
+
+def test_the_interpreters_lock_is_released_while_it_steps():
+    """Another thread gets on in the middle of a call, with an interpreter that takes its lock from nobody who keeps it."""
+    batch = pendularm.Batch(64, threads=1)
+    seen, done = 0, threading.Event()
+
+    def watch():
+        nonlocal seen
+        while not done.is_set():
+            seen += 1
+            time.sleep(0.001)
+
+    watcher = threading.Thread(target=watch)
+    interval = sys.getswitchinterval()
+    try:
+        watcher.start()
+        sys.setswitchinterval(1000)
+        before = seen
+        for _ in range(1000):
+            batch.step(1000)
+            if seen > before:
+                break
+        during = seen - before
+    finally:
+        done.set()
+        sys.setswitchinterval(interval)
+        watcher.join()
+    assert during > 0
+
+
+def test_calls_of_several_threads_wait_for_each_other():
+    batch, alone = pendularm.Batch(16), pendularm.Batch(16)
+    threads = [threading.Thread(target=batch.step, args=(3000,)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    alone.step(12_000)
+    assert batch.position.tolist() == alone.position.tolist()
+
+
+FORKED = """
+import os, pendularm
+batch = pendularm.Batch(256, threads=2)
+batch.step(100)
+child = os.fork()
+batch.step(100)
+if child == 0:
+    os._exit(0 if batch.time[0] == 0.2 else 1)
+raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
+def test_a_forked_child_has_threads_of_its_own():
+    # Python itself warns of a fork beside threads.
+    assert subprocess.run([sys.executable, "-W", "ignore", "-c", FORKED], timeout=60).returncode == 0

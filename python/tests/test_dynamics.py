@@ -1,0 +1,85 @@
+"""The equation of motion against reference values that were reckoned in 160 digits by another derivation."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pendularm
+from pendularm import dynamics
+
+DATA = Path(__file__).parents[2] / "tests" / "data"
+
+
+def cases():
+    every = json.loads((DATA / "dynamics.json").read_text())["cases"]
+    return [case for case in every if case["n"] in (2, 3)]
+
+
+def test_all_terms_are_those_of_the_reference_values():
+    seen = 0
+    for case in cases():
+        arm = pendularm.Arm(case["n"], lengths=case["lengths"], masses=case["masses"], gravity=case["gravity"])
+        q, qd, effort, qdd = case["q"], case["qdot"], case["tau"], case["qddot_id"]
+        # The first-order bound of the reference values, per unit of rounding, and some units for the sums themselves.
+        near = lambda found, name, of=case: np.all(
+            np.abs(np.asarray(found) - np.asarray(of[name]))
+            <= 32 * np.finfo(float).eps * (np.asarray(of[f"sens_{name}"]) + np.abs(np.asarray(of[name])))
+        )
+        assert near(dynamics.mass_matrix(arm, q), "M")
+        assert near(dynamics.coriolis(arm, q, qd), "h")
+        assert near(dynamics.gravity_load(arm, q), "G")
+        assert near(dynamics.inverse_dynamics(arm, q, qd, qdd), "tau_id")
+        assert near(dynamics.forward_dynamics(arm, q, qd, effort), "qddot")
+        seen += 1
+    assert seen > 50
+
+
+def test_many_states_are_as_many_single_ones(links):
+    random = np.random.default_rng(3)
+    arm = pendularm.Arm(links)
+    q, qd, effort = (random.uniform(-3, 3, (9, links)) for _ in range(3))
+    for function, fields in [
+        (dynamics.mass_matrix, (q,)),
+        (dynamics.coriolis, (q, qd)),
+        (dynamics.gravity_load, (q,)),
+        (dynamics.forward_dynamics, (q, qd, effort)),
+        (dynamics.inverse_dynamics, (q, qd, effort)),
+        (dynamics.kinetic_energy, (q, qd)),
+        (dynamics.potential_energy, (q,)),
+    ]:
+        together = function(arm, *fields)
+        singly = [function(arm, *row) for row in zip(*fields, strict=True)]
+        assert together.tolist() == np.array(singly).tolist()
+    # One row goes with every row of the others.
+    assert dynamics.coriolis(arm, q[0], qd).tolist() == dynamics.coriolis(arm, [q[0]] * 9, qd).tolist()
+
+
+def test_inverse_kinematics_puts_the_end_effector_there(links):
+    arm = pendularm.Arm(links, lengths=[1.0, 0.8, 0.3][:links])
+    for x, y in [(1.0, 0.5), (-0.7, 0.9), (0.4, -1.1)]:
+        q = pendularm.inverse_kinematics(arm, x, y)
+        # A few roundings of lengths near 1 m.
+        assert np.allclose(pendularm.end_effector(arm, q), [x, y], rtol=0, atol=1e-14)
+    down = pendularm.inverse_kinematics(arm, 1.0, 0.5, present=[2.0, -1.0, 0.0][:links])
+    assert down[1] < 0
+    with pytest.raises(ValueError, match=r"beyond the arm's reach of"):
+        pendularm.inverse_kinematics(arm, 9.0, 0.0)
+    if links == 3:
+        assert np.isclose(pendularm.inverse_kinematics(arm, 1.0, 0.5, 0.25).sum(), 0.25)
+
+
+def test_inverse_kinematics_is_that_of_the_service(runtime, links):
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+    arm = pendularm.Arm(links)
+    assert runtime.call("/ik/solve", x=0.6, y=0.7)["positions"] == pendularm.inverse_kinematics(arm, 0.6, 0.7).tolist()
+
+
+def test_shapes_are_checked():
+    arm = pendularm.Arm()
+    with pytest.raises(ValueError, match=r"qd must have the shape \(2,\) or \(3, 2\), got \[2, 2\]"):
+        dynamics.coriolis(arm, np.zeros((3, 2)), np.zeros((2, 2)))
+    with pytest.raises(ValueError, match=r"q must have the shape \(2,\) or \(1, 2\), got \[\]"):
+        dynamics.gravity_load(arm, None)

@@ -1,0 +1,111 @@
+"""The environments are Gymnasium's own kind, and the vector ones are as many single ones."""
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import pendularm
+import pendularm.envs
+
+NAMES = ["Pendularm-v0", "PendularmReach-v0"]
+
+
+@pytest.fixture(params=NAMES)
+def name(request):
+    return request.param
+
+
+def test_gymnasiums_checker_passes(name, links):
+    env = gymnasium.make(name, links=links)
+    check_env(env.unwrapped)
+    env.reset(seed=1)
+    for _ in range(env.spec.max_episode_steps - 1):
+        *_, truncated, _ = env.step(np.zeros(links, np.float32))
+        assert not truncated
+    assert env.step(np.zeros(links, np.float32))[3]
+    env.close()
+
+
+def test_the_vector_environment_is_as_many_single_ones(name, links):
+    """Through ends and resets, exactly; 30 steps an episode bring several of them."""
+    arms = 5
+    ours = gymnasium.make_vec(name, arms, links=links, max_episode_steps=30)
+    theirs = gymnasium.make_vec(name, arms, vectorization_mode="sync", links=links, max_episode_steps=30)
+    assert ours.metadata["autoreset_mode"] == theirs.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
+    assert ours.single_observation_space == theirs.single_observation_space
+    assert ours.observation_space == theirs.observation_space
+    assert ours.action_space == theirs.action_space
+    random = np.random.default_rng(5)
+    found, expected = ours.reset(seed=7), theirs.reset(seed=7)
+    assert np.array_equal(found[0], expected[0])
+    assert found[0].dtype == expected[0].dtype
+    ends = 0
+    for step in range(100):
+        actions = random.uniform(-1.5, 1.5, (arms, links)).astype(np.float32)
+        found, expected = ours.step(actions), theirs.step(actions)
+        for one, other in zip(found[:4], expected[:4], strict=True):
+            assert np.array_equal(one, other), step
+            assert one.dtype == other.dtype
+            assert one.shape == other.shape
+        assert ours.observation_space.contains(found[0])
+        ends += int((found[2] | found[3]).sum())
+    assert ends >= 3 * arms
+    ours.close()
+    theirs.close()
+
+
+def test_an_arm_is_the_same_among_few_and_among_many(name):
+    few, many = gymnasium.make_vec(name, 4), gymnasium.make_vec(name, 600)
+    first, others = few.reset(seed=3)[0], many.reset(seed=3)[0]
+    assert np.array_equal(first, others[:4])
+    actions = np.random.default_rng(1).uniform(-1, 1, (600, 2)).astype(np.float32)
+    for _ in range(20):
+        found, among = few.step(actions[:4]), many.step(actions)
+        assert np.array_equal(found[0], among[0][:4])
+        assert np.array_equal(found[1], among[1][:4])
+
+
+def test_some_of_the_arms_can_be_reset_alone(name):
+    env = gymnasium.make_vec(name, 3)
+    env.reset(seed=1)
+    for _ in range(5):
+        before = env.step(np.ones((3, 2), np.float32))[0]
+    mask = np.array([False, True, False])
+    after, _ = env.reset(options={"reset_mask": mask})
+    assert np.array_equal(after[[0, 2]], before[[0, 2]])
+    assert not np.array_equal(after[1], before[1])
+    with pytest.raises(ValueError, match="reset_mask must be"):
+        env.reset(options={"reset_mask": [True]})
+    with pytest.raises(ValueError, match="seed must be one number, or one for each of 3, got 2"):
+        env.reset(seed=[1, 2])
+
+
+def test_an_arm_that_turns_too_fast_is_lost():
+    env = gymnasium.make("PendularmReach-v0")
+    env.reset(seed=0)
+    for _ in range(100):
+        observation, reward, terminated, *_ = env.step(np.ones(2, np.float32))
+        assert env.observation_space.contains(observation)
+        assert 0 <= reward <= 1
+        if terminated:
+            break
+    assert terminated
+    assert np.abs(observation[4:6]).max() == 25
+
+
+def test_swinging_up_pays():
+    """Upright the reward is 1, hanging it is 0, and no effort that is allowed holds the arm stretched."""
+    env = gymnasium.make("Pendularm-v0").unwrapped
+    env.reset(seed=0)
+    for angle, reward in [(np.pi / 2, 1.0), (-np.pi / 2, 0.0), (0.0, 0.5)]:
+        env._task.batch.set_state([angle, 0.0])
+        assert np.isclose(env._task.reward()[0], reward)
+    load = pendularm.dynamics.gravity_load(pendularm.Arm(), [0, 0])
+    assert (env._task.efforts < load).all()
+
+
+def test_a_step_needs_a_reset():
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        gymnasium.make_vec("Pendularm-v0", 2).step(np.zeros((2, 2), np.float32))

@@ -1,0 +1,52 @@
+"""The examples do what their heads say."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+# Jupyter's own warnings are Jupyter's.
+@pytest.mark.filterwarnings("ignore")
+def test_the_lesson_shows_what_it_says(tmp_path):
+    import nbclient
+    import nbformat
+
+    notebook = nbformat.read(EXAMPLES / "lesson.ipynb", as_version=4)
+    client = nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}})
+    client.execute()
+    outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    figures = [output for output in outputs if "image/png" in output.get("data", {})]
+    assert len(figures) == 2
+    said = "".join(output["text"] for output in outputs if output.get("name") == "stdout")
+    orders = {line.split()[0]: float(line.split()[2]) for line in said.splitlines() if " order " in line}
+    for method, order in {"euler": 1, "midpoint": 2, "verlet": 2, "rk4": 4}.items():
+        # Coarse steps are not yet where the order rules alone.
+        assert abs(orders[method] - order) < 0.3
+    _, predicted, _, _, seen, _ = said.splitlines()[-1].split()
+    # The timesteps are a twentieth of a percent apart; near the limit growth is slow to show.
+    assert abs(float(seen) / float(predicted) - 1) < 0.003
+
+
+def test_a_policy_learns():
+    spec = importlib.util.spec_from_file_location("policy", EXAMPLES / "policy.py")
+    policy = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(policy)
+    random = np.random.default_rng(0).normal(size=(8, policy.SIZE))
+    found = policy.train(generations=30)
+    before = policy.rewards(random, seed=10**8).max()
+    after = policy.rewards(found[None], seed=10**8, starts=32)[0]
+    assert after > before + 0.05
+
+
+def test_roslibpy_moves_the_live_arm(runtime):
+    run = subprocess.run(
+        [sys.executable, str(EXAMPLES / "live_client.py"), runtime.address], capture_output=True, text=True, timeout=120
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    assert run.stdout.endswith("it is there\n")

@@ -1,0 +1,58 @@
+"""The lines of Python in the papers run as they stand there; only a long search is cut short."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+# The README's other ones need a runtime, and are run by the tests of that.
+README = (ROOT / "README.md").read_text(encoding="utf-8").split("## From Python")[1].split("\n## ")[0]
+MANUAL = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+
+
+def blocks(text):
+    return [part.split("```")[0] for part in text.split("```python\n")[1:]]
+
+
+def run(code, folder):
+    here = {**os.environ, "MPLBACKEND": "Agg"}
+    done = subprocess.run([sys.executable, "-c", code], cwd=folder, env=here, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_readmes_plot_is_drawn(tmp_path):
+    plot, _ = blocks(README)
+    run(plot.replace("plt.show()", "plt.savefig('plot.png')"), tmp_path)
+    assert (tmp_path / "plot.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_readmes_policy_learns(tmp_path):
+    _, policy = blocks(README)
+    assert "10_000" in policy
+    # A seed makes it the same at each run; so long a search is for those who wait for it.
+    short = policy.replace("10_000", "1_000, 'seed': 1, 'verbose': -9")
+    said = run(short, tmp_path)
+    # Whoever hangs has 0, and a network drawn at random some 0.2.
+    assert float(said.strip().strip("[]")) > 0.3
+
+
+def test_the_manual_runs_from_top_to_bottom(tmp_path):
+    parts = blocks(MANUAL)
+    assert len(parts) >= 3
+    said = run("\n".join(parts), tmp_path)
+    assert "(20, 20, 2)" in said
+    assert len(list((tmp_path / "servo").glob("*.npz"))) == 1
+
+
+def test_the_wheels_own_page_runs(tmp_path):
+    for part in blocks((ROOT / "python" / "README.md").read_text(encoding="utf-8")):
+        assert "4.0" in run(part, tmp_path)
+
+
+@pytest.mark.parametrize("text", [README, MANUAL], ids=["README", "manual"])
+def test_there_is_python_in_it(text):
+    assert blocks(text)

@@ -1,0 +1,62 @@
+"""The program that comes with the wheel: on the path, as a module, with its arguments and its signals."""
+
+import signal
+import subprocess
+import sys
+import sysconfig
+import time
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+import pendularm
+
+PROGRAM = str(Path(sysconfig.get_path("scripts")) / "pendularm")
+WAYS = [[PROGRAM], [sys.executable, "-m", "pendularm"]]
+
+
+@pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
+def test_it_is_the_version_of_the_library(way):
+    said = subprocess.run([*way, "--version"], capture_output=True, text=True, check=True).stdout
+    assert said == f"pendularm {pendularm.__version__} (web)\n"
+
+
+@pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
+def test_bad_arguments_come_back_as_exit_status_2(way):
+    run = subprocess.run([*way, "--links", "7"], capture_output=True, text=True)
+    assert run.returncode == 2
+    assert "--links" in run.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
+def test_it_serves_the_page_until_a_signal(way, number):
+    arguments = ["--bind", "127.0.0.1:0", "--links", "3", "--log", "off"]
+    with subprocess.Popen([*way, *arguments], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        address = run.stdout.readline().removeprefix("listening on ").strip()
+        with urllib.request.urlopen(f"http://{address}/", timeout=60) as page:
+            assert b"pendularm" in page.read()
+        began = time.monotonic()
+        run.send_signal(number)
+        assert run.wait(60) == 0
+        # The runtime ends within a second by itself; what is left is for a machine that is busy with other work.
+        assert time.monotonic() - began < 10
+
+
+def test_a_report_can_be_read(tmp_path):
+    folder = tmp_path / "report"
+    subprocess.run([PROGRAM, "report", "--quick", "--only", "conditioning", "--out", str(folder)], check=True)
+    report = pendularm.read_report(folder)
+    table = report["conditioning"]
+    lines = (folder / "conditioning.csv").read_text().splitlines()
+    assert list(table) == lines[0].split(",")
+    assert len(table["mass_ratio"]) == len(lines) - 1
+    assert table["mass_ratio"][0] == 1e-9
+    assert table["pose"][0] == "3 links, bent"
+
+
+def test_no_report_is_said_so(tmp_path):
+    with pytest.raises(FileNotFoundError, match="holds no report"):
+        pendularm.read_report(tmp_path)

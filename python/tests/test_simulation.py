@@ -1,0 +1,182 @@
+"""One arm is the live arm, bit for bit, and refuses what the services refuse."""
+
+import math
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy as np
+import pytest
+
+import pendularm
+from pendularm import dynamics
+
+
+def live_state(runtime, time_of_arm):
+    """The joint state that the runtime publishes once it is paused at that time."""
+    while True:
+        message = runtime.next_message("/joint_states")
+        stamp = message["header"]["stamp"]
+        if math.isclose(stamp["sec"] + 1e-9 * stamp["nanosec"], time_of_arm, abs_tol=1e-6):
+            return message
+
+
+@pytest.mark.parametrize("method", ["euler", "midpoint", "verlet", "rk4"])
+def test_the_same_calls_give_the_same_bits_as_the_live_arm(runtime, links, method):
+    ours = pendularm.Simulation(pendularm.Arm(links))
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+
+    arm = {"gravity": 3.7, "masses": [1.5, 0.8, 0.3][:links], "lengths": [0.9, 0.7, 0.4][:links]}
+    runtime.call("/arm_sim/set_params", **arm)
+    ours.arm = pendularm.Arm(links, **arm)
+    runtime.call("/arm_sim/set_integrator", method=method, timestep=0.0007)
+    ours.method, ours.timestep = method, 0.0007
+    gains = {"kp": [300.0, 80.0, 20.0][:links], "ki": [100.0, 40.0, 5.0][:links], "kd": [40.0, 8.0, 1.0][:links]}
+    runtime.call("/pid_controller/set_gains", **gains)
+    ours.set_gains(**gains)
+    runtime.call("/pid_controller/enable", data=True)
+    ours.enable()
+    setpoint = [0.7, -0.4, 0.2][:links]
+    points = [{"positions": setpoint, "velocities": [0.1] * links}]
+    runtime.send(op="publish", topic="/joint_trajectory", msg={"points": points})
+    ours.set_setpoint(setpoint, [0.1] * links)
+    assert runtime.call("/arm_sim/step", steps=300)["steps"] == ours.step(300)
+    push = [2.0, -1.0, 0.5][:links]
+    runtime.call("/arm_sim/disturb", effort=push, duration=0.05)
+    ours.disturb(push, 0.05)
+    stepped = runtime.call("/arm_sim/step", steps=400)
+    ours.step(400)
+    assert stepped["time"] == ours.time
+
+    runtime.send(op="subscribe", topic="/joint_states")
+    live = live_state(runtime, ours.time)
+    assert live["position"] == ours.position.tolist()
+    assert live["velocity"] == ours.velocity.tolist()
+    assert live["effort"] == ours.effort.tolist()
+
+
+def test_a_fresh_simulation_is_a_fresh_runtime(runtime, links):
+    ours = pendularm.Simulation(pendularm.Arm(links))
+    params = runtime.call("/arm_sim/set_params")
+    assert params["gravity"] == ours.arm.gravity
+    assert params["masses"] == ours.arm.masses.tolist()
+    assert params["lengths"] == ours.arm.lengths.tolist()
+    assert runtime.call("/arm_sim/set_integrator") == {"method": ours.method, "timestep": ours.timestep}
+    gains = runtime.call("/pid_controller/set_gains")
+    assert gains == {name: values.tolist() for name, values in ours.gains.items()}
+    assert gains == {name: values.tolist() for name, values in pendularm.default_gains(links).items()}
+    assert runtime.call("/pid_controller/enable") == {"data": ours.enabled}
+
+
+def test_a_settled_arm_carries_its_gravity_load(links):
+    arm = pendularm.Simulation(pendularm.Arm(links))
+    arm.enable()
+    arm.set_setpoint([0.5, -0.8, 0.3][:links])
+    arm.step(20_000)
+    assert np.allclose(arm.position, [0.5, -0.8, 0.3][:links], atol=1e-6)
+    # What the integrals still lack after 20 s is some millionths of the load.
+    assert np.allclose(arm.effort, dynamics.gravity_load(arm.arm, arm.position), rtol=1e-4)
+
+
+def test_divergence_is_told_and_reset_clears_it():
+    arm = pendularm.Simulation(method="euler", timestep=0.1)
+    arm.enable()
+    arm.set_setpoint([1.0, 1.0])
+    taken = arm.step(10_000)
+    assert taken < 10_000
+    assert arm.divergence is not None
+    assert (arm.divergence.step, arm.divergence.time) == (taken + 1, arm.time)
+    assert np.isfinite(arm.position).all()
+    assert arm.step(5) == 0
+    arm.reset()
+    assert arm.divergence is None
+    assert arm.time == 0.0
+    assert arm.step() == 1
+
+
+def test_a_state_can_be_set_and_energy_is_kept():
+    arm = pendularm.Simulation()
+    arm.set_state([0.4, -0.3], [0.1, 0.2])
+    before = arm.energy
+    assert before == dynamics.kinetic_energy(arm.arm, arm.position, arm.velocity) + dynamics.potential_energy(
+        arm.arm, arm.position
+    )
+    arm.step(1000)
+    # Runge-Kutta 4 at 1 ms loses some 1e-11 J in a second.
+    assert math.isclose(arm.energy, before, abs_tol=1e-8)
+    assert arm.end_effector.tolist() == pendularm.end_effector(arm.arm, arm.position).tolist()
+
+
+def test_arms_are_values():
+    arm = pendularm.Arm(3, lengths=[1, 2, 0.5], gravity=1.6)
+    assert arm == pendularm.Arm(3, lengths=np.array([1.0, 2.0, 0.5]), masses=(1, 1, 1), gravity=1.6)
+    assert arm != pendularm.Arm(3)
+    assert pickle.loads(pickle.dumps(arm)) == arm
+    assert arm.reach == 3.5
+    assert repr(arm) == "Arm(3, lengths=[1.0, 2.0, 0.5], masses=[1.0, 1.0, 1.0], gravity=1.6)"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda arm: pendularm.Arm(4), "links must be 2 or 3, got 4"),
+        (lambda arm: pendularm.Arm(lengths=[1, -1]), "lengths[1] must be finite and greater than 0, got -1"),
+        (lambda arm: pendularm.Arm(masses=[1, math.nan]), "masses[1] must be finite and greater than 0, got NaN"),
+        (lambda arm: pendularm.Arm(gravity=-1.0), "gravity must be at least 0, got -1"),
+        (lambda arm: arm.set_setpoint([1, 2, 3]), "positions must be an array of 2 numbers, got [1, 2, 3]"),
+        (lambda arm: arm.set_setpoint("up"), "positions must be an array of numbers, got 'up'"),
+        (lambda arm: arm.set_setpoint([0, 0], [math.inf, 0]), "velocities[0] must be finite, got inf"),
+        (lambda arm: arm.set_gains(kd=[1, -2]), "kd[1] must be finite and at least 0, got -2"),
+        (lambda arm: arm.set_state([0, math.nan]), "position[1] must be finite, got NaN"),
+        (lambda arm: arm.disturb([0, 0], 0.0), "duration must be finite and greater than 0, got 0"),
+        (lambda arm: setattr(arm, "method", "leapfrog"), 'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"'),
+        (lambda arm: setattr(arm, "timestep", 0.0), "timestep must be finite and greater than 0, got 0"),
+        (lambda arm: setattr(arm, "arm", pendularm.Arm(3)), "arm must have as many links as the one before"),
+        (lambda arm: pendularm.Simulation(gains={"kx": [1, 1]}), "gains has kp, ki and kd, got 'kx'"),
+        (lambda arm: pendularm.Simulation(gains={"kp": [1]}), "gains.kp must be an array of 2 numbers, got [1]"),
+    ],
+)
+def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
+    arm = pendularm.Simulation()
+    before = (arm.position.tolist(), arm.gains["kd"].tolist(), arm.timestep, arm.method)
+    with pytest.raises(ValueError) as refusal:
+        wrong(arm)
+    assert str(refusal.value) == said
+    assert (arm.position.tolist(), arm.gains["kd"].tolist(), arm.timestep, arm.method) == before
+
+
+def test_threads_share_one_arm():
+    arm = pendularm.Simulation()
+    threads = [threading.Thread(target=arm.step, args=(20_000,)) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    alone = pendularm.Simulation()
+    alone.step(80_000)
+    assert arm.position.tolist() == alone.position.tolist()
+
+
+FOREVER = """
+import signal, pendularm, threading
+arm = pendularm.Simulation()
+print("stepping", flush=True)
+try:
+    arm.step(10**15)
+except KeyboardInterrupt:
+    print(arm.steps > 0)
+"""
+
+
+def test_ctrl_c_ends_a_long_run():
+    with subprocess.Popen([sys.executable, "-c", FOREVER], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == "stepping\n"
+        time.sleep(0.3)
+        run.send_signal(signal.SIGINT)
+        assert run.stdout.readline() == "True\n"
+        assert run.wait(60) == 0

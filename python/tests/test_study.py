@@ -1,0 +1,131 @@
+"""The study's answers are those of the services, to the bit."""
+
+import dataclasses
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+import pendularm
+
+
+def plain(answer):
+    """An answer as JSON has it."""
+    if dataclasses.is_dataclass(answer):
+        return {field.name: plain(getattr(answer, field.name)) for field in dataclasses.fields(answer)}
+    return answer.tolist() if isinstance(answer, np.ndarray) else answer
+
+
+GAINS = {"kp": [400.0, 90.0, 30.0], "ki": [0.0, 50.0, 10.0], "kd": [60.0, 9.0, 2.0]}
+
+
+def test_stability_is_the_services(runtime, links):
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+    gains = {name: values[:links] for name, values in GAINS.items()}
+    setpoint = [0.4, 0.8, -0.2][:links]
+    params = {"gravity": 5.0, "masses": [2.0, 1.0, 0.5][:links], "lengths": [0.5, 0.6, 0.7][:links]}
+    theirs = runtime.call("/study/stability", integrator="verlet", gains=gains, setpoint=setpoint, params=params)
+    arm = pendularm.Arm(links, **params)
+    ours = plain(pendularm.stability(arm, integrator="verlet", gains=gains, setpoint=setpoint))
+    assert ours == theirs
+    assert plain(pendularm.stability(pendularm.Arm(links))) == runtime.call("/study/stability")
+
+
+def test_a_rollout_is_the_services_and_the_simulations(runtime, links):
+    runtime.call("/arm_sim/pause", data=True)
+    gains = {name: values[:links] for name, values in GAINS.items()}
+    asked = {
+        "q0": [0.4, -0.3, 0.2][:links],
+        "qdot0": [0.5, 0.0, -1.0][:links],
+        "duration": 0.8,
+        "timestep": 0.002,
+        "integrator": "midpoint",
+        "gains": gains,
+        "setpoint": [0.1, 0.2, 0.3][:links],
+        "samples": 41,
+        "reference": True,
+    }
+    theirs = runtime.call("/study/rollout", **asked)
+    run = pendularm.rollout(pendularm.Arm(links), **asked)
+    ours = plain(run)
+    assert run.wall_time > 0
+    assert ours.pop("divergence") is None
+    del ours["wall_time"], theirs["wall_time"]
+    assert ours == theirs
+
+    arm = pendularm.Simulation(pendularm.Arm(links), method="midpoint", timestep=0.002, gains=gains)
+    arm.set_state(asked["q0"], asked["qdot0"])
+    arm.set_setpoint(asked["setpoint"])
+    arm.enable()
+    arm.step(400)
+    assert run.positions[-1].tolist() == arm.position.tolist()
+
+
+def test_a_rollout_that_diverges_says_where():
+    run = pendularm.rollout(duration=100, timestep=0.5, integrator="euler", samples=201)
+    assert run.divergence is not None
+    step, moment = run.divergence
+    assert run.times[-1] <= moment == (step - 1) * 0.5
+    assert len(run.times) < 201
+
+
+def test_a_plan_is_the_services(runtime, links):
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+    theirs = runtime.call("/study/plan", error=1e-3, duration=1.0)
+    ours = plain(pendularm.plan(1e-3, pendularm.Arm(links), duration=1.0))
+    assert ours == theirs
+
+
+def test_suggested_gains_are_the_services(runtime, links):
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+    params = {"masses": [0.5, 0.4, 0.3][:links], "lengths": [0.6, 0.5, 0.4][:links]}
+    theirs = runtime.call("/study/gains", params=params, settling_time=6.0, margin=1.5, timestep=0.0005)
+    found = pendularm.suggest_gains(pendularm.Arm(links, **params), settling_time=6.0, margin=1.5, timestep=0.0005)
+    assert plain(found) == theirs
+    assert found.margin >= 1.5
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (lambda: pendularm.plan(-1.0), "error must be finite and greater than 0, got -1"),
+        (lambda: pendularm.plan(0.1, duration=1e4), "duration must be at most 1000 s, got 10000"),
+        (lambda: pendularm.suggest_gains(margin=0.5), "margin must be at least 1, got 0.5"),
+        (lambda: pendularm.suggest_gains(settling_time=1e6), "settling_time / timestep must be at most 1e6 steps, got 1e9"),
+        (lambda: pendularm.rollout(timestep=0.0), "timestep must be greater than 0, got 0"),
+        (lambda: pendularm.rollout(samples=1), "samples must be between 2 and 100000, got 1"),
+        (lambda: pendularm.rollout(gains={"kp": [1, -1]}), "gains.kp[1] must be finite and at least 0, got -1"),
+        (lambda: pendularm.rollout(q0=[1]), "q0 must be an array of 2 numbers, got [1]"),
+        (lambda: pendularm.stability(integrator="ab2"), 'integrator must be one of euler, midpoint, verlet, rk4, got "ab2"'),
+    ],
+)
+def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
+    with pytest.raises(ValueError) as refusal:
+        wrong()
+    assert str(refusal.value) == said
+
+
+FOREVER = """
+import pendularm
+print("running", flush=True)
+try:
+    pendularm.rollout(duration=1e4, timestep=1e-3, reference=True, gains=pendularm.default_gains())
+except KeyboardInterrupt:
+    print("ended")
+"""
+
+
+def test_ctrl_c_ends_a_long_computation():
+    with subprocess.Popen([sys.executable, "-c", FOREVER], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == "running\n"
+        time.sleep(0.3)
+        run.send_signal(signal.SIGINT)
+        assert run.stdout.readline() == "ended\n"
+        assert run.wait(60) == 0

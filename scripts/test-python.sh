@@ -1,0 +1,12 @@
+#!/usr/bin/env bash
+# Installs the wheel that `make wheel` left into a fresh virtual environment, and tests it there: test-python.sh [pytest's arguments].
+set -euo pipefail
+cd "$(dirname "$0")/../python"
+wheel=$(realpath target/wheels/*.whl)
+environment=target/test-environment
+
+echo "test-python: a fresh environment with $(basename "$wheel")"
+rm -rf "$environment"
+python3 -m venv "$environment"
+"$environment/bin/pip" install --quiet --disable-pip-version-check "$wheel" --requirement tests/requirements.txt
+"$environment/bin/python" -m pytest --quiet --durations 5 "$@"

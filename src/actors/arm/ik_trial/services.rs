@@ -1,0 +1,117 @@
+//! The questions to `ik_trial`: what each is, how it is read, and how its answer is written.
+//!
+//! **Invariant:** settings change only with a start that has no bad field; one that is refused still echoes those in
+//! force.
+
+use bytes::Bytes;
+
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Answered, Callable};
+use crate::math::trial::{Changes, Rejection, Settings};
+use crate::protocol::catalog::Service;
+use crate::protocol::messages::Empty;
+use crate::protocol::messages::goal::TrialValues;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+
+/// Starts a trial afresh, unless something was rejected.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StartTrial {
+    /// Settings that are to be others from now on.
+    pub changes: Changes,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for StartTrial {
+    type Answer = Terms;
+}
+
+/// The terms of trials, and whether one has been started.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Terms {
+    /// The settings in force.
+    pub settings: Settings,
+    /// Whether a trial has been started.
+    pub outcome: Result<(), NotStarted>,
+}
+
+/// Why no trial was started.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotStarted {
+    /// Fields were not valid.
+    #[error("{0}")]
+    Rejected(Rejections),
+    /// The trial's own reason.
+    #[error(transparent)]
+    Refused(#[from] Rejection),
+}
+
+/// Abandons the present target for a new one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkipTarget;
+
+impl Ask for SkipTarget {
+    type Answer = Result<(), Rejection>;
+}
+
+/// Ends the trial.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StopTrial;
+
+impl Ask for StopTrial {
+    type Answer = Result<(), Rejection>;
+}
+
+impl Callable for StartTrial {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read_or_none(arguments, service);
+        Ok(Self {
+            changes: Changes {
+                duration: fields.number("duration", Bound::Positive),
+                epsilon: fields.number("epsilon", Bound::Positive),
+                success_hold: fields.number("success_hold", Bound::NonNegative),
+            },
+            rejected: fields.finish(),
+        })
+    }
+}
+
+impl Answered for StartTrial {
+    fn write(Terms { settings, outcome }: Terms, to: &Address) -> Bytes {
+        let Settings { duration, criteria } = settings;
+        let values = TrialValues {
+            duration,
+            epsilon: criteria.epsilon,
+            success_hold: criteria.success_hold,
+        };
+        let status = outcome.map_or_else(|why| why.to_string(), |()| String::new());
+        to.response(&values, &status)
+    }
+}
+
+impl Callable for SkipTarget {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        Fields::read(arguments, service)?;
+        Ok(Self)
+    }
+}
+
+impl Answered for SkipTarget {
+    fn write(answer: Result<(), Rejection>, to: &Address) -> Bytes {
+        to.outcome(answer.map(|()| Empty {}))
+    }
+}
+
+impl Callable for StopTrial {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        Fields::read(arguments, service)?;
+        Ok(Self)
+    }
+}
+
+impl Answered for StopTrial {
+    fn write(answer: Result<(), Rejection>, to: &Address) -> Bytes {
+        to.outcome(answer.map(|()| Empty {}))
+    }
+}

@@ -1,0 +1,136 @@
+//! Messages between the arm and other nodes or the runtime. Questions that clients can ask as well are
+//! in `services`.
+//!
+//! **Invariant:** every message is plain: it knows nothing of the actor that handles it.
+
+use actix::prelude::*;
+use glam::DVec2;
+
+use crate::math::arm::State;
+use crate::math::goal::{Criteria, Outcome};
+use crate::math::simulation::Simulation;
+use crate::study::control_loop::ControlLoop;
+
+// ---- time and settings ----------------------------------------------------------------------------------------------
+
+/// Asks for simulation time \[s\]. From `rosapi` and `rosout`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "f64")]
+pub struct SimulationTime;
+
+/// Which simulation an offline observer would have to run to get the present state. From tests and tools.
+#[derive(Message)]
+#[rtype(result = "Snapshot<N>")]
+pub struct TakeSnapshot<const N: usize>;
+
+/// The whole simulation as it is now.
+#[derive(MessageResponse)]
+pub struct Snapshot<const N: usize>(pub Box<Simulation<N>>);
+
+/// The arm's settings as they are now. From `study`, at every call.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Present<N>")]
+pub struct ArmSettings<const N: usize>;
+
+/// The arm's settings at one instant.
+#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
+pub struct Present<const N: usize> {
+    /// The loop, with the gains as they are set, whether the controller is on or off.
+    pub control: ControlLoop<N>,
+    /// Where the arm is and how it moves.
+    pub state: State<N>,
+}
+
+/// The largest stable timestep \[s\] of a loop with held control, infinite where nothing limits. From the arm to
+/// `study`; none if the runtime ends meanwhile.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Option<f64>")]
+pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
+
+/// Whom to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
+
+/// The steps that are still to be taken are refused, for the reason given. From the runtime, when it ends.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct RefuseSteps(pub &'static str);
+
+// ---- goals ----------------------------------------------------------------------------------------------------------
+
+/// Where the arm is now. From `ik` and `ik_trial`, at every request that depends on it.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Pose<N>")]
+pub struct ArmPose<const N: usize>;
+
+/// The arm at one instant.
+#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
+pub struct Pose<const N: usize> {
+    /// Lengths of the links \[m\].
+    pub lengths: [f64; N],
+    /// Joint positions \[rad\].
+    pub positions: [f64; N],
+    /// Simulation time that has passed since the arm was started, through all resets \[s\]; never runs backwards.
+    pub simulated: f64,
+}
+
+/// A goal begins, and the one before it ends, both in this instant. From `ik_action`, which then publishes the
+/// trajectory and sends the [`CommandGoal`].
+#[derive(Message)]
+#[rtype(result = "Tracking<N>")]
+pub struct TrackGoal<const N: usize> {
+    /// Names the goal between `ik_action` and the arm; each is used once.
+    pub number: u64,
+    /// Where the end effector should be \[m\].
+    pub target: DVec2,
+    /// When it counts as there.
+    pub criteria: Criteria,
+    /// Joint positions that put the end effector there \[rad\].
+    pub solution: [f64; N],
+    /// Hears of progress and of the end, unless that is the answer to its own message.
+    pub owner: Recipient<GoalJudged<N>>,
+}
+
+/// The goal has begun.
+#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
+pub struct Tracking<const N: usize> {
+    /// The solution, shifted by whole turns to within π of the present positions \[rad\]: the setpoint to be sent.
+    pub positions: [f64; N],
+    /// How the goal before it ended, now or earlier, if there was one.
+    pub before: Option<GoalJudged<N>>,
+}
+
+/// The goal's setpoint is held from the next step on, and the goal judged, unless it has ended. From `ik_action`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct CommandGoal<const N: usize> {
+    /// The goal.
+    pub number: u64,
+    /// The setpoint \[rad\], at rest.
+    pub positions: [f64; N],
+}
+
+/// The goal is preempted, unless it has ended already. From `ik_action`. The answer is how the latest goal ended.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "Option<GoalJudged<N>>")]
+pub struct EndGoal<const N: usize> {
+    /// The goal.
+    pub number: u64,
+}
+
+/// How a goal stands after a step, or how it ended. To its owner.
+#[derive(Message, Debug, Clone, Copy, PartialEq)]
+#[rtype(result = "()")]
+pub struct GoalJudged<const N: usize> {
+    /// The goal.
+    pub number: u64,
+    /// Distance between end effector and target \[m\].
+    pub distance: f64,
+    /// Simulation time since the goal's start \[s\].
+    pub elapsed: f64,
+    /// The arm at that instant.
+    pub pose: Pose<N>,
+    /// How it ended; none while it is active.
+    pub outcome: Option<Outcome>,
+}

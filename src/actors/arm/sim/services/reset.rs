@@ -1,0 +1,104 @@
+//! `/arm_sim/reset`: back to the starting pose at time 0.
+//!
+//! **Invariant:** a goal that ends by it is announced before the answer.
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::field_by_field::{Echo, FieldByField};
+use crate::actors::arm::sim::messages::GoalJudged;
+use crate::actors::arm::sim::node::ArmSim;
+use crate::actors::node::{Ask, Call, Reply};
+use crate::actors::wire::{Address, Answered, Nodes};
+use crate::math::arm::State;
+use crate::math::simulation::ArmInput;
+use crate::protocol::catalog::Service;
+use crate::protocol::op::fields::{Fields, Rejections};
+
+/// Enters the route of this file into the registry's table.
+pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+    nodes.serve::<Reset<N>>(Service::Reset, arm.clone());
+}
+
+/// Puts the arm back to its starting pose at time 0, unless something was rejected.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Reset<const N: usize> {
+    /// A reset has no fields: what is rejected is the request as a whole.
+    pub rejected: Rejections,
+}
+
+impl<const N: usize> Ask for Reset<N> {
+    type Answer = Echo<State<N>>;
+}
+
+impl<const N: usize> Handler<Call<Reset<N>>> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<Reset<N>>, ctx: &mut Context<Self>) {
+        self.attend_call(ctx);
+        let ended = if call.ask.rejected.is_empty() {
+            self.reset()
+        } else {
+            None
+        };
+        self.answer_reset(call.reply, call.ask.rejected, ended, ctx);
+    }
+}
+
+impl<const N: usize> ArmSim<N> {
+    /// Gives the goal that ended by it, and who is to hear of that.
+    fn reset(&mut self) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
+        let ended = self.end_goal_for_reset();
+        let diverged = self.simulation.divergence().is_some();
+        self.change(ArmInput::Reset);
+        self.restart_pacer();
+        self.restart_energy_drift();
+        if diverged {
+            self.publish_diagnostics();
+        }
+        ended
+    }
+
+    /// Answers with the pose after the reset, but not before the goal's owner has published how the goal ended.
+    fn answer_reset(
+        &self,
+        reply: Reply<Echo<State<N>>>,
+        rejected: Rejections,
+        ended: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
+        ctx: &mut Context<Self>,
+    ) {
+        let values = *self.simulation.state();
+        let echo = Echo { values, rejected };
+        match ended {
+            None => reply.conclude(echo),
+            Some((owner, news)) => {
+                let heard = owner.send(news).into_actor(self);
+                ctx.spawn(heard.map(move |_, _, _| reply.conclude(echo)));
+            }
+        }
+    }
+}
+impl<const N: usize> FieldByField for Reset<N> {
+    fn of(_: &mut Fields<'_>) -> Self {
+        Self {
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl<const N: usize> Answered for Reset<N> {
+    fn write(Echo { values, rejected }: Echo<State<N>>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values<'a> {
+            position: &'a [f64],
+            velocity: &'a [f64],
+        }
+        let State { position, velocity } = &values;
+        to.response(&Values { position, velocity }, &rejected.status())
+    }
+}

@@ -1,0 +1,168 @@
+//! `/arm_sim/step`: single steps of a paused arm.
+//!
+//! Steps are taken [`STEPS_IN_A_ROW`] at a time, and those who ask for more take turns: it is as if each had asked for
+//! single steps, one after the other, so what others ask takes effect in between.
+//!
+//! **Invariant:** a request that is refused at first changes nothing; one that is taken up is done as a whole, unless a
+//! divergence, a resume or the end of the runtime comes in between.
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::disturb::DIVERGED;
+use super::field_by_field::FieldByField;
+use crate::actors::arm::sim::messages::RefuseSteps;
+use crate::actors::arm::sim::node::ArmSim;
+use crate::actors::arm::sim::state::steps::{Stepped, Steps, StepsEnd};
+use crate::actors::node::{Ask, Call, Unserved};
+use crate::actors::wire::{Address, Answered, Nodes};
+use crate::protocol::catalog::Service;
+use crate::protocol::messages::Empty;
+use crate::protocol::op::fields::{Fields, Rejections};
+
+/// Enters the route of this file into the registry's table.
+pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
+    nodes.serve::<Step>(Service::Step, arm.clone());
+}
+
+/// Steps in one request: what one wake-up's budget is worth, and ten seconds of the default timestep.
+pub const MAX_STEPS: u64 = 10_000;
+
+/// Steps in a row: some 0.2 ms of work, so that neither the tick nor anybody's call waits for the steps of others.
+pub const STEPS_IN_A_ROW: u64 = 1000;
+
+/// Takes steps while paused. Refused if something was rejected, or the arm can't be stepped.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Step {
+    /// How many, 1 to [`MAX_STEPS`].
+    pub steps: Option<u64>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for Step {
+    type Answer = Result<Stepped, Rejections>;
+}
+
+impl<const N: usize> Handler<RefuseSteps> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, RefuseSteps(why): RefuseSteps, ctx: &mut Context<Self>) {
+        self.count_message(ctx);
+        for mut steps in self.steps.drain(..) {
+            steps.reply.refuse(Unserved::Refused(why));
+        }
+    }
+}
+
+impl<const N: usize> Handler<Call<Step>> for ArmSim<N> {
+    type Result = ();
+
+    /// Wall time plays no part in the steps, and the arm goes on from there when it is resumed.
+    fn handle(&mut self, Call { ask, reply }: Call<Step>, ctx: &mut Context<Self>) {
+        self.attend_call(ctx);
+        let mut rejected = ask.rejected;
+        if !self.paused {
+            rejected.refuse("steps", &"can be taken only while the arm is paused");
+        } else if self.simulation.divergence().is_some() {
+            rejected.refuse("steps", &DIVERGED);
+        }
+        let Some(asked) = ask.steps.filter(|_| rejected.is_empty()) else {
+            return reply.conclude(Err(rejected));
+        };
+        let nobody_steps = self.steps.is_empty();
+        self.take_row(Steps {
+            asked,
+            taken: 0,
+            reply,
+        });
+        if nobody_steps {
+            self.go_on_stepping(ctx);
+        }
+    }
+}
+
+impl<const N: usize> ArmSim<N> {
+    /// Lets everybody else have a turn, and then those whose steps are not all taken, one after the other.
+    fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
+        if self.steps.is_empty() {
+            return;
+        }
+        let others = tokio::task::yield_now().into_actor(self);
+        ctx.spawn(others.map(|(), arm, ctx| {
+            if let Some(next) = arm.steps.pop_front() {
+                arm.take_row(next);
+            }
+            arm.go_on_stepping(ctx);
+        }));
+    }
+
+    /// Takes the next steps in a row; answers if they are the last, or puts the request behind those of the others.
+    fn take_row(&mut self, mut steps: Steps) {
+        if steps.reply.caller_is_gone() {
+            return steps.reply.refuse(Unserved::CallerGone);
+        }
+        if !self.paused {
+            return self.end_steps(steps, StepsEnd::Resumed);
+        }
+        let has_diverged = self.simulation.divergence().is_some();
+        let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
+        // A goal that is reached on the way ends an advance, not the steps.
+        while steps.taken < row_end && self.simulation.divergence().is_none() {
+            steps.taken += self.advance(row_end - steps.taken);
+        }
+        if self.simulation.divergence().is_some() {
+            if !has_diverged {
+                self.note_divergence();
+            }
+            self.end_steps(steps, StepsEnd::Diverged);
+        } else if steps.taken == steps.asked {
+            self.end_steps(steps, StepsEnd::AllTaken);
+        } else {
+            self.steps.push_back(steps);
+        }
+    }
+
+    fn end_steps(&self, steps: Steps, end: StepsEnd) {
+        steps.reply.conclude(Ok(Stepped {
+            steps: steps.taken,
+            time: self.simulation.time(),
+            end,
+        }));
+    }
+}
+
+impl FieldByField for Step {
+    fn of(fields: &mut Fields<'_>) -> Self {
+        Self {
+            steps: fields.count("steps", MAX_STEPS),
+            rejected: Rejections::default(),
+        }
+    }
+
+    fn rejected(&mut self) -> &mut Rejections {
+        &mut self.rejected
+    }
+}
+
+impl Answered for Step {
+    fn write(answer: Result<Stepped, Rejections>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            steps: u64,
+            time: f64,
+        }
+        match answer {
+            Ok(Stepped { steps, time, end }) => {
+                let status = match end {
+                    StepsEnd::AllTaken => "",
+                    StepsEnd::Diverged => "steps ended early: the simulation has diverged",
+                    StepsEnd::Resumed => "steps ended early: the arm has been resumed",
+                };
+                to.response(&Values { steps, time }, status)
+            }
+            Err(rejected) => to.response(&Empty {}, &rejected.status()),
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! The active goal as the arm sees it: judged at every physics step, in simulation time, where the steps are made.
+//!
+//! **Invariant:** every goal ends once, and whoever asks about the latest end hears the same.
+
+use actix::prelude::*;
+use glam::DVec2;
+
+use crate::actors::arm::sim::messages::{GoalJudged, Pose};
+use crate::math::goal::{Cadence, Goal, Outcome};
+use crate::math::kinematics::forward;
+use crate::math::simulation::Simulation;
+
+/// The arm's memory of goals.
+#[derive(Default)]
+pub(crate) struct Goals<const N: usize> {
+    pub(crate) tracked: Option<Tracked<N>>,
+    /// How the latest goal ended, for a question that crossed the news on its way.
+    pub(crate) latest: Option<GoalJudged<N>>,
+    /// Simulation time up to the last reset \[s\].
+    pub(crate) before_reset: f64,
+}
+
+/// A goal that has not ended.
+pub(crate) struct Tracked<const N: usize> {
+    pub(crate) number: u64,
+    pub(crate) goal: Goal,
+    pub(crate) feedback: Cadence,
+    pub(crate) owner: Recipient<GoalJudged<N>>,
+    /// Its setpoint is held, and it is judged.
+    pub(crate) commanded: bool,
+}
+
+impl<const N: usize> Goals<N> {
+    pub(crate) fn is_tracked(&self, number: u64) -> bool {
+        self.tracked
+            .as_ref()
+            .is_some_and(|goal| goal.number == number)
+    }
+
+    /// Ends the goal, if there is one, where the arm is now.
+    pub(crate) fn preempt(
+        &mut self,
+        simulation: &Simulation<N>,
+    ) -> Option<(Tracked<N>, GoalJudged<N>)> {
+        let tracked = self.tracked.take()?;
+        let mut judged = tracked.stands(simulation, self.before_reset);
+        judged.outcome = Some(Outcome::Preempted);
+        self.latest = Some(judged);
+        Some((tracked, judged))
+    }
+}
+
+impl<const N: usize> Tracked<N> {
+    /// Judges the step that was just made; tells the owner of progress when that is due. The news, once reached.
+    pub(crate) fn judge(
+        &mut self,
+        simulation: &Simulation<N>,
+        before_reset: f64,
+    ) -> Option<GoalJudged<N>> {
+        let time = simulation.time();
+        let reached = self.goal.judge(time, end_effector(simulation));
+        let due = self.feedback.due(time);
+        if !reached && !due {
+            return None;
+        }
+        let judged = self.stands(simulation, before_reset);
+        if due {
+            self.owner.do_send(judged);
+        }
+        reached.then_some(GoalJudged {
+            outcome: Some(Outcome::Reached),
+            ..judged
+        })
+    }
+
+    pub(crate) fn stands(&self, simulation: &Simulation<N>, before_reset: f64) -> GoalJudged<N> {
+        GoalJudged {
+            number: self.number,
+            distance: self.goal.distance(end_effector(simulation)),
+            elapsed: self.goal.elapsed(simulation.time()),
+            pose: pose(simulation, before_reset),
+            outcome: None,
+        }
+    }
+}
+
+/// Where the end effector is \[m\], with the lengths as they are now.
+fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
+    forward(simulation.arm().lengths(), &simulation.state().position).position
+}
+
+/// The arm at this instant.
+pub(crate) fn pose<const N: usize>(simulation: &Simulation<N>, before_reset: f64) -> Pose<N> {
+    Pose {
+        lengths: *simulation.arm().lengths(),
+        positions: simulation.state().position,
+        simulated: before_reset + simulation.time(),
+    }
+}

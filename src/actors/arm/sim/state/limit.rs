@@ -1,0 +1,34 @@
+//! The arm's memory of its largest stable timestep, and which loops share one.
+//!
+//! **Invariant:** a limit is kept together with the loop that it is about.
+
+use actix::prelude::*;
+use tokio::time::Instant;
+
+use crate::actors::arm::sim::messages::HeldLimit;
+use crate::study::control_loop::ControlLoop;
+
+/// The arm's memory of its limit.
+#[derive(Default)]
+pub(crate) struct LimitWatch<const N: usize> {
+    /// Who predicts, if anybody does.
+    pub(crate) study: Option<Recipient<HeldLimit<N>>>,
+    /// The loop that was last asked about, and when.
+    pub(crate) asked: Option<(ControlLoop<N>, Instant)>,
+    /// The answer is on its way.
+    pub(crate) waiting: bool,
+    /// The latest answer \[s\], infinite where nothing limits, and the loop that it is about.
+    pub(crate) known: Option<(ControlLoop<N>, f64)>,
+    /// Whether the timestep was too long when that was last published.
+    pub(crate) warned: bool,
+}
+
+/// Whether two loops have one limit: it depends on everything but the timestep.
+pub(crate) fn share_limit<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
+    one.setpoint == other.setpoint && resemble(one, other)
+}
+
+/// Whether two loops differ in setpoint and timestep at most.
+pub(crate) fn resemble<const N: usize>(one: &ControlLoop<N>, other: &ControlLoop<N>) -> bool {
+    one.arm == other.arm && one.gains == other.gains && one.method == other.method
+}

@@ -1,0 +1,163 @@
+//! The question to `integration`: what it is, how it is read, and how its answer is written, a slice at a time.
+//!
+//! **Invariant:** the formula passes through as text, which a worker parses; a response is never written on an actor's
+//! thread.
+
+use bytes::Bytes;
+
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Callable, Streamed};
+use crate::math::integrator::Method;
+use crate::math::particle::{MAX_STEPS, Particle, ParticleError};
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Bound, Fields, Rejections};
+use crate::protocol::wire::streamed::StreamedResponse;
+/// Integrates a particle of one degree of freedom. All or nothing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct IntegrationStep {
+    /// Its acceleration as a formula \[m/s²\], of t in s.
+    pub function: Option<String>,
+    /// Where it starts \[m\].
+    pub x0: Option<f64>,
+    /// How fast \[m/s\]; 0 if it is not said.
+    pub xdot0: Option<f64>,
+    /// Length of a step \[s\], greater than 0.
+    pub dt: Option<f64>,
+    /// How many.
+    pub steps: Option<u64>,
+    /// The method that takes them.
+    pub method: Option<Method>,
+    /// Fields that were not valid.
+    pub rejected: Rejections,
+}
+
+impl Ask for IntegrationStep {
+    type Answer = Result<Box<Particle>, NotIntegrated>;
+}
+
+/// Why nothing was integrated.
+#[derive(Debug, thiserror::Error)]
+pub enum NotIntegrated {
+    /// Fields were not valid.
+    #[error("{0}")]
+    Rejected(Rejections),
+    /// They do not go together.
+    #[error(transparent)]
+    Particle(#[from] ParticleError),
+}
+
+/// Numbers encoded between two looks at the clock: some tens of microseconds.
+const NUMBERS_PER_LOOK: usize = 1024;
+
+impl Callable for IntegrationStep {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        Ok(Self {
+            function: fields.text("function").map(std::borrow::Cow::into_owned),
+            x0: fields.number("x0", Bound::Finite),
+            xdot0: fields.number("xdot0", Bound::Finite),
+            dt: fields.number("dt", Bound::Positive),
+            steps: fields.count("steps", MAX_STEPS),
+            method: fields.choice("integrator", &Method::ALL, Method::name),
+            rejected: fields.finish(),
+        })
+    }
+}
+
+impl Streamed for IntegrationStep {
+    type Writer = Result<SamplesWriter, Bytes>;
+
+    fn begin(answer: Result<Box<Particle>, NotIntegrated>, to: &Address) -> Self::Writer {
+        match answer {
+            Ok(particle) => Ok(SamplesWriter::new(particle, to)),
+            Err(why) => Err(to.failure(&why.to_string())),
+        }
+    }
+
+    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
+        match writer {
+            Ok(encoding) => encoding.advance(),
+            Err(failure) => Some(failure.clone()),
+        }
+    }
+}
+
+/// The answer, written a slice at a time: it may be 60 MB.
+pub struct SamplesWriter {
+    particle: Box<Particle>,
+    writer: StreamedResponse,
+    array: Array,
+    entry: usize,
+}
+
+/// Which of the three arrays is being written.
+#[derive(Clone, Copy)]
+enum Array {
+    Times,
+    Positions,
+    Velocities,
+}
+
+impl SamplesWriter {
+    fn new(particle: Box<Particle>, to: &Address) -> Self {
+        let mut writer = StreamedResponse::new(to.name(), to.id());
+        writer.raw("{\"times\":[");
+        Self {
+            particle,
+            writer,
+            array: Array::Times,
+            entry: 0,
+        }
+    }
+
+    /// Writes some more; the frame, once it is whole.
+    fn advance(&mut self) -> Option<Bytes> {
+        let samples = self.particle.positions().len();
+        let end = samples.min(self.entry + NUMBERS_PER_LOOK);
+        for entry in self.entry..end {
+            if entry > 0 {
+                self.writer.raw(",");
+            }
+            self.writer.number(self.value(entry));
+        }
+        self.entry = end;
+        if end < samples {
+            return None;
+        }
+        self.entry = 0;
+        self.array = match self.array {
+            Array::Times => {
+                self.writer.raw("],\"positions\":[");
+                Array::Positions
+            }
+            Array::Positions => {
+                self.writer.raw("],\"velocities\":[");
+                Array::Velocities
+            }
+            Array::Velocities => {
+                self.writer.raw("]}");
+                return Some(std::mem::take(&mut self.writer).finish(true, ""));
+            }
+        };
+        None
+    }
+
+    fn value(&self, entry: usize) -> f64 {
+        match self.array {
+            Array::Times => self.particle.time(entry),
+            Array::Positions => self
+                .particle
+                .positions()
+                .get(entry)
+                .copied()
+                .unwrap_or(f64::NAN),
+            Array::Velocities => self
+                .particle
+                .velocities()
+                .get(entry)
+                .copied()
+                .unwrap_or(f64::NAN),
+        }
+    }
+}

@@ -1,0 +1,148 @@
+//! The workers' side of the pool: which computation is next, its slice, and its end.
+//!
+//! **Invariant:** a computation is advanced, refused and dropped outside the lock.
+
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use super::computation::{Computation, Progress, SLICE};
+use super::turns::{Ticket, Turns};
+use crate::actors::panics::contain;
+use crate::actors::resources::work_clock;
+
+/// How often those that can't begin try again while nothing else is computed.
+const TRY_AGAIN: Duration = Duration::from_millis(10);
+
+/// The queue, and the news that it has changed.
+#[derive(Default)]
+pub(super) struct PoolState {
+    queue: Mutex<Queue>,
+    pub(super) changed: Condvar,
+}
+
+pub(super) type Job = Box<dyn Computation>;
+
+/// The computations that are here.
+#[derive(Default)]
+pub(super) struct Queue {
+    pub(super) turns: Turns<Job>,
+    /// Computations that can't begin yet.
+    waiting: Vec<(Ticket, Job)>,
+    pub(super) closed: Option<&'static str>,
+}
+
+impl Queue {
+    /// Takes out those for whose answers nobody waits.
+    pub(super) fn take_abandoned(&mut self) -> Vec<Job> {
+        self.retry();
+        self.turns.take_waiting_if(|job| job.is_abandoned())
+    }
+
+    /// Has those that could not begin try again.
+    pub(super) fn retry(&mut self) {
+        for (place, job) in self.waiting.drain(..) {
+            self.turns.wait(place, job);
+        }
+    }
+
+    pub(super) fn admitted(&self) -> usize {
+        self.turns.len() + self.waiting.len()
+    }
+}
+
+impl PoolState {
+    /// The queue. A poisoned lock is taken as it is: the queue is never left half changed.
+    pub(super) fn lock(&self) -> MutexGuard<'_, Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn work(&self) {
+        while let Some((place, job)) = self.take() {
+            self.advance(place, job);
+        }
+    }
+
+    /// Gives a computation that was taken its turn.
+    pub(super) fn advance(&self, place: Ticket, mut job: Job) {
+        let began = work_clock::spent();
+        let progress = contain(|| job.advance(work_clock::now() + SLICE));
+        let progress = progress.unwrap_or_else(|panic| {
+            tracing::error!(%panic, "a computation ended; its caller has an answer");
+            Progress::Finished
+        });
+        let took = work_clock::spent().saturating_sub(began);
+        if let Some(end) = self.put_back(place, job, progress, took) {
+            self.end(place, end, began);
+        }
+    }
+
+    fn take(&self) -> Option<(Ticket, Job)> {
+        let mut queue = self.lock();
+        loop {
+            if let Some(job) = queue.turns.next() {
+                return Some(job);
+            }
+            if queue.closed.is_some() {
+                return None;
+            }
+            if queue.waiting.is_empty() {
+                let waited = self.changed.wait(queue);
+                queue = waited.unwrap_or_else(PoisonError::into_inner);
+                continue;
+            }
+            let waited = self.changed.wait_timeout(queue, TRY_AGAIN);
+            let end;
+            (queue, end) = waited.unwrap_or_else(PoisonError::into_inner);
+            if end.timed_out() {
+                queue.retry();
+            }
+        }
+    }
+
+    /// Takes a computation back after its turn; gives it out again, with what it is to be refused for, if it was its
+    /// last.
+    fn put_back(&self, place: Ticket, job: Job, progress: Progress, took: Duration) -> Option<End> {
+        let mut queue = self.lock();
+        match (progress, queue.closed) {
+            (Progress::Finished, _) => return Some(End { job, why: None }),
+            (_, Some(why)) => {
+                let why = Some(why);
+                return Some(End { job, why });
+            }
+            (Progress::Unfinished, None) => queue.turns.again(place, job, took),
+            (Progress::Waiting, None) => {
+                let place = queue.turns.leave(place, took);
+                queue.waiting.push((place, job));
+            }
+        }
+        None
+    }
+
+    /// Ends a computation whose last turn began when this thread had had so much of a processor.
+    fn end(&self, place: Ticket, End { mut job, why }: End, began: Duration) {
+        // Dropped outside the lock: the end of a computation may free many megabytes.
+        let end = contain(move || {
+            if let Some(why) = why {
+                job.refuse(why);
+            }
+        });
+        if let Err(panic) = end {
+            tracing::error!(%panic, "the end of a computation failed");
+        }
+        let mut queue = self.lock();
+        queue
+            .turns
+            .leave(place, work_clock::spent().saturating_sub(began));
+        queue.retry();
+        if queue.turns.waiting() > 0 {
+            self.changed.notify_all();
+        }
+    }
+}
+
+/// A computation that has had its last turn.
+struct End {
+    job: Job,
+    /// The reason of its refusal, if it has not ended by itself.
+    why: Option<&'static str>,
+}

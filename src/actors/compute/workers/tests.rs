@@ -1,0 +1,169 @@
+//! How the workers take turns, seen from within.
+//!
+//! **Invariant:** what is asserted is the order that the pool decides on, never how fast a thread was.
+
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+use super::*;
+use crate::actors::ConnectionId;
+use crate::actors::resources::work_clock;
+
+struct Counting {
+    name: &'static str,
+    slices: usize,
+    log: mpsc::Sender<String>,
+}
+
+impl Computation for Counting {
+    fn advance(&mut self, _deadline: Instant) -> Progress {
+        assert!(self.name != "panics", "asked to");
+        self.log.send(self.name.to_owned()).unwrap();
+        self.slices -= 1;
+        if self.slices == 0 {
+            Progress::Finished
+        } else {
+            Progress::Unfinished
+        }
+    }
+
+    fn is_abandoned(&self) -> bool {
+        self.name == "gone"
+    }
+
+    fn refuse(&mut self, why: &'static str) {
+        self.log.send(format!("{}: {why}", self.name)).unwrap();
+    }
+}
+
+fn computation(
+    name: &'static str,
+    slices: usize,
+    log: &mpsc::Sender<String>,
+) -> Box<dyn Computation> {
+    Box::new(Counting {
+        name,
+        slices,
+        log: log.clone(),
+    })
+}
+
+/// A computation that has begun does not keep the worker, and each gets all the turns that it wants.
+#[test]
+fn computations_take_turns() {
+    const TURNS: usize = 100;
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::start(1).unwrap();
+    {
+        // Both wait before the worker takes the first: the lock is held meanwhile.
+        let mut queue = pool.shared.lock();
+        for (client, name) in [(1, "a"), (2, "b")] {
+            let job = computation(name, TURNS, &log);
+            queue.turns.enter(ConnectionId(client), job);
+        }
+    }
+    pool.shared.changed.notify_all();
+    let order: Vec<String> = seen.iter().take(2 * TURNS).collect();
+    let a = order.iter().position(|turn| turn == "b").unwrap();
+    let last_a = order.iter().rposition(|turn| turn == "a").unwrap();
+    assert!(a < last_a, "b has a turn before the last of a: {order:?}");
+    assert_eq!(order.iter().filter(|turn| *turn == "a").count(), TURNS);
+    while !pool.is_idle() {
+        thread::yield_now();
+    }
+}
+
+/// Has a turn of five milliseconds, in which it computes or sleeps.
+struct Turn {
+    sleeps: bool,
+    log: mpsc::Sender<bool>,
+}
+
+impl Computation for Turn {
+    fn advance(&mut self, _deadline: Instant) -> Progress {
+        const TURN: Duration = Duration::from_millis(5);
+        let before = work_clock::spent();
+        if self.sleeps {
+            thread::sleep(TURN);
+        }
+        while !self.sleeps && work_clock::spent() - before < TURN {
+            std::hint::spin_loop();
+        }
+        self.log.send(self.sleeps).unwrap();
+        Progress::Unfinished
+    }
+
+    fn refuse(&mut self, _why: &'static str) {}
+}
+
+/// Who sleeps in its turns has more of them: it is charged for what it has had of a processor.
+#[test]
+fn what_a_worker_was_kept_from_is_charged_to_nobody() {
+    const TURNS: usize = 40;
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::without_threads();
+    for (client, sleeps) in [(1, true), (2, false)] {
+        let log = log.clone();
+        pool.submit(ConnectionId(client), Box::new(Turn { sleeps, log }));
+    }
+    for _ in 0..TURNS {
+        assert!(pool.turn());
+    }
+    let asleep = seen.try_iter().filter(|sleeps| *sleeps).count();
+    assert!((TURNS * 3 / 4..TURNS).contains(&asleep), "{asleep}");
+}
+
+#[test]
+fn one_too_many_is_refused_and_there_is_always_room_for_the_runtimes_own() {
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::start(1).unwrap();
+    for client in 1..=MAX_ADMITTED as u64 {
+        let endless = computation("endless", usize::MAX, &log);
+        pool.submit(ConnectionId(client), endless);
+    }
+    let late = ConnectionId(MAX_ADMITTED as u64 + 1);
+    pool.submit(late, computation("late", 1, &log));
+    pool.submit(RUNTIME, computation("own", 1, &log));
+    let mut refused = seen.iter().filter(|line| line != "endless");
+    assert_eq!(refused.next(), Some(format!("late: {BUSY}")));
+    assert_eq!(refused.next().as_deref(), Some("own"));
+    pool.close("the test is over");
+}
+
+/// Abandoned ones make room, so that clients that come and go keep nobody out.
+#[test]
+fn who_comes_when_all_are_abandoned_is_admitted() {
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::without_threads();
+    for client in 1..=MAX_ADMITTED as u64 {
+        let gone = computation("gone", usize::MAX, &log);
+        pool.submit(ConnectionId(client), gone);
+    }
+    pool.submit(
+        ConnectionId(MAX_ADMITTED as u64 + 1),
+        computation("newcomer", 1, &log),
+    );
+    assert!(pool.turn());
+    assert_eq!(seen.try_recv().as_deref(), Ok("newcomer"));
+    assert!(pool.is_idle(), "the others have been dropped");
+    assert!(seen.try_recv().is_err());
+}
+
+#[test]
+fn a_panic_leaves_the_worker_working() {
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::start(1).unwrap();
+    pool.submit(ConnectionId(1), computation("panics", 1, &log));
+    pool.submit(ConnectionId(2), computation("next", 1, &log));
+    assert_eq!(seen.recv().unwrap(), "next");
+}
+
+#[test]
+fn a_closed_pool_refuses() {
+    let (log, seen) = mpsc::channel();
+    let pool = WorkerPool::start(1).unwrap();
+    pool.close("shutting down");
+    pool.submit(ConnectionId(1), computation("late", 1, &log));
+    assert_eq!(seen.recv().unwrap(), "late: shutting down");
+    assert!(pool.is_idle());
+}

@@ -1,0 +1,48 @@
+//! Topic messages that have to be encoded before they can be sent.
+//!
+//! **Invariant:** at most [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
+
+use std::collections::VecDeque;
+
+use crate::actors::gateway::messages::Deliver;
+use crate::protocol::outbox::{MAX_TOPIC_BYTES, PLACE_BYTES};
+
+/// The messages of one connection that wait.
+#[derive(Default)]
+pub(super) struct Unencoded {
+    waiting: VecDeque<Deliver>,
+    /// Their bytes, as they came.
+    bytes: usize,
+    /// Whether there is a task at work.
+    pub(super) at_work: bool,
+}
+
+impl Unencoded {
+    /// Adds a message; gives how many had to go for it.
+    pub(super) fn push(&mut self, message: Deliver) -> u64 {
+        self.bytes += message.frames.plain_length();
+        self.waiting.push_back(message);
+        self.keep(MAX_TOPIC_BYTES)
+    }
+
+    /// Drops the oldest messages until those that are left, and their places, take no more than `most` bytes; gives
+    /// how many went.
+    pub(super) fn keep(&mut self, most: usize) -> u64 {
+        let mut dropped = 0;
+        while self.bytes + self.waiting.len() * PLACE_BYTES > most && self.pop().is_some() {
+            dropped += 1;
+        }
+        dropped
+    }
+
+    /// How many messages wait, and their bytes.
+    pub(super) fn size(&self) -> (usize, usize) {
+        (self.waiting.len(), self.bytes)
+    }
+
+    pub(super) fn pop(&mut self) -> Option<Deliver> {
+        let message = self.waiting.pop_front()?;
+        self.bytes -= message.frames.plain_length();
+        Some(message)
+    }
+}

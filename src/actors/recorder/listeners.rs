@@ -1,0 +1,80 @@
+//! Makes entries of the record out of what arm and registry tell.
+//!
+//! **Invariant:** a listener copies and does not wait.
+
+use bytes::Bytes;
+
+use super::limits::MAX_RECORDED_FRAME;
+use crate::actors::arm::sim::{ArmEvent, ArmListener, ArmNews};
+use crate::actors::gateway::messages::{Eavesdropper, Overheard};
+use crate::record::{Content, Note, write_note};
+
+/// The arm's inputs and states; `put` answers whether it has taken an entry.
+#[must_use]
+pub fn arm<const N: usize>(
+    mut put: impl FnMut(Content) -> bool + Send + 'static,
+) -> ArmListener<N> {
+    Box::new(move |ArmNews { step, event }| {
+        let input = |note: Note<N>| Content::Input {
+            step,
+            note: write_note(&note),
+        };
+        put(match event {
+            ArmEvent::Began(checkpoint) => input(Note::Begin(checkpoint)),
+            ArmEvent::Changed(change) => input(Note::Input(change)),
+            ArmEvent::Diverged => input(Note::Diverged),
+            ArmEvent::Stands { state, effort } => Content::State {
+                step,
+                position: state.position.to_vec(),
+                velocity: state.velocity.to_vec(),
+                effort: effort.to_vec(),
+            },
+        })
+    })
+}
+
+/// Topics, calls and answers; none for one that is longer than [`MAX_FRAME`].
+#[must_use]
+pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesdropper {
+    Box::new(move |what| {
+        let length = match &what {
+            Overheard::Published(_, frame) | Overheard::Answered { frame, .. } => frame.len(),
+            Overheard::Heard(_, msg) => msg.line().len(),
+            Overheard::Called { args, .. } => args.line().len(),
+        };
+        if length > MAX_RECORDED_FRAME {
+            return put(None);
+        }
+        put(Some(match what {
+            Overheard::Published(topic, frame) => Content::Published {
+                topic,
+                frame: copied(frame),
+            },
+            Overheard::Heard(topic, msg) => Content::Heard {
+                topic,
+                msg: msg.line().into(),
+            },
+            Overheard::Called {
+                from,
+                service,
+                id,
+                args,
+            } => Content::Called {
+                client: from.0,
+                service,
+                id: id.map_or("", |id| id.line()).into(),
+                args: args.line().into(),
+            },
+            Overheard::Answered { to, service, frame } => Content::Answered {
+                client: to.0,
+                service,
+                frame: copied(frame),
+            },
+        }));
+    })
+}
+
+/// A frame counts towards what its client holds as long as it is shared: a slow file would be the client's fault.
+fn copied(frame: &Bytes) -> Bytes {
+    Bytes::copy_from_slice(frame)
+}

@@ -1,0 +1,247 @@
+//! `/recorder/*` and `--record`: has registry and arm tell what passes, and a thread write it.
+//!
+//! **Invariant:** there is one record at a time; arm and registry tell nothing without one.
+
+mod clock;
+pub mod limits;
+pub mod listeners;
+mod messages;
+mod tape;
+mod wire;
+
+use std::path::{Path, PathBuf};
+
+use actix::prelude::*;
+use tokio::sync::oneshot;
+
+use self::clock::TapeClock;
+use self::limits::MAX_RECORD_BYTES;
+pub use self::messages::{
+    EndRecord, NotRecorded, RecordTo, Recorded, StartRecording, StopRecording,
+};
+use self::tape::{Begun, TapeTarget};
+use crate::actors::arm::sim::Tell;
+use crate::actors::gateway::messages::Overhear;
+use crate::actors::node::Call;
+use crate::record::RunSettings;
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `recorder` beside an arm of `N` links.
+pub struct Recorder<const N: usize> {
+    arm: Recipient<Tell<N>>,
+    registry: Recipient<Overhear>,
+    /// Where clients may have records made.
+    folder: Option<PathBuf>,
+    settings: RunSettings,
+    current: Option<Current>,
+    /// Records so far: the end of one says nothing about the next.
+    begun: u64,
+}
+
+/// The record that is being written.
+struct Current {
+    file: String,
+    number: u64,
+    end: oneshot::Receiver<Recorded>,
+}
+
+impl<const N: usize> Recorder<N> {
+    /// A recorder at rest; clients may have it write into `folder`, if there is one.
+    #[must_use]
+    pub fn new(
+        arm: Recipient<Tell<N>>,
+        registry: Recipient<Overhear>,
+        folder: Option<PathBuf>,
+        seed: u64,
+    ) -> Self {
+        Self {
+            arm,
+            registry,
+            folder,
+            settings: RunSettings { links: N, seed },
+            current: None,
+            begun: 0,
+        }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// A record has ended by itself. From its thread.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Over(u64);
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for Recorder<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<StartRecording>> for Recorder<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<StartRecording>, ctx: &mut Context<Self>) {
+        let Call { ask, mut reply } = call;
+        if !ask.rejected.is_empty() {
+            return reply.answer(Err(NotRecorded::Rejected(ask.rejected)));
+        }
+        let Some(folder) = &self.folder else {
+            return reply.answer(Err(NotRecorded::NoFolder));
+        };
+        let (name, target) = place(folder, ask.name);
+        let begun = self.begin(target, ctx);
+        ctx.wait(begun.map(move |begun, _, _| reply.answer(begun.map(|()| name))));
+    }
+}
+
+impl<const N: usize> Handler<Call<StopRecording>> for Recorder<N> {
+    type Result = ();
+
+    fn handle(&mut self, call: Call<StopRecording>, ctx: &mut Context<Self>) {
+        let mut reply = call.reply;
+        if self.folder.is_none() {
+            return reply.answer(Err(NotRecorded::NoFolder));
+        }
+        let ended = self.end();
+        ctx.wait(ended.map(move |ended, _, _| reply.answer(ended.ok_or(NotRecorded::Nothing))));
+    }
+}
+
+impl<const N: usize> Handler<RecordTo> for Recorder<N> {
+    type Result = ResponseActFuture<Self, Result<(), NotRecorded>>;
+
+    fn handle(&mut self, RecordTo(path): RecordTo, ctx: &mut Context<Self>) -> Self::Result {
+        let limit = None;
+        Box::pin(self.begin(TapeTarget { path, limit }, ctx))
+    }
+}
+
+impl<const N: usize> Handler<EndRecord> for Recorder<N> {
+    type Result = ResponseActFuture<Self, ()>;
+
+    fn handle(&mut self, _: EndRecord, _: &mut Context<Self>) -> Self::Result {
+        Box::pin(self.end().map(|_, _, _| ()))
+    }
+}
+
+impl<const N: usize> Handler<Over> for Recorder<N> {
+    type Result = ();
+
+    fn handle(&mut self, Over(number): Over, ctx: &mut Context<Self>) {
+        if self
+            .current
+            .as_ref()
+            .is_some_and(|one| one.number == number)
+        {
+            ctx.wait(self.end().map(|_, _, _| ()));
+        }
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Recorder<N> {
+    /// Begins a record, unless there is one.
+    fn begin(
+        &mut self,
+        target: TapeTarget,
+        ctx: &mut Context<Self>,
+    ) -> impl ActorFuture<Self, Output = Result<(), NotRecorded>> + use<N> {
+        self.begun += 1;
+        let number = self.begun;
+        let file = tape::file_name(&target.path);
+        let already = self.current.as_ref().map(|current| current.file.clone());
+        let begun = already.is_none().then(|| {
+            let address = ctx.address();
+            let over = move || address.do_send(Over(number));
+            tape::begin(target, self.settings.clone(), over)
+        });
+        let (arm, registry) = (self.arm.clone(), self.registry.clone());
+        let name = file.clone();
+        let begins = async move {
+            let Some(begun) = begun else {
+                return Err(NotRecorded::Already(already.unwrap_or_default()));
+            };
+            let no_thread = |_| NotRecorded::File {
+                file: name,
+                why: "there is no thread to write it".to_owned(),
+            };
+            let Begun { tape, end } = begun.await.map_err(no_thread)??;
+            // Either is there as long as the program.
+            let of_arm = tape.clone();
+            let listener = listeners::arm(move |content| of_arm.put(content));
+            let _ = arm.send(Tell(Some(listener))).await;
+            let eavesdropper = listeners::registry(move |content| {
+                // Without any one of these the run can be repeated all the same.
+                let _ = tape.put_or_count(content);
+            });
+            let _ = registry.send(Overhear(Some(eavesdropper))).await;
+            Ok(end)
+        };
+        begins.into_actor(self).map(move |begun, recorder, _| {
+            let end = begun?;
+            tracing::info!(file, "recording");
+            recorder.current = Some(Current { file, number, end });
+            Ok(())
+        })
+    }
+
+    /// Ends the record, and waits until its file is whole; none if there is no record.
+    fn end(&mut self) -> impl ActorFuture<Self, Output = Option<Recorded>> + use<N> {
+        let current = self.current.take();
+        let (arm, registry) = (self.arm.clone(), self.registry.clone());
+        let ends = async move {
+            let current = current?;
+            // Each gives up its tape; with the last one the thread ends the file.
+            let _ = arm.send(Tell(None)).await;
+            let _ = registry.send(Overhear(None)).await;
+            let recorded = current.end.await.ok()?;
+            tracing::info!(
+                file = recorded.file,
+                messages = recorded.messages,
+                dropped = recorded.dropped,
+                "recorded"
+            );
+            Some(recorded)
+        };
+        ends.into_actor(self)
+    }
+}
+
+/// The place of a client's record: the file's name, and all about the file.
+fn place(folder: &Path, name: Option<String>) -> (String, TapeTarget) {
+    let made_up = || format!("run-{}", TapeClock::start().now());
+    let mut name = name.unwrap_or_else(made_up);
+    if !name.ends_with(".mcap") {
+        name.push_str(".mcap");
+    }
+    let target = TapeTarget {
+        path: folder.join(&name),
+        limit: Some(MAX_RECORD_BYTES),
+    };
+    (name, target)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_clients_record_lies_in_the_folder_and_is_bounded() {
+        for name in ["a", "a.mcap"] {
+            let (name, target) = place(Path::new("runs"), Some(name.to_owned()));
+            assert_eq!(name, "a.mcap");
+            assert_eq!(target.path, Path::new("runs/a.mcap"));
+            assert_eq!(target.limit, Some(MAX_RECORD_BYTES));
+        }
+        let (name, _) = place(Path::new("runs"), None);
+        assert!(
+            name.starts_with("run-") && name.ends_with(".mcap"),
+            "{name}"
+        );
+    }
+}

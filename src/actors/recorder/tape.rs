@@ -1,0 +1,374 @@
+//! The way of entries to the file: a bounded queue, and the thread that writes.
+//!
+//! **Invariant:** nobody waits for the file; what does not fit into the queue is dropped, counted and told, an input
+//! last of all.
+
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::thread;
+use std::time::Instant;
+
+use tokio::sync::oneshot;
+
+use super::clock::TapeClock;
+use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
+use super::messages::{NotRecorded, Recorded};
+use crate::record::{Content, RecordEntry, RecordError, RunSettings, Scribe};
+
+/// The end of a record's file name.
+const EXTENSION: &str = "mcap";
+
+/// Where a record goes.
+pub(super) struct TapeTarget {
+    pub(super) path: PathBuf,
+    /// Bytes after which it ends by itself, and other records beside it are counted; none for the operator's own.
+    pub(super) limit: Option<u64>,
+}
+
+/// The way into a record that is being written. The thread ends with the last of them.
+#[derive(Clone)]
+pub(super) struct Tape {
+    entries: SyncSender<RecordEntry>,
+    counts: Arc<TapeCounts>,
+    clock: TapeClock,
+}
+
+#[derive(Default)]
+struct TapeCounts {
+    entries: AtomicUsize,
+    bytes: AtomicUsize,
+    dropped: AtomicU64,
+    is_over: AtomicBool,
+}
+
+/// A record that has begun.
+pub(super) struct Begun {
+    pub(super) tape: Tape,
+    /// Comes when the file is whole.
+    pub(super) end: oneshot::Receiver<Recorded>,
+}
+
+/// Begins a record; the answer comes from its thread. `over` is called there when it ends before its last tape.
+pub(super) fn begin(
+    target: TapeTarget,
+    settings: RunSettings,
+    over: impl FnOnce() + Send + 'static,
+) -> oneshot::Receiver<Result<Begun, NotRecorded>> {
+    let (answer, begun) = oneshot::channel();
+    let file = file_name(&target.path);
+    let spawned = thread::Builder::new()
+        .name("recorder".into())
+        .spawn(move || {
+            let scribe = open(&target).and_then(|file| {
+                Scribe::new(io::BufWriter::new(file), &settings)
+                    .map_err(|why| failure(&target.path, &why))
+            });
+            let scribe = match scribe {
+                Ok(scribe) => scribe,
+                Err(why) => return drop(answer.send(Err(why))),
+            };
+            let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
+            let counts = Arc::<TapeCounts>::default();
+            let tape = Tape {
+                entries,
+                counts: Arc::clone(&counts),
+                clock: TapeClock::start(),
+            };
+            let (ended, end) = oneshot::channel();
+            if answer.send(Ok(Begun { tape, end })).is_err() {
+                return;
+            }
+            let recorded = write(scribe, &queue, &counts, &target, over);
+            // The program may be ending without waiting for the file.
+            let _ = ended.send(recorded);
+        });
+    if let Err(error) = spawned {
+        tracing::error!(%error, file, "no thread to record with");
+    }
+    begun
+}
+
+/// The name of the file, as it is told.
+pub(super) fn file_name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// Makes the file, which must not be there: no record is ever overwritten.
+fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
+    let refused = |why: io::Error| failure(&target.path, &why);
+    if let (Some(_), Some(folder)) = (target.limit, target.path.parent()) {
+        let records = fs::read_dir(folder)
+            .map_err(refused)?
+            .filter_map(Result::ok)
+            .filter(|entry| entry.path().extension().is_some_and(|end| end == EXTENSION));
+        if records.take(MAX_RECORDS).count() == MAX_RECORDS {
+            return Err(NotRecorded::Full(MAX_RECORDS));
+        }
+    }
+    File::create_new(&target.path).map_err(refused)
+}
+
+fn failure(path: &Path, why: &impl ToString) -> NotRecorded {
+    NotRecorded::File {
+        file: file_name(path),
+        why: why.to_string(),
+    }
+}
+
+impl Tape {
+    /// Records something, unless there is no room; whether it did.
+    pub(super) fn put(&self, content: Content) -> bool {
+        if self.counts.is_over.load(Ordering::Relaxed) {
+            return false;
+        }
+        let bytes = content.allocated();
+        // Inputs are few and short, and without one of them the rest can't be repeated.
+        let share = if matches!(content, Content::Input { .. }) {
+            1
+        } else {
+            2
+        };
+        let entries_before = self.counts.entries.fetch_add(1, Ordering::Relaxed);
+        let bytes_before = self.counts.bytes.fetch_add(bytes, Ordering::Relaxed);
+        let fits = entries_before < MAX_WAITING_ENTRIES / share
+            && bytes_before.saturating_add(bytes) <= MAX_WAITING_BYTES / share;
+        let entry = RecordEntry {
+            log_time: self.clock.now(),
+            content,
+        };
+        if fits && self.entries.try_send(entry).is_ok() {
+            return true;
+        }
+        self.counts.written(bytes);
+        self.counts.dropped.fetch_add(1, Ordering::Relaxed);
+        false
+    }
+
+    /// The same; something that was too long to be made an entry is dropped.
+    pub(super) fn put_or_count(&self, content: Option<Content>) -> bool {
+        if content.is_none() {
+            self.counts.dropped.fetch_add(1, Ordering::Relaxed);
+        }
+        content.is_some_and(|content| self.put(content))
+    }
+}
+
+impl TapeCounts {
+    /// An entry waits no more.
+    fn written(&self, bytes: usize) {
+        self.entries.fetch_sub(1, Ordering::Relaxed);
+        self.bytes.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}
+
+/// Writes entry after entry until the last tape is gone, the file takes no more, or it is long enough.
+fn write(
+    mut scribe: Scribe<io::BufWriter<File>>,
+    queue: &Receiver<RecordEntry>,
+    counts: &TapeCounts,
+    target: &TapeTarget,
+    over: impl FnOnce(),
+) -> Recorded {
+    let file = file_name(&target.path);
+    let outcome = take_entries(&mut scribe, queue, counts, target);
+    counts.is_over.store(true, Ordering::Relaxed);
+    let recorded = Recorded {
+        messages: scribe.messages(),
+        bytes: scribe.bytes(),
+        dropped: counts.dropped.load(Ordering::Relaxed),
+        file,
+    };
+    let finished = outcome.and_then(|is_last| scribe.finish().map(|_| is_last));
+    match finished {
+        Ok(true) => {}
+        Ok(false) => {
+            tracing::warn!(
+                file = recorded.file,
+                bytes = recorded.bytes,
+                "the record is as long as it may be, and ends"
+            );
+            over();
+        }
+        Err(error) => {
+            tracing::error!(%error, file = recorded.file, "the record ends");
+            over();
+        }
+    }
+    recorded
+}
+
+/// Whether that was all there was; false if the file has become too long.
+fn take_entries(
+    scribe: &mut Scribe<io::BufWriter<File>>,
+    queue: &Receiver<RecordEntry>,
+    counts: &TapeCounts,
+    target: &TapeTarget,
+) -> Result<bool, RecordError> {
+    let mut flush_due = Instant::now() + FLUSH_PERIOD;
+    let mut dropped = 0;
+    loop {
+        let is_last = match queue.recv_timeout(flush_due.saturating_duration_since(Instant::now()))
+        {
+            Ok(entry) => {
+                counts.written(entry.content.allocated());
+                match scribe.write(&entry) {
+                    // A frame that can't be read back is one of ours gone wrong, and no reason to end.
+                    Err(error @ RecordError::Frame(_)) => {
+                        tracing::warn!(%error, "a message is not recorded");
+                    }
+                    outcome => outcome?,
+                }
+                false
+            }
+            Err(RecvTimeoutError::Timeout) => false,
+            Err(RecvTimeoutError::Disconnected) => true,
+        };
+        if is_last || Instant::now() >= flush_due {
+            scribe.flush()?;
+            flush_due = Instant::now() + FLUSH_PERIOD;
+            let so_far = counts.dropped.load(Ordering::Relaxed);
+            if so_far > dropped {
+                let file = file_name(&target.path);
+                tracing::warn!(
+                    dropped = so_far - dropped,
+                    file,
+                    "the record has gaps: the file is slow"
+                );
+                dropped = so_far;
+            }
+        }
+        if is_last {
+            return Ok(true);
+        }
+        if target.limit.is_some_and(|limit| scribe.bytes() >= limit) {
+            return Ok(false);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::catalog::Topic;
+
+    /// A tape whose queue nobody empties.
+    fn stuck() -> (Tape, Receiver<RecordEntry>) {
+        let (entries, queue) = sync_channel(MAX_WAITING_ENTRIES);
+        let tape = Tape {
+            entries,
+            counts: Arc::default(),
+            clock: TapeClock::start(),
+        };
+        (tape, queue)
+    }
+
+    fn message(bytes: usize) -> Content {
+        Content::Heard {
+            topic: Topic::JointTrajectory,
+            msg: "x".repeat(bytes).into(),
+        }
+    }
+
+    fn input() -> Content {
+        Content::Input {
+            step: 0,
+            note: String::new(),
+        }
+    }
+
+    fn dropped(tape: &Tape) -> u64 {
+        tape.counts.dropped.load(Ordering::Relaxed)
+    }
+
+    #[test]
+    fn topics_leave_half_of_the_queue_to_inputs() {
+        let (tape, queue) = stuck();
+        for _ in 0..MAX_WAITING_ENTRIES / 2 {
+            assert!(tape.put(message(1)));
+        }
+        assert!(!tape.put(message(1)));
+        for _ in MAX_WAITING_ENTRIES / 2..MAX_WAITING_ENTRIES {
+            assert!(tape.put(input()));
+        }
+        assert!(!tape.put(input()));
+        assert_eq!(dropped(&tape), 2);
+        let taken = queue.recv().unwrap();
+        tape.counts.written(taken.content.allocated());
+        assert!(tape.put(input()));
+    }
+
+    #[test]
+    fn the_bytes_that_wait_are_bounded() {
+        let (tape, _queue) = stuck();
+        let long = 1024 * 1024;
+        let taken = (0..).take_while(|_| tape.put(message(long))).count();
+        assert_eq!(
+            taken,
+            MAX_WAITING_BYTES / 2 / long - 1,
+            "each with a little beside its text"
+        );
+        assert!(tape.put(input()));
+        assert_eq!(dropped(&tape), 1);
+        assert!(!tape.put_or_count(None));
+        assert_eq!(dropped(&tape), 2);
+    }
+
+    #[test]
+    fn a_record_ends_at_its_limit_and_says_so() {
+        let folder = std::env::temp_dir().join(format!("pendularm-tape-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("short.mcap");
+        let _ = fs::remove_file(&path);
+        let (tell, heard) = std::sync::mpsc::channel();
+        let settings = RunSettings { links: 2, seed: 0 };
+        let target = TapeTarget {
+            path: path.clone(),
+            limit: Some(1000),
+        };
+        let begun = begin(target, settings, move || tell.send(()).unwrap());
+        let Begun { tape, end } = begun.blocking_recv().unwrap().unwrap();
+        while tape.put(input()) {}
+        heard.recv().unwrap();
+        let recorded = end.blocking_recv().unwrap();
+        assert!(
+            recorded.bytes >= 1000 && recorded.bytes < 1100,
+            "{recorded:?}"
+        );
+        let mut recording = crate::record::Recording::new(File::open(&path).unwrap());
+        let mut read = 0;
+        while recording.next_passage().unwrap().is_some() {
+            read += 1;
+        }
+        assert_eq!(read, recorded.messages);
+        assert_eq!(recording.ending(), Some(crate::record::RecordEnding::Whole));
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_folder_holds_so_many_records_and_no_more() {
+        let folder = std::env::temp_dir().join(format!("pendularm-tapes-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let target = |name: &str| TapeTarget {
+            path: folder.join(name),
+            limit: Some(1),
+        };
+        for number in 1..MAX_RECORDS {
+            File::create(folder.join(format!("{number}.mcap"))).unwrap();
+        }
+        assert!(open(&target("last.mcap")).is_ok());
+        let full = open(&target("more.mcap")).err();
+        assert_eq!(full, Some(NotRecorded::Full(MAX_RECORDS)));
+        let own = TapeTarget {
+            limit: None,
+            ..target("own.mcap")
+        };
+        assert!(open(&own).is_ok(), "the operator's own is not counted");
+        assert!(open(&own).is_err(), "and overwrites nothing");
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -1,0 +1,82 @@
+//! The questions to the recorder in JSON, and the responses.
+//!
+//! **Invariant:** a client names a file, never a folder.
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde::Serialize;
+
+use super::Recorder;
+use super::limits::MAX_FILE_NAME;
+use super::messages::{NotRecorded, Recorded, StartRecording, StopRecording};
+use crate::actors::wire::{Address, Answered, Callable, Nodes};
+use crate::protocol::catalog::Service;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Fields, Rejections};
+
+impl<const N: usize> Recorder<N> {
+    /// Enters this node's services into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<StartRecording>(Service::RecorderStart, address.clone());
+        nodes.serve::<StopRecording>(Service::RecorderStop, address.clone());
+    }
+}
+
+impl Callable for StartRecording {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let name = fields.text("name").map(|name| name.into_owned());
+        if name.as_ref().is_some_and(|name| !is_file_name(name)) {
+            let rule = format!(
+                "must be 1 to {MAX_FILE_NAME} letters, digits, `.`, `-` and `_`, the first one not `.`"
+            );
+            fields.refuse("name", &rule);
+        }
+        Ok(Self {
+            name,
+            rejected: fields.finish(),
+        })
+    }
+}
+
+impl Answered for StartRecording {
+    fn write(answer: Result<String, NotRecorded>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            file: String,
+        }
+        to.outcome(answer.map(|file| Values { file }))
+    }
+}
+
+impl Callable for StopRecording {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        Fields::read(arguments, service)?;
+        Ok(Self)
+    }
+}
+
+impl Answered for StopRecording {
+    fn write(answer: Result<Recorded, NotRecorded>, to: &Address) -> Bytes {
+        #[derive(Serialize)]
+        struct Values {
+            file: String,
+            messages: u64,
+            bytes: u64,
+            dropped: u64,
+        }
+        let values = answer.map(|recorded| Values {
+            file: recorded.file,
+            messages: recorded.messages,
+            bytes: recorded.bytes,
+            dropped: recorded.dropped,
+        });
+        to.outcome(values)
+    }
+}
+
+/// Whether that is the name of a file, and nothing else on any system.
+fn is_file_name(name: &str) -> bool {
+    let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'-' | b'_');
+    (1..=MAX_FILE_NAME).contains(&name.len()) && !name.starts_with('.') && name.bytes().all(plain)
+}

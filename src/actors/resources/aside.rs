@@ -1,0 +1,65 @@
+//! Work that would keep the gateway's thread for longer than a turn, done on another thread meanwhile.
+//!
+//! The gateway's thread serves every client: nothing holds it for much more than a millisecond. Work that is longer,
+//! needs nothing but its bytes and is waited for by one client (a frame of megabytes to be read, a message to be
+//! encoded, a long list to be written) is done here.
+//!
+//! **Invariant:** at most [`PLACES`] of these threads are at work for one gateway on each kind of errand; the others
+//! wait in the order in which they came.
+
+use std::sync::Arc;
+
+use tokio::sync::Semaphore;
+use tokio::task::{spawn_blocking, yield_now};
+
+use crate::actors::panics::contain;
+use crate::actors::resources::work_clock;
+
+/// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other, and the arm and
+/// the gateway keep most of the machine.
+pub const PLACES: usize = 2;
+
+/// The kinds of errands; none waits for places that the other takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Errand {
+    /// Reads a client's input.
+    Reading,
+    /// Writes messages for clients.
+    Writing,
+}
+
+thread_local! {
+    static READING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
+    static WRITING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
+}
+
+/// Does `work` on another thread; in a simulation, which has one, on that and a turn later. `None` if it panicked,
+/// which is logged, or if the runtime is ending.
+pub async fn aside<T: Send + 'static>(
+    errand: Errand,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Option<T> {
+    let free = match errand {
+        Errand::Reading => READING.with(Arc::clone),
+        Errand::Writing => WRITING.with(Arc::clone),
+    };
+    let place = free.acquire_owned().await.ok()?;
+    let work = move || {
+        let done = contain(work);
+        drop(place);
+        done
+    };
+    let done = if work_clock::is_counted() {
+        yield_now().await;
+        work()
+    } else {
+        spawn_blocking(work).await.ok()?
+    };
+    match done {
+        Ok(done) => Some(done),
+        Err(panic) => {
+            tracing::error!(%panic, "work for a client failed");
+            None
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! The machine that all nodes share: memory, which is counted, time for work, which is measured, and threads for work
+//! that takes long.
+//!
+//! **Invariant:** nothing in here knows a node, so that every node can use it.
+
+pub mod aside;
+pub mod awake;
+pub mod budget;
+pub mod gauges;
+pub mod work_clock;

@@ -1,0 +1,109 @@
+//! The clocks on which the cost of work is measured: the slices of computations, the arm's wake-ups. How long work may
+//! take is elapsed time; what somebody is charged for it is the processor time of the thread that did it: a machine
+//! that does something else is nobody's debt.
+//!
+//! It is the machine's own, unless a simulation counts instead: there each look costs the same, so that the work done
+//! between two looks, and all that follows from it, is the same in every run.
+//!
+//! **Invariant:** only what work costs is read here. Simulation time and what a client waits for go by the runtime's
+//! clock.
+
+use std::cell::Cell;
+use std::time::{Duration, Instant};
+
+use rustix::time::{ClockId, clock_gettime};
+
+thread_local! {
+    /// How looks are counted on this thread; none where the machine's clocks count.
+    static COUNTED: Cell<Option<Looks>> = const { Cell::new(None) };
+}
+
+/// Time that passes with looks at it alone.
+#[derive(Clone, Copy)]
+struct Looks {
+    began: Instant,
+    /// The time that a look costs.
+    cost: Duration,
+    /// The time that all of them have cost so far.
+    spent: Duration,
+}
+
+impl Looks {
+    /// Looks once more.
+    fn look(mut self) -> Self {
+        self.spent += self.cost;
+        COUNTED.set(Some(self));
+        self
+    }
+}
+
+/// The time now. Only differences mean something.
+#[must_use]
+pub fn now() -> Instant {
+    match COUNTED.get() {
+        Some(counted) => counted.began + counted.look().spent,
+        None => Instant::now(),
+    }
+}
+
+/// Processor time that this thread has had. Only differences on one thread mean something.
+#[must_use]
+pub fn spent() -> Duration {
+    match COUNTED.get() {
+        Some(counted) => counted.look().spent,
+        // Nothing is charged on a machine whose clock would run backwards.
+        None => clock_gettime(ClockId::ThreadCPUTime)
+            .try_into()
+            .unwrap_or_default(),
+    }
+}
+
+/// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time
+/// pass.
+pub fn count(cost: Duration) {
+    COUNTED.set(Some(Looks {
+        began: Instant::now(),
+        cost,
+        spent: Duration::ZERO,
+    }));
+}
+
+/// Whether looks are counted on this thread.
+#[must_use]
+pub fn is_counted() -> bool {
+    COUNTED.get().is_some()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Waits for the thread's own time, so it takes as long as the machine lets it.
+    #[test]
+    fn who_works_is_charged_and_who_sleeps_is_not() {
+        let (began, before) = (Instant::now(), spent());
+        std::thread::sleep(Duration::from_millis(200));
+        let asleep = spent() - before;
+        assert!(asleep < began.elapsed() / 10, "{asleep:?}");
+        while spent() - before < asleep + Duration::from_millis(5) {
+            std::hint::spin_loop();
+        }
+    }
+
+    #[test]
+    fn each_look_costs_the_same_where_looks_are_counted() {
+        assert!(!is_counted());
+        count(Duration::from_micros(100));
+        let began = now();
+        for looks in 1..=50 {
+            assert_eq!(now() - began, looks * Duration::from_micros(100));
+        }
+        let before = spent();
+        assert_eq!(spent() - before, Duration::from_micros(100));
+        let elsewhere = std::thread::spawn(is_counted).join();
+        assert!(
+            !elsewhere.unwrap(),
+            "another thread has the machine's clock"
+        );
+    }
+}

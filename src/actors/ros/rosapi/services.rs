@@ -1,0 +1,381 @@
+//! The questions to `rosapi`: what each is, how it is read, and how its answer is written.
+//!
+//! **Invariant:** a parameter's value is read as the arm's own service reads it; a question about one that does not
+//! exist gets as far as the node, which says so.
+
+use std::borrow::Cow;
+
+use bytes::Bytes;
+use serde_json::value::RawValue;
+use serde_json::{Value, json};
+
+use crate::actors::arm::sim::{FieldByField as _, SetGains, SetIntegrator, SetParams};
+use crate::actors::node::Ask;
+use crate::actors::wire::{Address, Answered, Callable, Streamed};
+use crate::protocol::catalog::{self, Service};
+use crate::protocol::messages::Stamp;
+use crate::protocol::op::Arguments;
+use crate::protocol::op::fields::{Fields, Rejections};
+use crate::protocol::ros::parameters::Parameter;
+use crate::protocol::ros::rosapi;
+use crate::protocol::ros::rosapi::Census;
+use crate::protocol::wire::json;
+
+const NO_SUCH: &str = "name must be that of a parameter; get_param_names lists them";
+
+/// A question about what there is: topics, services, nodes and types.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Look {
+    /// The question.
+    pub question: catalog::Rosapi,
+    /// The name that it is about, if it is about one.
+    pub name: String,
+}
+
+/// A question and the registrations of clients: its answer is made of these and of the catalog.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listing {
+    /// The question.
+    pub look: Look,
+    /// Topics and services of clients.
+    pub census: Census,
+}
+
+impl Ask for Look {
+    type Answer = Listing;
+}
+
+/// Asks for simulation time \[s\].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GetTime;
+
+impl Ask for GetTime {
+    type Answer = f64;
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct GetParam<const N: usize> {
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+    /// The value, as JSON text, that is wanted where there is none.
+    pub default: String,
+}
+
+impl<const N: usize> Ask for GetParam<N> {
+    type Answer = Result<ParameterValue<N>, Unknown>;
+}
+
+/// The value of a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParameterValue<const N: usize> {
+    /// A number.
+    Number(f64),
+    /// One per joint.
+    Numbers([f64; N]),
+    /// A name or a description.
+    Text(String),
+}
+
+/// There is no parameter of that name.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{NO_SUCH}")]
+pub struct Unknown {
+    /// The value that was wanted in that case.
+    pub default: String,
+}
+
+/// Sets a parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetParam<const N: usize> {
+    /// The change, or why there can be none.
+    pub change: Result<ParamChange<N>, NotSet>,
+}
+
+impl<const N: usize> Ask for SetParam<N> {
+    type Answer = Result<(), NotSet>;
+}
+
+/// A change of one parameter, as a question to the arm.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ParamChange<const N: usize> {
+    /// Gravity, masses or lengths.
+    Params(SetParams<N>),
+    /// Gains.
+    Gains(SetGains<N>),
+    /// Method or timestep.
+    Integrator(SetIntegrator),
+}
+
+/// Why a parameter was not set.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum NotSet {
+    /// There is none of that name.
+    #[error("{NO_SUCH}")]
+    Unknown,
+    /// It has no value of its own.
+    #[error("name: robot_description is made from lengths and masses")]
+    Derived,
+    /// Its value is of another type.
+    #[error("{name} must be a {expected} (type {number}), got type {found}")]
+    WrongType {
+        /// The parameter's name.
+        name: &'static str,
+        /// The name of its type.
+        expected: &'static str,
+        /// The number of its type.
+        number: u8,
+        /// The number of the type that came.
+        found: u8,
+    },
+    /// The value can't be read.
+    #[error("value must be JSON text")]
+    NotJson,
+    /// The arm does not take it.
+    #[error("{0}")]
+    Rejected(Rejections),
+}
+
+impl NotSet {
+    /// Rejections are why a parameter was not set.
+    pub(in crate::actors::ros) fn unless_empty(rejected: Rejections) -> Result<(), Self> {
+        if rejected.is_empty() {
+            Ok(())
+        } else {
+            Err(Self::Rejected(rejected))
+        }
+    }
+}
+
+/// Whether there is a parameter of that name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct HasParam {
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+}
+
+impl Ask for HasParam {
+    type Answer = bool;
+}
+
+/// Deletes a parameter, which can't be done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeleteParam {
+    /// The parameter; none if there is none of that name.
+    pub parameter: Option<Parameter>,
+}
+
+impl Ask for DeleteParam {
+    type Answer = NotDeleted;
+}
+
+/// Why a parameter was not deleted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum NotDeleted {
+    /// There is none of that name.
+    #[error("{NO_SUCH}")]
+    Unknown,
+    /// The arm needs it.
+    #[error("name: the parameters of the arm can't be deleted")]
+    Fixed,
+}
+
+/// The names of all parameters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GetParamNames;
+
+impl Ask for GetParamNames {
+    type Answer = Vec<String>;
+}
+
+/// The value of a parameter that does not exist, as JSON text: clients parse it, so it has to be some.
+const NO_VALUE: &str = "\"\"";
+
+// ---- what there is --------------------------------------------------------------------------------------------------
+
+impl Callable for Look {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let (name, _) = read_texts(service, arguments)?;
+        let name = name.into_owned();
+        let Service::Rosapi(question) = service else {
+            debug_assert!(false, "{} is not this node's", service.name());
+            let question = catalog::Rosapi::Topics;
+            return Ok(Self { question, name });
+        };
+        Ok(Self { question, name })
+    }
+}
+
+impl Streamed for Look {
+    type Writer = Option<Bytes>;
+
+    fn begin(Listing { look, census }: Listing, to: &Address) -> Self::Writer {
+        Some(to.outcome(rosapi::answer(look.question, &look.name, &census)))
+    }
+
+    fn advance(writer: &mut Self::Writer) -> Option<Bytes> {
+        writer.take()
+    }
+}
+
+// ---- time -----------------------------------------------------------------------------------------------------------
+
+impl Callable for GetTime {
+    fn read(_: Service, _: &Arguments) -> Result<Self, Rejections> {
+        Ok(Self)
+    }
+}
+
+impl Answered for GetTime {
+    fn write(time: f64, to: &Address) -> Bytes {
+        let Stamp { sec, nanosec } = Stamp::from_seconds(time);
+        // ROS 1 has other names for the same; some clients know only those.
+        let time = json!({"sec": sec, "nanosec": nanosec, "secs": sec, "nsecs": nanosec});
+        to.response(&json!({"time": time}), "")
+    }
+}
+
+// ---- parameters -----------------------------------------------------------------------------------------------------
+
+/// The first two fields, both texts; empty where the question has no such field, or the request leaves it out.
+fn read_texts(
+    service: Service,
+    arguments: &Arguments,
+) -> Result<(Cow<'_, str>, Cow<'_, str>), Rejections> {
+    let mut fields = Fields::read(arguments, service)?;
+    let mut text = |index: usize| {
+        let field = service.fields().get(index)?;
+        fields.text(field.name)
+    };
+    let (first, second) = (text(0), text(1));
+    if fields.accepted() {
+        Ok((first.unwrap_or_default(), second.unwrap_or_default()))
+    } else {
+        Err(fields.finish())
+    }
+}
+
+fn read_parameter(
+    service: Service,
+    arguments: &Arguments,
+) -> Result<Option<Parameter>, Rejections> {
+    let (name, _) = read_texts(service, arguments)?;
+    Ok(Parameter::from_name(&name))
+}
+
+impl<const N: usize> Callable for GetParam<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let (name, default) = read_texts(service, arguments)?;
+        Ok(Self {
+            parameter: Parameter::from_name(&name),
+            default: default.into_owned(),
+        })
+    }
+}
+
+impl<const N: usize> Answered for GetParam<N> {
+    fn write(answer: Result<ParameterValue<N>, Unknown>, to: &Address) -> Bytes {
+        let values = match answer {
+            Ok(value) => {
+                let value = match value {
+                    ParameterValue::Number(number) => Value::from(number),
+                    ParameterValue::Numbers(numbers) => Value::from(numbers.to_vec()),
+                    ParameterValue::Text(text) => Value::from(text),
+                };
+                json!({"value": value.to_string(), "successful": true, "reason": ""})
+            }
+            Err(why) => {
+                let reason = why.to_string();
+                let value = match &*why.default {
+                    "" => NO_VALUE,
+                    default => default,
+                };
+                json!({"value": value, "successful": false, "reason": reason})
+            }
+        };
+        to.response(&values, "")
+    }
+}
+
+impl<const N: usize> Callable for SetParam<N> {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let (name, text) = read_texts(service, arguments)?;
+        let change = match Parameter::from_name(&name) {
+            None => Err(NotSet::Unknown),
+            Some(parameter) => read_json(parameter, &text),
+        };
+        Ok(Self { change })
+    }
+}
+
+/// A value in JSON text.
+fn read_json<const N: usize>(parameter: Parameter, text: &str) -> Result<ParamChange<N>, NotSet> {
+    // As lenient about numbers as every frame: they are refused by the parameter's name.
+    let text = json::accept_literals(text.to_owned());
+    let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson)?;
+    read_change(parameter, &value)
+}
+
+/// A value, as the arm's own service would read it.
+pub(in crate::actors::ros) fn read_change<const N: usize>(
+    parameter: Parameter,
+    value: &RawValue,
+) -> Result<ParamChange<N>, NotSet> {
+    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+    let fields = Fields::single(service, field, value);
+    Ok(match service {
+        Service::SetParams => ParamChange::Params(SetParams::request(fields)),
+        Service::SetGains => ParamChange::Gains(SetGains::request(fields)),
+        _ => ParamChange::Integrator(SetIntegrator::request(fields)),
+    })
+}
+
+impl<const N: usize> Answered for SetParam<N> {
+    fn write(answer: Result<(), NotSet>, to: &Address) -> Bytes {
+        let reason = answer
+            .as_ref()
+            .map_or_else(NotSet::to_string, |()| String::new());
+        let values = json!({"successful": answer.is_ok(), "reason": reason});
+        to.response(&values, "")
+    }
+}
+
+impl Callable for HasParam {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let parameter = read_parameter(service, arguments)?;
+        Ok(Self { parameter })
+    }
+}
+
+impl Answered for HasParam {
+    fn write(exists: bool, to: &Address) -> Bytes {
+        to.response(&json!({"exists": exists}), "")
+    }
+}
+
+impl Callable for DeleteParam {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let parameter = read_parameter(service, arguments)?;
+        Ok(Self { parameter })
+    }
+}
+
+impl Answered for DeleteParam {
+    fn write(why: NotDeleted, to: &Address) -> Bytes {
+        let values = json!({"successful": false, "reason": why.to_string()});
+        to.response(&values, "")
+    }
+}
+
+impl Callable for GetParamNames {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        read_texts(service, arguments)?;
+        Ok(Self)
+    }
+}
+
+impl Answered for GetParamNames {
+    fn write(names: Vec<String>, to: &Address) -> Bytes {
+        to.response(&json!({"names": names}), "")
+    }
+}

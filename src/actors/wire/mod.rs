@@ -1,0 +1,19 @@
+//! Between the registry and the nodes: a client's call is read here and becomes a question, and a node's answer is
+//! written here and becomes the call's one response.
+//!
+//! A question that clients can ask says how it is read and how its answer is written ([`Callable`]); the table of
+//! routes ([`Nodes`]) says which node is asked. All that goes wrong on the way is in here, once: bad arguments, a
+//! question that was dropped, and how an error is written.
+//!
+//! **Invariant:** arguments are read before a node hears of the call, and responses written after it has answered: a
+//! node's thread sees no JSON.
+
+mod caller;
+pub mod follower;
+mod routes;
+mod served;
+
+pub use self::caller::{Address, Caller, ROOM_TIME, SMALL_ANSWER, ServiceCall, TopicMessage};
+pub(in crate::actors) use self::routes::LONG_ARGUMENTS;
+pub use self::routes::{Nodes, Route};
+pub use self::served::{Answered, Callable, Streamed};

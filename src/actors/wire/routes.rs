@@ -1,0 +1,79 @@
+//! The table of routes: which node serves a service, pursues an action, listens to a topic and publishes one.
+//!
+//! **Invariant:** arguments are read here or aside, never on the thread of the node.
+
+use std::collections::HashMap;
+
+use actix::prelude::*;
+
+use super::caller::{Caller, ServiceCall, TopicMessage};
+use super::follower::ActionRequest;
+use super::served::{Answered, Callable, ClientAsker, PatientAsker, Streamed};
+use crate::actors::node::{Asker, Call, Interest, Reply};
+use crate::actors::resources::aside::{Errand, aside};
+use crate::protocol::catalog::{Action, Service, Topic};
+
+/// Arguments longer than this are read aside: some tenth of a millisecond. Only computations take such.
+pub(in crate::actors) const LONG_ARGUMENTS: usize = 16 * 1024;
+
+/// Hands what has come to the node that is meant.
+pub type Route<T> = Box<dyn Fn(T) + Send>;
+
+/// The runtime's own nodes: who serves, listens and publishes what.
+#[derive(Default)]
+pub struct Nodes {
+    /// The way of a call to the node that answers it.
+    pub services: HashMap<Service, Route<ServiceCall>>,
+    /// The way of a goal to the node that pursues it.
+    pub actions: HashMap<Action, Route<ActionRequest>>,
+    /// The way of a message to the node that listens to its topic.
+    pub listeners: HashMap<Topic, Route<TopicMessage>>,
+    /// The node that publishes each of the runtime's topics.
+    pub publishers: HashMap<Topic, Recipient<Interest>>,
+}
+
+impl Nodes {
+    /// A row of a node's table: calls of `service` are this question.
+    pub fn serve<A: Answered>(&mut self, service: Service, node: impl Into<Recipient<Call<A>>>) {
+        self.route(service, node.into(), ClientAsker::<A>::new);
+    }
+
+    /// The same where the answer may be long.
+    pub fn serve_long<A: Streamed>(
+        &mut self,
+        service: Service,
+        node: impl Into<Recipient<Call<A>>>,
+    ) {
+        self.route(service, node.into(), PatientAsker::<A>::new);
+    }
+
+    /// Reads what is asked, or says what is wrong with it.
+    fn route<A: Callable, C: Asker<A::Answer> + 'static>(
+        &mut self,
+        service: Service,
+        node: Recipient<Call<A>>,
+        asker: fn(Caller) -> C,
+    ) {
+        let take = move |call: ServiceCall| {
+            let node = node.clone();
+            let is_long = call.arguments.payload().get().len() > LONG_ARGUMENTS;
+            let read = move || {
+                let mut caller = call.caller;
+                match A::read(call.service, &call.arguments) {
+                    Ok(ask) => {
+                        let done = caller.done.take();
+                        let reply = Reply::new(asker(caller), done);
+                        node.do_send(Call { ask, reply });
+                    }
+                    Err(rejections) => caller.refuse(&rejections.status()),
+                }
+            };
+            if is_long {
+                actix_rt::spawn(aside(Errand::Reading, read));
+            } else {
+                read();
+            }
+        };
+        self.services.insert(service, Box::new(take));
+    }
+}

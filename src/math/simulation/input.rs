@@ -1,0 +1,50 @@
+//! Everything from outside that a step depends on: one value per kind of change.
+//!
+//! **Invariant:** a simulation that is given the same inputs before the same steps takes the same steps, bit for bit.
+
+use super::Simulation;
+use crate::math::arm::Arm;
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+
+/// A change from outside, in force from the next step on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ArmInput<const N: usize> {
+    /// The method that takes the steps.
+    Method(Method),
+    /// Length of a step \[s\], greater than 0.
+    Timestep(f64),
+    /// Lengths, masses and gravity.
+    Arm(Arm<N>),
+    /// The controller's gains.
+    Gains(Gains<N>),
+    /// The controller on or off.
+    Enabled(bool),
+    /// Where the arm is to be held.
+    Setpoint(Setpoint<N>),
+    /// An effort that is added for a while.
+    Disturbance {
+        /// \[N m\].
+        effort: [f64; N],
+        /// Simulation time \[s\], greater than 0.
+        duration: f64,
+    },
+    /// Back to the starting pose.
+    Reset,
+}
+
+impl<const N: usize> Simulation<N> {
+    /// Has `input` take effect.
+    pub fn apply(&mut self, input: ArmInput<N>) {
+        match input {
+            ArmInput::Method(method) => self.set_method(method),
+            ArmInput::Timestep(timestep) => self.set_timestep(timestep),
+            ArmInput::Arm(arm) => self.set_arm(arm),
+            ArmInput::Gains(gains) => self.set_gains(gains),
+            ArmInput::Enabled(on) => self.enable(on),
+            ArmInput::Setpoint(setpoint) => self.set_setpoint(setpoint),
+            ArmInput::Disturbance { effort, duration } => self.disturb(effort, duration),
+            ArmInput::Reset => self.reset(),
+        }
+    }
+}

@@ -1,0 +1,360 @@
+//! The live loop without time: arm, state, control law, method and step counter, advanced in whole steps.
+//!
+//! One step, from the state `(q, q̇)` at its start:
+//!
+//! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero; a disturbance that
+//!    has not ended ([`Disturbance`]) is added to it;
+//! 2. that effort is held while the method's stages evaluate the dynamics ([`step_under`]);
+//! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
+//!
+//! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
+//! studied, bit for bit. May use the rest of `math`; told no time, it is stepped.
+//!
+//! **Invariant:** the state is finite. A step whose result is not finite is not taken, in whole or in part, and
+//! nothing steps after it until [`Simulation::reset`]; time is `base + k timestep`, never a running sum.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
+mod checkpoint;
+mod increments;
+mod input;
+
+use std::ops::ControlFlow;
+
+pub use self::checkpoint::Checkpoint;
+pub use self::increments::step_under;
+use self::increments::{add, step_as};
+pub use self::input::ArmInput;
+use super::arm::{Arm, State};
+use super::integrator::Method;
+use super::pid::{Control, Gains, Pid, Setpoint};
+
+/// Timestep until another is set \[s\]. A third of what the default gains are stable to.
+pub const DEFAULT_TIMESTEP: f64 = 0.001;
+
+/// When and where a simulation left the finite numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Divergence {
+    /// Number of the step, since the reset, whose result was not finite; the first step is 1.
+    pub step: u64,
+    /// Simulation time at which that step began, and at which the clock stands \[s\].
+    pub time: f64,
+}
+
+/// An effort from outside, added to that of every step that begins before it ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Disturbance<const N: usize> {
+    /// Effort per joint \[N m\].
+    pub effort: [f64; N],
+    /// Simulation time at which it ends \[s\].
+    ends: f64,
+}
+
+impl<const N: usize> Disturbance<N> {
+    /// `effort` \[N m\] over `duration` \[s\], greater than 0, from simulation time `start` \[s\] on: `duration /
+    /// timestep` steps, rounded up, so that at least one has it.
+    ///
+    /// The end is brought forward by more than the roundings of the sum and of the times that it is compared with, far
+    /// less than a timestep: 1.1 s in steps of 0.1 s are eleven steps, not twelve.
+    fn new(effort: [f64; N], start: f64, duration: f64) -> Self {
+        let ends = (start + duration) * (1.0 - 4.0 * f64::EPSILON);
+        Self {
+            effort,
+            ends: ends.max(start.next_up()),
+        }
+    }
+}
+
+/// An arm under control, advanced in whole steps.
+///
+/// ```
+/// use pendularm::math::{arm::Arm, pid::{Gains, Setpoint}, simulation::Simulation};
+///
+/// let mut simulation = Simulation::<2>::new(Arm::default(), Gains::default());
+/// simulation.enable(true);
+/// simulation.set_setpoint(Setpoint { position: [0.3, -0.5], velocity: [0.0; 2] });
+/// simulation.advance(4000);
+/// assert_eq!(simulation.time(), 4.0);
+/// assert!((simulation.state().position[0] - 0.3).abs() < 0.02);
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Simulation<const N: usize> {
+    arm: Arm<N>,
+    pid: Pid<N>,
+    method: Method,
+    /// Length of a step \[s\].
+    timestep: f64,
+    state: State<N>,
+    /// The rounding error of `state` so far: position \[rad\], velocity \[rad/s\].
+    carry: State<N>,
+    /// Effort of the latest step \[N m\].
+    effort: [f64; N],
+    /// The disturbance that is added to the effort of the next step.
+    disturbance: Option<Disturbance<N>>,
+    /// Simulation time when this timestep came into force \[s\].
+    base: f64,
+    /// Steps taken since then.
+    steps_since_base: u64,
+    /// Steps taken since the reset.
+    steps: u64,
+    divergence: Option<Divergence>,
+}
+
+impl<const N: usize> Simulation<N> {
+    /// An arm in the starting pose, q = 0 at rest, with Runge-Kutta 4 at [`DEFAULT_TIMESTEP`] and the controller off.
+    #[must_use]
+    pub fn new(arm: Arm<N>, gains: Gains<N>) -> Self {
+        Self {
+            arm,
+            pid: Pid::new(gains),
+            method: Method::Rk4,
+            timestep: DEFAULT_TIMESTEP,
+            state: State::rest(),
+            carry: State::rest(),
+            effort: [0.0; N],
+            disturbance: None,
+            base: 0.0,
+            steps_since_base: 0,
+            steps: 0,
+            divergence: None,
+        }
+    }
+
+    /// Takes one step; `false` if the simulation has diverged, then or before.
+    pub fn step(&mut self) -> bool {
+        self.advance(1) == 1
+    }
+
+    /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged.
+    pub fn advance(&mut self, steps: u64) -> u64 {
+        self.advance_with(steps, |_| ControlFlow::Continue(()))
+    }
+
+    /// As [`Simulation::advance`], and shows every state that a step leads to to `observe`, which may end the advance
+    /// there. What must be judged at every physics step hooks in here; without it, it costs nothing.
+    pub fn advance_with(
+        &mut self,
+        steps: u64,
+        observe: impl FnMut(&Self) -> ControlFlow<()>,
+    ) -> u64 {
+        if self.divergence.is_some() {
+            return 0;
+        }
+        // Asked once for all steps: in every one it would cost as much as 2 links save by it.
+        if self.arm.gravity() == 0.0 {
+            self.take_steps::<false>(steps, observe)
+        } else {
+            self.take_steps::<true>(steps, observe)
+        }
+    }
+
+    fn take_steps<const WEIGHS: bool>(
+        &mut self,
+        steps: u64,
+        mut observe: impl FnMut(&Self) -> ControlFlow<()>,
+    ) -> u64 {
+        // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
+        for taken in 0..steps {
+            if !self.take_step::<WEIGHS>() {
+                self.divergence = Some(Divergence {
+                    step: self.steps + 1,
+                    time: self.time(),
+                });
+                return taken;
+            }
+            if observe(self).is_break() {
+                return taken + 1;
+            }
+        }
+        steps
+    }
+
+    /// One step, unless its result is not finite: then nothing changes, and `false`.
+    #[inline(always)] // into both loops: called, it takes a dozen instructions more
+    fn take_step<const WEIGHS: bool>(&mut self) -> bool {
+        let mut control = if self.pid.is_enabled() {
+            self.pid.control(&self.state, self.timestep)
+        } else {
+            Control {
+                effort: [0.0; N],
+                integral: *self.pid.integral(),
+            }
+        };
+        if self.disturbance.is_some() {
+            self.add_disturbance(&mut control.effort);
+        }
+        let State { position, velocity } = &self.state;
+        let effort = &control.effort;
+        let (dq, dv) =
+            step_as::<N, WEIGHS>(&self.arm, self.method, &self.state, effort, self.timestep);
+        let (position, position_carry) = add(position, &self.carry.position, &dq);
+        let (velocity, velocity_carry) = add(velocity, &self.carry.velocity, &dv);
+        let next = State { position, velocity };
+        if !next.is_finite() {
+            return false;
+        }
+        self.state = next;
+        self.carry = State {
+            position: position_carry,
+            velocity: velocity_carry,
+        };
+        self.effort = control.effort;
+        self.pid.commit(control.integral);
+        self.steps_since_base += 1;
+        self.steps += 1;
+        true
+    }
+
+    /// The effort that the next step would be taken with \[N m\]: the controller's and the disturbance's together.
+    #[must_use]
+    pub fn effort_of_next_step(&self) -> [f64; N] {
+        let controlled = if self.pid.is_enabled() {
+            self.pid.control(&self.state, self.timestep).effort
+        } else {
+            [0.0; N]
+        };
+        match self.disturbance {
+            Some(push) if self.time() < push.ends => {
+                std::array::from_fn(|i| controlled[i] + push.effort[i])
+            }
+            _ => controlled,
+        }
+    }
+
+    /// Adds the disturbance to the effort of the step that begins now, or ends it if its time is over.
+    #[cold]
+    fn add_disturbance(&mut self, effort: &mut [f64; N]) {
+        match self.disturbance {
+            Some(disturbance) if self.time() < disturbance.ends => {
+                *effort = std::array::from_fn(|i| effort[i] + disturbance.effort[i]);
+            }
+            _ => self.disturbance = None,
+        }
+    }
+
+    /// Adds `effort` \[N m\] to that of every step that begins within `duration` \[s\], greater than 0, of simulation
+    /// time from now; one that still runs ends here. With the controller off, this is all the effort there is.
+    pub fn disturb(&mut self, effort: [f64; N], duration: f64) {
+        self.disturbance = Some(Disturbance::new(effort, self.time(), duration));
+    }
+
+    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, effort zero, disturbance ended,
+    /// divergence cleared.
+    /// On or off, gains, arm, method and timestep stay.
+    pub fn reset(&mut self) {
+        self.set_state(State::rest());
+        self.pid.reset();
+        self.effort = [0.0; N];
+        self.disturbance = None;
+        self.base = 0.0;
+        self.steps_since_base = 0;
+        self.steps = 0;
+        self.divergence = None;
+    }
+
+    /// Joint positions and velocities.
+    #[must_use]
+    pub fn state(&self) -> &State<N> {
+        &self.state
+    }
+
+    /// Puts the arm into another state, which must be finite; clock, controller and divergence stay.
+    pub fn set_state(&mut self, state: State<N>) {
+        self.state = state;
+        self.carry = State::rest();
+    }
+
+    /// Effort of the latest step \[N m\], the controller's and the disturbance's together; zeros at once when the
+    /// controller is turned off, and after a reset.
+    #[must_use]
+    pub fn effort(&self) -> &[f64; N] {
+        &self.effort
+    }
+
+    /// Simulation time since the reset \[s\].
+    #[must_use]
+    #[allow(
+        clippy::cast_precision_loss,
+        reason = "2^53 steps, where the count rounds, take years at any speed"
+    )]
+    pub fn time(&self) -> f64 {
+        self.base + self.steps_since_base as f64 * self.timestep
+    }
+
+    /// Steps taken since the reset.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// The method that takes the steps.
+    #[must_use]
+    pub fn method(&self) -> Method {
+        self.method
+    }
+
+    /// Changes the method from the next step on.
+    pub fn set_method(&mut self, method: Method) {
+        self.method = method;
+    }
+
+    /// Length of a step \[s\].
+    #[must_use]
+    pub fn timestep(&self) -> f64 {
+        self.timestep
+    }
+
+    /// Changes the length of a step \[s\], greater than 0, from the next step on; time goes on from where it is. The
+    /// timestep already in force changes nothing, so that repeating it does not turn time into a running sum.
+    pub fn set_timestep(&mut self, timestep: f64) {
+        if timestep.to_bits() != self.timestep.to_bits() {
+            self.base = self.time();
+            self.steps_since_base = 0;
+            self.timestep = timestep;
+        }
+    }
+
+    /// The arm's parameters.
+    #[must_use]
+    pub fn arm(&self) -> &Arm<N> {
+        &self.arm
+    }
+
+    /// Changes the arm's parameters; positions and velocities of the joints stay.
+    pub fn set_arm(&mut self, arm: Arm<N>) {
+        self.arm = arm;
+    }
+
+    /// The controller, to be read.
+    #[must_use]
+    pub fn pid(&self) -> &Pid<N> {
+        &self.pid
+    }
+
+    /// Turns the controller on or off ([`Pid::enable`]). Off, the effort is zero at once.
+    pub fn enable(&mut self, on: bool) {
+        self.pid.enable(on);
+        if !on {
+            self.effort = [0.0; N];
+        }
+    }
+
+    /// Changes the gains and keeps the integral.
+    pub fn set_gains(&mut self, gains: Gains<N>) {
+        self.pid.set_gains(gains);
+    }
+
+    /// Changes the setpoint, whether the controller is on or off.
+    pub fn set_setpoint(&mut self, setpoint: Setpoint<N>) {
+        self.pid.set_setpoint(setpoint);
+    }
+
+    /// The step at which the simulation left the finite numbers, if it did since the reset.
+    #[must_use]
+    pub fn divergence(&self) -> Option<Divergence> {
+        self.divergence
+    }
+}

@@ -1,0 +1,78 @@
+//! The options of runs on record, and the subcommand that replays one.
+//!
+//! **Invariant:** without any of them nothing is written anywhere.
+
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+use clap::builder::OsStringValueParser;
+use clap::{Arg, ArgMatches, Command};
+
+use super::setting::{Given, LaunchOption};
+
+pub(super) const RECORD: LaunchOption = LaunchOption {
+    option: "record",
+    variable: "ARM_SIM_RECORD",
+    value: "FILE",
+    about: "Records the run as MCAP into this file, which must not be there",
+    default: "none",
+    is_switch: false,
+};
+
+pub(super) const RECORD_DIR: LaunchOption = LaunchOption {
+    option: "record-dir",
+    variable: "ARM_SIM_RECORD_DIR",
+    value: "FOLDER",
+    about: "Folder in which clients may have runs recorded, by /recorder/start",
+    default: "none",
+    is_switch: false,
+};
+
+/// Records, as chosen at launch.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct RecordOptions {
+    /// The file into which this run is recorded, if it is.
+    pub file: Option<PathBuf>,
+    /// Where clients may have runs recorded, if anywhere.
+    pub folder: Option<PathBuf>,
+}
+
+impl RecordOptions {
+    pub(super) fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Self {
+        Self {
+            file: given(&RECORD).map(|given| given.value.into()),
+            folder: given(&RECORD_DIR).map(|given| given.value.into()),
+        }
+    }
+}
+
+/// The record that is to be replayed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ReplayOptions {
+    /// The file.
+    pub file: PathBuf,
+}
+
+/// The name of the subcommand.
+pub(super) const REPLAY: &str = "replay";
+
+/// The subcommand as `clap` is to read it.
+pub(super) fn command() -> Command {
+    let file = Arg::new("file")
+        .value_name("FILE")
+        .value_parser(OsStringValueParser::new())
+        .required(true)
+        .help("A record that --record or /recorder/start has made");
+    Command::new(REPLAY)
+        .about("Take a recorded run's steps again, and say where they differ from the record")
+        .after_help("Exit status: 0 if every state is the same bit for bit, 1 if not.")
+        .arg(file)
+}
+
+/// Reads its arguments.
+pub(super) fn read(matches: &ArgMatches) -> ReplayOptions {
+    let file = matches.get_one::<OsString>("file");
+    ReplayOptions {
+        file: file.map(PathBuf::from).unwrap_or_default(),
+    }
+}

@@ -1,0 +1,291 @@
+//! Inputs to the arm as text: one JSON value each, which is read back bit for bit.
+//!
+//! **Invariant:** what is written of finite numbers and read again is the same; what does not fit the arm is refused.
+
+use serde::{Deserialize, Serialize};
+
+use crate::math::arm::{Arm, ArmError, State};
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::{ArmInput, Checkpoint};
+
+/// Something on which the arm's steps depend.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note<const N: usize> {
+    /// The whole simulation: the record begins here, or begins again where some of it was lost.
+    Begin(Box<Checkpoint<N>>),
+    /// A change from outside.
+    Input(ArmInput<N>),
+    /// The step from here on was not finite and was not taken.
+    Diverged,
+}
+
+/// Why a text is no note.
+#[derive(Debug, thiserror::Error)]
+pub enum NoteError {
+    /// Another text.
+    #[error("not an input: {0}")]
+    Text(#[from] serde_json::Error),
+    /// Not one number per joint.
+    #[error("{0} must have one number per joint")]
+    Count(
+        /// The field.
+        &'static str,
+    ),
+    /// No method of that name.
+    #[error("no method {0:?}")]
+    Method(
+        /// The name.
+        String,
+    ),
+    /// No timestep.
+    #[error("the timestep must be greater than 0")]
+    Timestep,
+    /// There can't be such an arm.
+    #[error(transparent)]
+    Arm(#[from] ArmError),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+enum Written {
+    Begin(Box<WrittenCheckpoint>),
+    Method(String),
+    Timestep(f64),
+    Params(WrittenArm),
+    Gains(WrittenGains),
+    Enable(bool),
+    Setpoint(WrittenState),
+    Disturb { effort: Vec<f64>, duration: f64 },
+    Reset,
+    Diverged,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WrittenArm {
+    gravity: f64,
+    masses: Vec<f64>,
+    lengths: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WrittenGains {
+    kp: Vec<f64>,
+    ki: Vec<f64>,
+    kd: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WrittenState {
+    position: Vec<f64>,
+    velocity: Vec<f64>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct WrittenCheckpoint {
+    links: usize,
+    params: WrittenArm,
+    gains: WrittenGains,
+    setpoint: WrittenState,
+    integral: Vec<f64>,
+    enabled: bool,
+    method: String,
+    timestep: f64,
+    state: WrittenState,
+    carry: WrittenState,
+    effort: Vec<f64>,
+    disturbance: Option<(Vec<f64>, f64)>,
+    base: f64,
+    steps_since_base: u64,
+    steps: u64,
+    divergence: Option<(u64, f64)>,
+}
+
+/// The note as text.
+#[must_use]
+pub fn write_note<const N: usize>(note: &Note<N>) -> String {
+    let written = match note {
+        Note::Begin(checkpoint) => Written::Begin(Box::new(checkpoint.as_ref().into())),
+        Note::Diverged => Written::Diverged,
+        Note::Input(input) => match input {
+            ArmInput::Method(method) => Written::Method(method.name().to_owned()),
+            ArmInput::Timestep(timestep) => Written::Timestep(*timestep),
+            ArmInput::Arm(arm) => Written::Params(arm.into()),
+            ArmInput::Gains(gains) => Written::Gains(gains.into()),
+            ArmInput::Enabled(on) => Written::Enable(*on),
+            ArmInput::Setpoint(setpoint) => Written::Setpoint(WrittenState {
+                position: setpoint.position.to_vec(),
+                velocity: setpoint.velocity.to_vec(),
+            }),
+            ArmInput::Disturbance { effort, duration } => Written::Disturb {
+                effort: effort.to_vec(),
+                duration: *duration,
+            },
+            ArmInput::Reset => Written::Reset,
+        },
+    };
+    serde_json::to_string(&written).unwrap_or_default()
+}
+
+/// How many links the arm has with which a record begins; `None` if the note is no beginning.
+#[must_use]
+pub fn links(note: &str) -> Option<usize> {
+    match serde_json::from_str(note) {
+        Ok(Written::Begin(checkpoint)) => Some(checkpoint.links),
+        _ => None,
+    }
+}
+
+/// Reads a note.
+///
+/// # Errors
+/// If it is none, or none for an arm of `N` links.
+pub fn read_note<const N: usize>(note: &str) -> Result<Note<N>, NoteError> {
+    let input = match serde_json::from_str(note)? {
+        Written::Begin(checkpoint) => return Ok(Note::Begin(Box::new(checkpoint.read()?))),
+        Written::Diverged => return Ok(Note::Diverged),
+        Written::Method(name) => ArmInput::Method(method(name)?),
+        Written::Timestep(timestep) => ArmInput::Timestep(checked(timestep)?),
+        Written::Params(arm) => ArmInput::Arm(arm.read()?),
+        Written::Gains(gains) => ArmInput::Gains(gains.read()?),
+        Written::Enable(on) => ArmInput::Enabled(on),
+        Written::Setpoint(setpoint) => ArmInput::Setpoint(setpoint.setpoint()?),
+        Written::Disturb { effort, duration } => ArmInput::Disturbance {
+            effort: array("effort", &effort)?,
+            duration,
+        },
+        Written::Reset => ArmInput::Reset,
+    };
+    Ok(Note::Input(input))
+}
+
+fn array<const N: usize>(field: &'static str, values: &[f64]) -> Result<[f64; N], NoteError> {
+    values.try_into().map_err(|_| NoteError::Count(field))
+}
+
+fn method(name: String) -> Result<Method, NoteError> {
+    let found = Method::ALL.into_iter().find(|one| one.name() == name);
+    found.ok_or(NoteError::Method(name))
+}
+
+fn checked(timestep: f64) -> Result<f64, NoteError> {
+    let valid = timestep.is_finite() && timestep > 0.0;
+    valid.then_some(timestep).ok_or(NoteError::Timestep)
+}
+
+impl WrittenArm {
+    fn read<const N: usize>(&self) -> Result<Arm<N>, NoteError> {
+        let lengths = array("lengths", &self.lengths)?;
+        Ok(Arm::new(
+            lengths,
+            array("masses", &self.masses)?,
+            self.gravity,
+        )?)
+    }
+}
+
+impl<const N: usize> From<&Arm<N>> for WrittenArm {
+    fn from(arm: &Arm<N>) -> Self {
+        Self {
+            gravity: arm.gravity(),
+            masses: arm.masses().to_vec(),
+            lengths: arm.lengths().to_vec(),
+        }
+    }
+}
+
+impl WrittenGains {
+    fn read<const N: usize>(&self) -> Result<Gains<N>, NoteError> {
+        Ok(Gains {
+            kp: array("kp", &self.kp)?,
+            ki: array("ki", &self.ki)?,
+            kd: array("kd", &self.kd)?,
+        })
+    }
+}
+
+impl<const N: usize> From<&Gains<N>> for WrittenGains {
+    fn from(gains: &Gains<N>) -> Self {
+        Self {
+            kp: gains.kp.to_vec(),
+            ki: gains.ki.to_vec(),
+            kd: gains.kd.to_vec(),
+        }
+    }
+}
+
+impl WrittenState {
+    fn state<const N: usize>(&self) -> Result<State<N>, NoteError> {
+        Ok(State {
+            position: array("position", &self.position)?,
+            velocity: array("velocity", &self.velocity)?,
+        })
+    }
+
+    fn setpoint<const N: usize>(&self) -> Result<Setpoint<N>, NoteError> {
+        let State { position, velocity } = self.state()?;
+        Ok(Setpoint { position, velocity })
+    }
+}
+
+impl<const N: usize> From<&State<N>> for WrittenState {
+    fn from(state: &State<N>) -> Self {
+        Self {
+            position: state.position.to_vec(),
+            velocity: state.velocity.to_vec(),
+        }
+    }
+}
+
+impl<const N: usize> From<&Checkpoint<N>> for WrittenCheckpoint {
+    fn from(from: &Checkpoint<N>) -> Self {
+        let disturbance = from.disturbance.as_ref();
+        Self {
+            links: N,
+            params: (&from.arm).into(),
+            gains: (&from.gains).into(),
+            setpoint: WrittenState {
+                position: from.setpoint.position.to_vec(),
+                velocity: from.setpoint.velocity.to_vec(),
+            },
+            integral: from.integral.to_vec(),
+            enabled: from.enabled,
+            method: from.method.name().to_owned(),
+            timestep: from.timestep,
+            state: (&from.state).into(),
+            carry: (&from.carry).into(),
+            effort: from.effort.to_vec(),
+            disturbance: disturbance.map(|(effort, ends)| (effort.to_vec(), *ends)),
+            base: from.base,
+            steps_since_base: from.steps_since_base,
+            steps: from.steps,
+            divergence: from.divergence,
+        }
+    }
+}
+
+impl WrittenCheckpoint {
+    fn read<const N: usize>(self) -> Result<Checkpoint<N>, NoteError> {
+        let disturbance = match &self.disturbance {
+            Some((effort, ends)) => Some((array("disturbance", effort)?, *ends)),
+            None => None,
+        };
+        Ok(Checkpoint {
+            arm: self.params.read()?,
+            gains: self.gains.read()?,
+            setpoint: self.setpoint.setpoint()?,
+            integral: array("integral", &self.integral)?,
+            enabled: self.enabled,
+            method: method(self.method)?,
+            timestep: checked(self.timestep)?,
+            state: self.state.state()?,
+            carry: self.carry.state()?,
+            effort: array("effort", &self.effort)?,
+            disturbance,
+            base: self.base,
+            steps_since_base: self.steps_since_base,
+            steps: self.steps,
+            divergence: self.divergence,
+        })
+    }
+}

@@ -1,0 +1,103 @@
+//! Runs on record: an MCAP file with every topic as ROS 2 has it, with calls and answers, and with the inputs that make
+//! the run repeatable.
+//!
+//! Pure: entries in, bytes out, and back. Who makes the entries, and where the bytes go, is the
+//! [recorder](crate::actors::recorder)'s.
+//!
+//! **Invariant:** a file that was cut anywhere is readable up to its last whole chunk.
+
+mod journal;
+mod player;
+mod reader;
+mod schema;
+mod writer;
+
+use bytes::Bytes;
+
+pub use self::journal::{Note, NoteError, links, read_note, write_note};
+pub use self::player::{Difference, ReplayError, ReplayVerdict, replay};
+pub use self::reader::{Passage, ReadError, RecordEnding, Recording};
+pub use self::schema::{CALLS, INPUTS, STATES};
+pub use self::writer::{CHUNK_BYTES, RecordError, RunSettings, Scribe};
+use crate::protocol::catalog::{Service, Topic};
+
+/// Something to be recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RecordEntry {
+    /// When, in nanoseconds since 1970.
+    pub log_time: u64,
+    /// The rest.
+    pub content: Content,
+}
+
+/// The kinds of what is recorded.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Content {
+    /// A message of the runtime.
+    Published {
+        /// The topic.
+        topic: Topic,
+        /// The whole `publish` frame, as a client gets it.
+        frame: Bytes,
+    },
+    /// A client's message to the runtime.
+    Heard {
+        /// The topic.
+        topic: Topic,
+        /// The message, in JSON.
+        msg: Box<str>,
+    },
+    /// A client's call of one of the runtime's services.
+    Called {
+        /// The client's number.
+        client: u64,
+        /// The service.
+        service: Service,
+        /// The caller's `id`, in JSON; empty if there is none.
+        id: Box<str>,
+        /// The arguments, in JSON.
+        args: Box<str>,
+    },
+    /// The answer to such a call.
+    Answered {
+        /// The client's number.
+        client: u64,
+        /// The service.
+        service: Service,
+        /// The whole `service_response` frame.
+        frame: Bytes,
+    },
+    /// Something on which the arm's steps depend: a [note](write_note).
+    Input {
+        /// Steps taken before it took effect; goes on through resets.
+        step: u64,
+        /// The note.
+        note: String,
+    },
+    /// The arm's state.
+    State {
+        /// Steps taken, counted in the same way.
+        step: u64,
+        /// Joint positions \[rad\].
+        position: Vec<f64>,
+        /// Joint velocities \[rad/s\].
+        velocity: Vec<f64>,
+        /// Effort of the latest step \[N m\].
+        effort: Vec<f64>,
+    },
+}
+
+impl Content {
+    /// Bytes that it takes while it waits to be written.
+    #[must_use]
+    pub fn allocated(&self) -> usize {
+        let text = match self {
+            Self::Published { frame, .. } | Self::Answered { frame, .. } => frame.len(),
+            Self::Heard { msg, .. } => msg.len(),
+            Self::Called { id, args, .. } => id.len() + args.len(),
+            Self::Input { note, .. } => note.len(),
+            Self::State { position, .. } => 3 * size_of_val(position.as_slice()),
+        };
+        size_of::<RecordEntry>() + text
+    }
+}

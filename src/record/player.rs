@@ -1,0 +1,308 @@
+//! Takes the recorded steps again and compares every recorded state, bit for bit.
+//!
+//! **Invariant:** where inputs were lost the record begins again with the whole simulation; nothing is compared across
+//! that, and it is told.
+
+use std::fmt;
+use std::io::Read;
+
+use serde_json::Value;
+
+use super::journal::{Note, NoteError, links, read_note};
+use super::reader::{Passage, ReadError, RecordEnding, Recording};
+use super::schema::{INPUTS, STATES};
+use crate::math::simulation::Simulation;
+
+/// The outcome of a replay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReplayVerdict {
+    /// How many links the arm has.
+    pub links: usize,
+    /// Steps that were taken again.
+    pub steps: u64,
+    /// States that were compared.
+    pub states: u64,
+    /// Inputs that took effect again.
+    pub inputs: u64,
+    /// Where inputs are missing, because the queue was full: as often did the record begin again.
+    pub losses: u64,
+    /// The last step whose state was the same, or at which the record began.
+    pub agreed_to: u64,
+    /// The first difference; the replay ends there.
+    pub difference: Option<Difference>,
+    /// How the file ended, if it was read to its end.
+    pub ending: Option<RecordEnding>,
+}
+
+/// The first place at which the steps differ from the record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Difference {
+    /// Steps since the record's first, goes on through resets.
+    pub step: u64,
+    /// Simulation time there \[s\].
+    pub time: f64,
+    /// The values that differ.
+    pub what: String,
+}
+
+/// Why there is nothing to compare.
+#[derive(Debug, thiserror::Error)]
+pub enum ReplayError {
+    /// The file.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// An input that is none.
+    #[error("input before step {step}: {why}")]
+    Input {
+        /// Steps before it.
+        step: u64,
+        /// The fault.
+        why: NoteError,
+    },
+    /// A message without what it has to have.
+    #[error("{0}: a message is not as this version writes it")]
+    Shape(
+        /// The channel's topic.
+        String,
+    ),
+    /// No input at all, or no state behind one.
+    #[error("nothing to compare: it has no states of an arm")]
+    Empty,
+    /// Steps that run backwards.
+    #[error("step {step} comes after step {after}")]
+    Order {
+        /// The step.
+        step: u64,
+        /// The one before.
+        after: u64,
+    },
+}
+
+impl fmt::Display for ReplayVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            links,
+            steps,
+            states,
+            inputs,
+            ..
+        } = self;
+        write!(
+            f,
+            "{links} links, {steps} steps, {inputs} inputs, {states} states"
+        )?;
+        match &self.difference {
+            None => write!(f, ": the same, bit for bit")?,
+            Some(Difference { step, time, what }) => {
+                let same = self.agreed_to;
+                write!(
+                    f,
+                    ": the same up to step {same}, and at step {step} (t = {time:?} s) not: {what}"
+                )?;
+            }
+        }
+        if self.losses > 0 {
+            write!(
+                f,
+                "; {} gaps, which nothing is known of, were left out",
+                self.losses
+            )?;
+        }
+        if self.ending == Some(RecordEnding::Cut) {
+            write!(f, "; the file ends early, and was read up to there")?;
+        }
+        Ok(())
+    }
+}
+
+/// Replays a record.
+///
+/// # Errors
+/// If the file can't be read, or holds nothing to compare.
+pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
+    let mut recording = Recording::new(file);
+    let first = loop {
+        let Some(passage) = recording.next_passage()? else {
+            return Err(ReplayError::Empty);
+        };
+        if passage.topic == INPUTS {
+            break passage;
+        }
+    };
+    match links(text(&first, "input")?) {
+        Some(2) => play::<2>(recording, first),
+        Some(3) => play::<3>(recording, first),
+        _ => Err(ReplayError::Empty),
+    }
+}
+
+fn play<const N: usize>(
+    mut recording: Recording<impl Read>,
+    first: Passage,
+) -> Result<ReplayVerdict, ReplayError> {
+    let mut player = Player::<N> {
+        arm: None,
+        verdict: ReplayVerdict {
+            links: N,
+            steps: 0,
+            states: 0,
+            inputs: 0,
+            losses: 0,
+            agreed_to: 0,
+            difference: None,
+            ending: None,
+        },
+    };
+    let mut next = Some(first);
+    while let Some(passage) = next {
+        player.take(&passage)?;
+        if player.verdict.difference.is_some() {
+            return Ok(player.verdict);
+        }
+        next = recording.next_passage()?;
+    }
+    player.verdict.ending = recording.ending();
+    if player.verdict.states == 0 {
+        return Err(ReplayError::Empty);
+    }
+    Ok(player.verdict)
+}
+
+struct Player<const N: usize> {
+    /// The simulation, and the steps it has taken as the record counts them; none before the record begins.
+    arm: Option<(Simulation<N>, u64)>,
+    verdict: ReplayVerdict,
+}
+
+impl<const N: usize> Player<N> {
+    fn take(&mut self, passage: &Passage) -> Result<(), ReplayError> {
+        match passage.topic.as_str() {
+            INPUTS => self.input(passage),
+            STATES => self.state(passage),
+            _ => Ok(()),
+        }
+    }
+
+    fn input(&mut self, passage: &Passage) -> Result<(), ReplayError> {
+        let step = number(passage, "step")?;
+        let note = read_note(text(passage, "input")?);
+        let note = note.map_err(|why| ReplayError::Input { step, why })?;
+        if let Note::Begin(checkpoint) = note {
+            self.verdict.losses += u64::from(self.arm.is_some());
+            self.verdict.agreed_to = step;
+            self.arm = Some((Simulation::continued(&checkpoint), step));
+            return Ok(());
+        }
+        if !self.advance(step)? {
+            return Ok(());
+        }
+        let Some((simulation, _)) = &mut self.arm else {
+            return Ok(());
+        };
+        self.verdict.inputs += 1;
+        match note {
+            Note::Input(input) => simulation.apply(input),
+            Note::Diverged if simulation.step() => {
+                self.differs(
+                    step,
+                    "the step from here on was not finite, and is".to_owned(),
+                );
+            }
+            Note::Diverged | Note::Begin(_) => {}
+        }
+        Ok(())
+    }
+
+    fn state(&mut self, passage: &Passage) -> Result<(), ReplayError> {
+        let step = number(passage, "step")?;
+        if !self.advance(step)? {
+            return Ok(());
+        }
+        let Some((simulation, _)) = &self.arm else {
+            return Ok(());
+        };
+        let state = simulation.state();
+        let ours = [
+            ("position", &state.position),
+            ("velocity", &state.velocity),
+            ("effort", simulation.effort()),
+        ];
+        let mut unlike = Vec::new();
+        for (name, ours) in ours {
+            let recorded = numbers(passage, name)?;
+            for (joint, (recorded, ours)) in recorded.iter().zip(ours).enumerate() {
+                if recorded.to_bits() != ours.to_bits() {
+                    unlike.push(format!("{name}[{joint}] was {recorded:?} and is {ours:?}"));
+                }
+            }
+            if recorded.len() != N {
+                return Err(shape(passage));
+            }
+        }
+        self.verdict.states += 1;
+        if unlike.is_empty() {
+            self.verdict.agreed_to = step;
+        } else {
+            self.differs(step, unlike.join(", "));
+        }
+        Ok(())
+    }
+
+    /// Takes the steps up to that one; false if there is nothing to compare there.
+    fn advance(&mut self, step: u64) -> Result<bool, ReplayError> {
+        let Some((simulation, at)) = &mut self.arm else {
+            return Ok(false);
+        };
+        let due = step.checked_sub(*at);
+        let due = due.ok_or(ReplayError::Order { step, after: *at })?;
+        let taken = simulation.advance(due);
+        *at += taken;
+        self.verdict.steps += taken;
+        if taken < due {
+            let at = *at;
+            self.differs(
+                at,
+                "the step from here on was finite, and is not".to_owned(),
+            );
+            return Ok(false);
+        }
+        Ok(true)
+    }
+
+    fn differs(&mut self, step: u64, what: String) {
+        let time = self.arm.as_ref().map_or(f64::NAN, |(arm, _)| arm.time());
+        self.verdict.difference = Some(Difference { step, time, what });
+    }
+}
+
+fn shape(passage: &Passage) -> ReplayError {
+    ReplayError::Shape(passage.topic.clone())
+}
+
+fn member<'a>(passage: &'a Passage, name: &str) -> Result<&'a Value, ReplayError> {
+    let msg = passage.msg.as_ref();
+    msg.and_then(|msg| msg.get(name))
+        .ok_or_else(|| shape(passage))
+}
+
+fn text<'a>(passage: &'a Passage, name: &str) -> Result<&'a str, ReplayError> {
+    member(passage, name)?
+        .as_str()
+        .ok_or_else(|| shape(passage))
+}
+
+fn number(passage: &Passage, name: &str) -> Result<u64, ReplayError> {
+    member(passage, name)?
+        .as_u64()
+        .ok_or_else(|| shape(passage))
+}
+
+fn numbers(passage: &Passage, name: &str) -> Result<Vec<f64>, ReplayError> {
+    let values = member(passage, name)?.as_array();
+    let values = values.ok_or_else(|| shape(passage))?;
+    // A number that is not finite is `null`.
+    Ok(values
+        .iter()
+        .map(|one| one.as_f64().unwrap_or(f64::NAN))
+        .collect())
+}

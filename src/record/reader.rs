@@ -1,0 +1,131 @@
+//! Reads a record back, message by message, as far as the file goes.
+//!
+//! **Invariant:** of a chunk that was damaged nothing is read; a message is read by the definition that is ours, one
+//! that was recorded by another is left out.
+
+use std::collections::HashMap;
+use std::io::Read;
+
+use mcap::McapError;
+use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
+use serde_json::Value;
+
+use super::schema::{CALL, INPUT, STATE};
+use crate::protocol::catalog::types::{self, Type};
+use crate::protocol::ros::cdr_reader::{self, CdrError};
+
+/// Longest chunk that is read: longer ones are never written.
+const MAX_CHUNK: usize = 16 * 1024 * 1024;
+
+/// A message of the record.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Passage {
+    /// When, in nanoseconds since 1970.
+    pub log_time: u64,
+    /// The channel's topic.
+    pub topic: String,
+    /// Its number on that channel, from 1.
+    pub sequence: u32,
+    /// The message; none if its type is not as we know it.
+    pub msg: Option<Value>,
+}
+
+/// How a file ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RecordEnding {
+    /// As it should.
+    Whole,
+    /// It was cut, or the program that wrote it was killed.
+    Cut,
+}
+
+/// Why a file can't be read on.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// It is no MCAP file, or damaged.
+    #[error("not a record: {0}")]
+    Mcap(#[from] McapError),
+    /// A message that its definition does not fit.
+    #[error("{topic}: {why}")]
+    Message {
+        /// The channel's topic.
+        topic: String,
+        /// The fault.
+        why: CdrError,
+    },
+}
+
+/// A record that is being read.
+pub struct Recording<R> {
+    reader: MessageReader<R>,
+    /// By schema id: the type, if it is as we know it.
+    known: HashMap<u16, Option<Type>>,
+    ending: Option<RecordEnding>,
+}
+
+impl<R: Read> Recording<R> {
+    /// Begins to read.
+    pub fn new(file: R) -> Self {
+        let options = LinearReaderOptions::default()
+            .with_prevalidate_chunk_crcs(true)
+            .with_record_length_limit(MAX_CHUNK);
+        Self {
+            reader: MessageReader::new_with_options(file, options),
+            known: HashMap::new(),
+            ending: None,
+        }
+    }
+
+    /// The next message; none at the end.
+    ///
+    /// # Errors
+    /// If the file is damaged before its end.
+    pub fn next_passage(&mut self) -> Result<Option<Passage>, ReadError> {
+        let message = match self.reader.next() {
+            Some(Ok(message)) => message,
+            Some(Err(McapError::UnexpectedEof)) => {
+                self.ending = Some(RecordEnding::Cut);
+                return Ok(None);
+            }
+            Some(Err(error)) => return Err(error.into()),
+            None => {
+                self.ending.get_or_insert(RecordEnding::Whole);
+                return Ok(None);
+            }
+        };
+        let topic = message.channel.topic.clone();
+        let schema = message.channel.schema.as_ref();
+        let one = schema.and_then(|schema| {
+            let known = self.known.entry(schema.id);
+            *known.or_insert_with(|| known_type(&schema.name, &schema.data))
+        });
+        let read = |one| {
+            cdr_reader::decode(one, &message.data).map_err(|why| ReadError::Message {
+                topic: topic.clone(),
+                why,
+            })
+        };
+        let msg = one.map(read).transpose()?;
+        Ok(Some(Passage {
+            log_time: message.log_time,
+            topic,
+            sequence: message.sequence,
+            msg,
+        }))
+    }
+
+    /// How the file ended; none while it has not.
+    #[must_use]
+    pub fn ending(&self) -> Option<RecordEnding> {
+        self.ending
+    }
+}
+
+/// The type of that name, if it is defined as we define it.
+fn known_type(name: &str, definition: &[u8]) -> Option<Type> {
+    let own = [INPUT, STATE, CALL];
+    let own = own.into_iter().find(|one| one.name == name);
+    let one = own.or_else(|| types::find(name))?;
+    (types::definition(one).as_bytes() == definition).then_some(one)
+}

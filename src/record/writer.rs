@@ -1,0 +1,279 @@
+//! Writes a record: entries in, MCAP out, in chunks that are whole whenever they are written.
+//!
+//! **Invariant:** each channel's messages are numbered from 1 in the order in which they are written.
+
+use std::collections::{BTreeMap, HashMap};
+use std::io::{self, Write};
+
+use mcap::records::{MessageHeader, Metadata};
+use mcap::write::NoSeek;
+use mcap::{McapError, WriteOptions, Writer};
+use serde::Deserialize;
+use serde_json::value::RawValue;
+use serde_json::{Value, json};
+
+use super::schema::{CALL, CALLS, INPUT, INPUTS, STATE, STATES};
+use super::{Content, RecordEntry};
+use crate::protocol::catalog::types::{self, Type};
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::ros::cdr;
+
+/// Length of a chunk, from which on it is written without waiting for the next second.
+pub const CHUNK_BYTES: u64 = 64 * 1024;
+
+/// Facts about the run besides its inputs.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RunSettings {
+    /// How many links the arm has.
+    pub links: usize,
+    /// The seed of the targets of timed trials.
+    pub seed: u64,
+}
+
+/// Why something was not recorded.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file takes no more.
+    #[error("the file cannot be written: {0}")]
+    File(#[from] io::Error),
+    /// The MCAP library refuses.
+    #[error("the file cannot be written: {0}")]
+    Mcap(McapError),
+    /// A frame of ours that cannot be read back.
+    #[error("a frame cannot be read: {0}")]
+    Frame(#[from] serde_json::Error),
+}
+
+impl From<McapError> for RecordError {
+    fn from(error: McapError) -> Self {
+        match error {
+            McapError::Io(error) => Self::File(error),
+            error => Self::Mcap(error),
+        }
+    }
+}
+
+/// Writes entries into a file.
+pub struct Scribe<W: Write> {
+    writer: Writer<NoSeek<W>>,
+    channels: HashMap<&'static str, Channel>,
+    messages: u64,
+    bytes: u64,
+}
+
+struct Channel {
+    id: u16,
+    sequence: u32,
+}
+
+#[derive(Deserialize)]
+struct PublishFrame {
+    msg: Value,
+}
+
+#[derive(Deserialize)]
+struct ResponseFrame<'a> {
+    #[serde(borrow)]
+    id: Option<&'a RawValue>,
+    #[serde(borrow)]
+    values: &'a RawValue,
+    result: bool,
+    status: String,
+}
+
+impl<W: Write> Scribe<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// If it can't be written.
+    pub fn new(file: W, settings: &RunSettings) -> Result<Self, RecordError> {
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("pendularm ", env!("CARGO_PKG_VERSION")))
+            .compression(None)
+            .chunk_size(Some(CHUNK_BYTES))
+            // A chunk is kept until it is whole: what is in the file is always the beginning of a good one.
+            .disable_seeking(true);
+        let mut writer = options.create(NoSeek::new(file))?;
+        let facts = [
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("links", settings.links.to_string()),
+            ("seed", settings.seed.to_string()),
+        ];
+        writer.write_metadata(&Metadata {
+            name: env!("CARGO_PKG_NAME").to_owned(),
+            metadata: facts.map(|(key, value)| (key.to_owned(), value)).into(),
+        })?;
+        writer.flush()?;
+        Ok(Self {
+            writer,
+            channels: HashMap::new(),
+            messages: 0,
+            bytes: 0,
+        })
+    }
+
+    /// Writes an entry.
+    ///
+    /// # Errors
+    /// If the file takes no more, or the entry is none.
+    pub fn write(&mut self, entry: &RecordEntry) -> Result<(), RecordError> {
+        let at = entry.log_time;
+        match &entry.content {
+            Content::Published { topic, frame } => {
+                let frame: PublishFrame = serde_json::from_slice(frame)?;
+                self.message(at, topic, &frame.msg)
+            }
+            Content::Heard { topic, msg } => self.message(at, topic, &serde_json::from_str(msg)?),
+            Content::Called {
+                client,
+                service,
+                id,
+                args,
+            } => self.call(at, *client, *service, &Said::call(id, args)),
+            Content::Answered {
+                client,
+                service,
+                frame,
+            } => {
+                let frame: ResponseFrame = serde_json::from_slice(frame)?;
+                self.call(at, *client, *service, &Said::answer(&frame))
+            }
+            Content::Input { step, note } => {
+                self.put(at, INPUTS, INPUT, &json!({"step": step, "input": note}))
+            }
+            Content::State {
+                step,
+                position,
+                velocity,
+                effort,
+            } => {
+                let msg = json!({"step": step, "position": position, "velocity": velocity, "effort": effort});
+                self.put(at, STATES, STATE, &msg)
+            }
+        }
+    }
+
+    /// Everything so far is in the file.
+    ///
+    /// # Errors
+    /// If the file takes no more.
+    pub fn flush(&mut self) -> Result<(), RecordError> {
+        Ok(self.writer.flush()?)
+    }
+
+    /// Ends the file, with an index of what is in it.
+    ///
+    /// # Errors
+    /// If the file takes no more.
+    pub fn finish(mut self) -> Result<W, RecordError> {
+        self.writer.finish()?;
+        let mut file = self.writer.into_inner().into_inner();
+        file.flush()?;
+        Ok(file)
+    }
+
+    /// Messages written so far.
+    #[must_use]
+    pub fn messages(&self) -> u64 {
+        self.messages
+    }
+
+    /// Bytes of these messages.
+    #[must_use]
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    fn message(&mut self, at: u64, topic: &Topic, msg: &Value) -> Result<(), RecordError> {
+        match types::find(topic.type_name()) {
+            Some(one) => self.put(at, topic.name(), one, msg),
+            None => Ok(()),
+        }
+    }
+
+    fn call(
+        &mut self,
+        at: u64,
+        client: u64,
+        service: Service,
+        said: &Said<'_>,
+    ) -> Result<(), RecordError> {
+        let msg = json!({
+            "client": client,
+            "id": said.id,
+            "service": service.name(),
+            "type": service.type_name(),
+            "is_answer": said.is_answer,
+            "content": said.content,
+            "result": said.result,
+            "status": said.status,
+        });
+        self.put(at, CALLS, CALL, &msg)
+    }
+
+    fn put(
+        &mut self,
+        at: u64,
+        topic: &'static str,
+        one: Type,
+        msg: &Value,
+    ) -> Result<(), RecordError> {
+        if !self.channels.contains_key(topic) {
+            let text = types::definition(one);
+            let schema = self
+                .writer
+                .add_schema(one.name, "ros2msg", text.as_bytes())?;
+            let id = self
+                .writer
+                .add_channel(schema, topic, "cdr", &BTreeMap::new())?;
+            self.channels.insert(topic, Channel { id, sequence: 0 });
+        }
+        let Some(channel) = self.channels.get_mut(topic) else {
+            return Ok(());
+        };
+        channel.sequence = channel.sequence.wrapping_add(1);
+        let header = MessageHeader {
+            channel_id: channel.id,
+            sequence: channel.sequence,
+            log_time: at,
+            publish_time: at,
+        };
+        let data = cdr::encode(one, msg);
+        self.writer.write_to_known_channel(&header, &data)?;
+        self.messages += 1;
+        self.bytes += data.len() as u64;
+        Ok(())
+    }
+}
+
+/// A call or an answer, as it is recorded.
+struct Said<'a> {
+    id: &'a str,
+    is_answer: bool,
+    content: &'a str,
+    result: bool,
+    status: &'a str,
+}
+
+impl<'a> Said<'a> {
+    fn call(id: &'a str, args: &'a str) -> Self {
+        Self {
+            id,
+            is_answer: false,
+            content: args,
+            result: false,
+            status: "",
+        }
+    }
+
+    fn answer(frame: &'a ResponseFrame<'a>) -> Self {
+        Self {
+            id: frame.id.map_or("", RawValue::get),
+            is_answer: true,
+            content: frame.values.get(),
+            result: frame.result,
+            status: &frame.status,
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! The limits of one arm with one set of gains, predicted and measured, and the words for them.
+//!
+//! **Invariant:** a limit that was not measured is said to be none, not guessed.
+
+use crate::math::arm::Arm;
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+use crate::report::making::Making;
+use crate::study::control_loop::ControlLoop;
+use crate::study::stability::Sampling;
+
+/// Measured and predicted limits may differ by this part.
+pub(super) const AGREEMENT: f64 = 0.01;
+
+/// One line of the table of limits.
+pub(super) struct LimitRow {
+    pub(super) links: usize,
+    pub(super) gains: &'static str,
+    pub(super) method: Method,
+    pub(super) sampling: Sampling,
+    pub(super) predicted: f64,
+    pub(super) measured: Option<f64>,
+    pub(super) over_poses: Option<f64>,
+    pub(super) advised: Option<f64>,
+}
+
+impl LimitRow {
+    pub(super) fn ratio(&self) -> Option<f64> {
+        Some(self.measured? / self.predicted)
+    }
+}
+
+/// How much of the section is done.
+pub(super) struct Meter {
+    pub(super) done: usize,
+    pub(super) of: usize,
+}
+
+impl Meter {
+    pub(super) fn add(&mut self, making: &mut Making<'_>, work: usize) {
+        self.done += work;
+        making.at(self.done, self.of);
+    }
+}
+
+/// A sampling in words.
+pub(super) fn in_words(sampling: Sampling) -> &'static str {
+    match sampling {
+        Sampling::Held => "effort held for the step (as shipped)",
+        Sampling::Continuous => "law in every stage",
+    }
+}
+
+/// The words with a capital letter.
+pub(super) fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// The 2-link arm with the shipped gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
+pub(super) fn stiffened(factor: f64) -> ControlLoop<2> {
+    let Gains { kp, ki, kd } = Gains::<2>::default();
+    let gains = Gains {
+        kp: kp.map(|kp| kp * factor),
+        ki: ki.map(|ki| ki * factor.powf(1.5)),
+        kd: kd.map(|kd| kd * factor.sqrt()),
+    };
+    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
+}
+
+/// The line of the 2-link arm with its shipped gains.
+pub(super) fn shipped(lines: &[LimitRow], sampling: Sampling, method: Method) -> Option<&LimitRow> {
+    lines.iter().find(|line| {
+        line.links == 2
+            && line.gains == "shipped"
+            && line.sampling == sampling
+            && line.method == method
+    })
+}

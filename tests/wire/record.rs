@@ -1,0 +1,253 @@
+//! Runs on record, by the built program: files that are whole, files that were left, and what is not written at all.
+
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+use pendularm::actors::recorder::limits::MAX_FILE_NAME;
+use pendularm::record::{
+    CALLS, Content, INPUTS, Passage, RecordEnding, RecordEntry, Recording, RunSettings, STATES,
+    Scribe, replay,
+};
+use serde_json::{Value, json};
+
+use crate::common::{PATIENCE, Runtime};
+
+/// An empty folder of this test's own.
+fn folder(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("record-{name}"));
+    let _ = fs::remove_dir_all(&folder);
+    fs::create_dir_all(&folder).unwrap();
+    folder
+}
+
+fn passages(file: &Path) -> (Vec<Passage>, RecordEnding) {
+    let mut recording = Recording::new(File::open(file).unwrap());
+    let mut passages = Vec::new();
+    while let Some(passage) = recording.next_passage().unwrap() {
+        passages.push(passage);
+    }
+    (passages, recording.ending().unwrap())
+}
+
+/// Whether the file holds a call with these arguments.
+fn holds_call(file: &Path, args: &str) -> bool {
+    let (passages, _) = passages(file);
+    passages.iter().any(|one| {
+        let content = one.msg.as_ref().map(|msg| &msg["content"]);
+        one.topic == CALLS && content == Some(&Value::from(args))
+    })
+}
+
+/// The program with other arguments than serving: its exit status and what it says.
+fn run(arguments: &[&str]) -> (Option<i32>, String) {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_pendularm"));
+    let output = program.args(arguments).output().unwrap();
+    let said = [output.stdout, output.stderr].concat();
+    (output.status.code(), String::from_utf8(said).unwrap())
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn end(mut runtime: Runtime) {
+    let pid = runtime.pid().to_string();
+    let killed = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
+    assert!(killed.success());
+    let status = runtime.wait(PATIENCE).expect("it ends");
+    assert!(status.success());
+}
+
+#[test]
+fn a_run_is_recorded_whole_and_replayed() {
+    let file = folder("whole").join("run.mcap");
+    let runtime = Runtime::with(&["--links", "3", "--seed", "5", "--record", text(&file)]);
+    let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.ask("/ik_trial/start", json!({"duration": 60}));
+    client.subscribe("/joint_states");
+    for _ in 0..30 {
+        client.message("/joint_states");
+    }
+    client.ask("/arm_sim/reset", json!({}));
+    end(runtime);
+
+    let (passages, ending) = passages(&file);
+    assert_eq!(ending, RecordEnding::Whole);
+    for topic in [INPUTS, STATES, CALLS, "/joint_states", "/tf", "/clock"] {
+        assert!(passages.iter().any(|one| one.topic == topic), "{topic}");
+    }
+    let verdict = replay(File::open(&file).unwrap()).unwrap();
+    assert_eq!((verdict.links, verdict.difference), (3, None));
+    assert!(verdict.inputs >= 3 && verdict.states >= 20);
+
+    let (status, said) = run(&["replay", text(&file)]);
+    assert_eq!(status, Some(0), "{said}");
+    assert!(said.ends_with("the same, bit for bit\n"), "{said}");
+}
+
+#[test]
+fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
+    let file = folder("killed").join("run.mcap");
+    let mut runtime = Runtime::with(&["--record", text(&file)]);
+    let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.ask("/arm_sim/set_params", json!({"gravity": 4.25}));
+    let deadline = Instant::now() + PATIENCE;
+    while !holds_call(&file, "{\"gravity\":4.25}") {
+        assert!(Instant::now() < deadline, "it is not flushed");
+        std::thread::sleep(std::time::Duration::from_millis(50));
+    }
+    let pid = runtime.pid().to_string();
+    let killed = Command::new("kill").args(["-KILL", &pid]).status().unwrap();
+    assert!(killed.success());
+    runtime.wait(PATIENCE).expect("it is dead");
+
+    assert!(holds_call(&file, "{\"gravity\":4.25}"));
+    let (status, said) = run(&["replay", text(&file)]);
+    assert_eq!(status, Some(0), "{said}");
+    assert!(
+        said.contains("the same, bit for bit; the file ends early"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
+    let file = folder("differs").join("run.mcap");
+    let settings = RunSettings { links: 2, seed: 0 };
+    let mut scribe = Scribe::new(File::create(&file).unwrap(), &settings).unwrap();
+    let runtime_file = folder("differs-from").join("run.mcap");
+    let runtime = Runtime::with(&["--record", text(&runtime_file)]);
+    let mut client = runtime.connect();
+    client.subscribe("/joint_states");
+    for _ in 0..10 {
+        client.message("/joint_states");
+    }
+    end(runtime);
+    // The same run, with another gravity at its beginning.
+    let mut write = |content| {
+        let log_time = 0;
+        scribe.write(&RecordEntry { log_time, content }).unwrap();
+    };
+    let numbers = |msg: &Value, name: &str| -> Vec<f64> {
+        let numbers = msg[name].as_array().unwrap().iter();
+        numbers.map(|one| one.as_f64().unwrap()).collect()
+    };
+    for passage in passages(&runtime_file).0 {
+        let msg = passage.msg.unwrap();
+        let step = msg["step"].as_u64();
+        match passage.topic.as_str() {
+            INPUTS => write(Content::Input {
+                step: step.unwrap(),
+                note: msg["input"].as_str().unwrap().replace("9.81", "9.80"),
+            }),
+            STATES => write(Content::State {
+                step: step.unwrap(),
+                position: numbers(&msg, "position"),
+                velocity: numbers(&msg, "velocity"),
+                effort: numbers(&msg, "effort"),
+            }),
+            _ => {}
+        }
+    }
+    scribe.finish().unwrap();
+    let (status, said) = run(&["replay", text(&file)]);
+    assert_eq!(status, Some(1), "{said}");
+    assert!(
+        said.contains(": the same up to step ") && said.contains(", and at step "),
+        "{said}"
+    );
+}
+
+#[test]
+fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
+    let folder = folder("refused");
+    let there = folder.join("there.mcap");
+    fs::write(&there, "precious").unwrap();
+    let (status, said) = run(&[
+        "--bind",
+        "127.0.0.1:0",
+        "--log",
+        "off",
+        "--record",
+        text(&there),
+    ]);
+    assert_eq!(status, Some(1));
+    assert!(said.contains("cannot record: there.mcap: "), "{said}");
+    assert_eq!(fs::read_to_string(&there).unwrap(), "precious");
+
+    let (status, said) = run(&["replay", text(&there)]);
+    assert_eq!(status, Some(1));
+    assert!(said.contains("there.mcap: not a record: "), "{said}");
+    let (status, said) = run(&["replay", text(&folder.join("nowhere.mcap"))]);
+    assert_eq!(status, Some(1));
+    assert!(said.contains("nowhere.mcap: "), "{said}");
+    let (status, _) = run(&["replay"]);
+    assert_eq!(status, Some(2));
+}
+
+#[test]
+fn clients_record_into_the_operators_folder_and_nowhere_else() {
+    let folder = folder("service");
+    let runtime = Runtime::with(&["--record-dir", text(&folder)]);
+    let mut client = runtime.connect();
+    let nothing = client.call("/recorder/stop", json!({}));
+    assert_eq!(nothing["status"], "nothing is being recorded");
+    let long = "x".repeat(MAX_FILE_NAME + 1);
+    for name in [
+        "../x", "/x", "a/b", ".hidden", "", "a\\b", "a b", "\u{e9}", "x\0", &long,
+    ] {
+        let refused = client.call("/recorder/start", json!({"name": name}));
+        assert_eq!(refused["result"], false, "{name:?}");
+        let status = refused["status"].as_str().unwrap();
+        assert!(
+            status.starts_with("name must be 1 to 64 "),
+            "{name:?}: {status}"
+        );
+    }
+    assert_eq!(fs::read_dir(&folder).unwrap().count(), 0);
+
+    let begun = client.ask("/recorder/start", json!({"name": "lesson-1"}));
+    assert_eq!(begun["file"], "lesson-1.mcap");
+    let again = client.call("/recorder/start", json!({}));
+    assert_eq!(again["status"], "already recording to lesson-1.mcap");
+    client.ask(
+        "/arm_sim/disturb",
+        json!({"effort": [3.0, 0.0], "duration": 0.1}),
+    );
+    client.subscribe("/joint_states");
+    for _ in 0..5 {
+        client.message("/joint_states");
+    }
+    let ended = client.ask("/recorder/stop", json!({}));
+    assert_eq!(ended["file"], "lesson-1.mcap");
+    assert_eq!(ended["dropped"], 0);
+    let file = folder.join("lesson-1.mcap");
+    let (passages, ending) = passages(&file);
+    assert_eq!(ending, RecordEnding::Whole);
+    assert_eq!(ended["messages"], passages.len());
+    assert_eq!(replay(File::open(&file).unwrap()).unwrap().difference, None);
+
+    let taken = client.call("/recorder/start", json!({"name": "lesson-1.mcap"}));
+    assert_eq!(taken["result"], false, "no record is overwritten: {taken}");
+    let made_up = client.ask("/recorder/start", json!({}));
+    assert!(folder.join(made_up["file"].as_str().unwrap()).exists());
+    client.ask("/recorder/stop", json!({}));
+}
+
+#[test]
+fn without_a_folder_clients_neither_begin_nor_end_a_record() {
+    let file = folder("operators").join("run.mcap");
+    let runtime = Runtime::with(&["--record", text(&file)]);
+    let mut client = runtime.connect();
+    for service in ["/recorder/start", "/recorder/stop"] {
+        let refused = client.call(service, json!({}));
+        let status = refused["status"].as_str().unwrap();
+        assert!(status.contains("--record-dir"), "{status}");
+    }
+    end(runtime);
+    assert_eq!(passages(&file).1, RecordEnding::Whole);
+}
