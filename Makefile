@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -29,6 +29,10 @@ test: ## Run every test but those of the page
 test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"
 	$(CARGO) test --locked --test wire -- faults_slow:: memory_slow:: --ignored --nocapture --test-threads 1
+
+check-study: ## Try every answer of the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n
+	@echo "make check-study: an optimised build, then some minutes for each 10000"
+	COUNT="$(or $(COUNT),10000)" FROM="$(or $(FROM),0)" $(CARGO) test --locked --release --test study -- properties:: --nocapture
 
 test-page: node_modules ## Check the page's types and try its logic without a browser; needs node 20 with npm
 	@echo "make test-page: types, then unit tests"

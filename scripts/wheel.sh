@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the Python wheel: wheel.sh PROGRAM. The release program goes in as it is, beside the library; maturin comes from PyPI into
-# python/.venv. The wheel is left in python/target/wheels/, alone.
+# Builds the Python wheel: wheel.sh PROGRAM. The release program goes in as it is, beside the library; maturin comes
+# from PyPI into python/.venv. The wheel is left in python/target/wheels/, alone.
 set -euo pipefail
 program=$(realpath "$1")
 cd "$(dirname "$0")/../python"

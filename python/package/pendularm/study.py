@@ -90,7 +90,7 @@ class Rollout:
     wall_time: float
     """How long the run took by itself [s]."""
     error: float | None
-    """Largest distance of a joint from the reference [rad]; `None` without one, or where it is not known well enough."""
+    """Largest distance of a joint from the reference [rad]; `None` without one, or where it is not known so well."""
     error_uncertainty: float | None
     """Largest distance of two references from each other [rad]."""
     divergence: tuple[int, float] | None
@@ -149,8 +149,8 @@ def suggest_gains(
 ) -> SuggestedGains:
     """Finds gains for an arm and a timestep [s], as ``/study/gains`` does.
 
-    The smallest stable timestep over all poses is to be `margin` timesteps, 1 at least, and ten moves are to settle within
-    `settling_time` [s]. Raises `ValueError` where there are none.
+    The smallest stable timestep over all poses is to be `margin` timesteps, 1 at least, and ten moves are to settle
+    within `settling_time` [s]. Raises `ValueError` where there are none.
     """
     return SuggestedGains(
         **_native.suggest_gains(
@@ -170,9 +170,9 @@ def stability(
 ) -> Stability:
     """Predicts the largest timestep at which a control loop is stable, as ``/study/stability`` does.
 
-    `gains` are `kp`, `ki` and `kd`, (links,) each; those that are left out are the default ones, and zeros ask about an arm
-    left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state from which the
-    motion is ahead.
+    `gains` are `kp`, `ki` and `kd`, (links,) each; those that are left out are the default ones, and zeros ask about
+    an arm left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state
+    from which the motion is ahead.
     """
     found = _native.stability(
         arm, integrator=integrator, gains=None if gains is None else dict(gains), setpoint=setpoint, q=q, qd=qd
@@ -196,9 +196,9 @@ def rollout(
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
-    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start and end
-    among them, or every step if there are fewer. Without `gains` nothing controls the arm, and a member that is left out is
-    zeros. With `reference` the run is compared with the true motion under the same held control law.
+    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start
+    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and a member that
+    is left out is zeros. With `reference` the run is compared with the true motion under the same held control law.
     """
     return Rollout(
         **_native.rollout(
@@ -226,11 +226,12 @@ def plan(
     gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
 ) -> Plan:
-    """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan`` does.
+    """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan``
+    does.
 
-    Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s]; with
-    them it moves to `setpoint` [rad] (4 s unless given), and holding the effort counts as error. Raises `ValueError` where the
-    motion cannot be known so well for so long.
+    Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s];
+    with them it moves to `setpoint` [rad] (4 s unless given), and holding the effort counts as error. Raises
+    `ValueError` where the motion cannot be known so well for so long.
     """
     return Plan(
         **_native.plan(

@@ -1,6 +1,7 @@
 """Many settings of one question: on this machine's cores, or on a cluster by way of an executor.
 
-A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor the size of a piece changes a bit of the results.
+A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor the size of a piece changes a bit of the
+results.
 """
 
 import json
@@ -90,7 +91,7 @@ def final_error(run: Run) -> Floats:
 
 
 def settling_time(run: Run) -> Floats:
-    """Time from which on every joint is within 0.02 rad of its setpoint [s]; infinite where that is not so at the end."""
+    """Time from which on every joint is within 0.02 rad of its setpoint [s]; infinite where it is not so at the end."""
     away: NDArray[np.bool_] = np.any(np.abs(run.positions - run.setpoint) > SETTLED, axis=2)
     still = np.cumsum(away[::-1], axis=0)[::-1] == 0
     first = np.argmax(still, axis=0)
@@ -131,18 +132,19 @@ def sweep(
 ) -> Sweep:
     """Runs an arm for every combination of the settings in `grid`, and answers what `metric` makes of each run.
 
-    Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad], `q0` [rad]
-    and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and `method`. `grid` has a
-    sequence of each that varies; those that do not are given by name, and what is left out is as in a fresh runtime. Without
-    `servo` the controller is off. Every run lasts `duration` [s] and has `samples`, start and end among them.
+    Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
+    `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and
+    `method`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
+    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s] and has `samples`,
+    start and end among them.
 
-    `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of a `Run`,
-    which an executor has to be able to send.
+    `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of
+    a `Run`, which an executor has to be able to send.
 
-    Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that hands out futures as `concurrent.futures` does (Dask's
-    `Client.get_executor()`, say), or to as many threads as there are cores. In `folder` every finished piece is kept, and a
-    sweep that was stopped goes on there. Raises `ValueError` for a setting that cannot be, and where the folder holds
-    another sweep.
+    Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
+    hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
+    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. Raises
+    `ValueError` for a setting that cannot be, and where the folder holds another sweep.
     """
     axes = {name: list(values) for name, values in grid.items()}
     for name, choices in axes.items():
@@ -180,7 +182,8 @@ def sweep(
     done = {} if kept is None else kept.read(starts)
     threads = ThreadPoolExecutor() if executor is None else None
     try:
-        _run(question, [start for start in starts if start not in done], piece, threads or executor, done, kept, progress)
+        left = [start for start in starts if start not in done]
+        _run(question, left, piece, threads or executor, done, kept, progress)
     finally:
         if threads is not None:
             threads.shutdown(cancel_futures=True)

@@ -15,20 +15,20 @@ use rustix::time::{ClockId, clock_gettime};
 
 thread_local! {
     /// How looks are counted on this thread; none where the machine's clocks count.
-    static COUNTED: Cell<Option<Looks>> = const { Cell::new(None) };
+    static COUNTED: Cell<Option<Counted>> = const { Cell::new(None) };
 }
 
 /// Time that passes with looks at it alone.
 #[derive(Clone, Copy)]
-struct Looks {
+struct Counted {
     began: Instant,
-    /// The time that a look costs.
+    /// The cost of a look.
     cost: Duration,
-    /// The time that all of them have cost so far.
+    /// The cost of all of them so far.
     spent: Duration,
 }
 
-impl Looks {
+impl Counted {
     /// Looks once more.
     fn look(mut self) -> Self {
         self.spent += self.cost;
@@ -61,7 +61,7 @@ pub fn spent() -> Duration {
 /// From now on every look on this thread finds that `cost` has passed since the one before, and nothing else makes time
 /// pass.
 pub fn count(cost: Duration) {
-    COUNTED.set(Some(Looks {
+    COUNTED.set(Some(Counted {
         began: Instant::now(),
         cost,
         spent: Duration::ZERO,

@@ -1,6 +1,7 @@
-//! What one step adds to a state, and how it is added.
+//! The increments of one step, and how they are added to a state.
 //!
-//! **Invariant:** an arm without gravity moves by the same bits, whichever of the two ways through the dynamics it takes.
+//! **Invariant:** an arm without gravity moves by the same bits, whichever of the two ways through the dynamics it
+//! takes.
 
 #![allow(
     clippy::indexing_slicing,
@@ -23,14 +24,21 @@ pub fn step_under<const N: usize>(
     effort: &[f64; N],
     h: f64,
 ) -> Increment<N> {
-    if arm.gravity() == 0.0 {
+    if leaves_out_first_angle(arm) {
         step_as::<N, false>(arm, method, state, effort, h)
     } else {
         step_as::<N, true>(arm, method, state, effort, h)
     }
 }
 
-/// [`step_under`], of an arm with gravity or without.
+/// Whether the dynamics can do without the first angle, and gain by it: sines and cosines are taken two at a time, so
+/// that an odd number of angles less one is a whole pass less. With 2 links next to nothing is saved.
+#[inline(always)]
+pub(super) fn leaves_out_first_angle<const N: usize>(arm: &Arm<N>) -> bool {
+    N % 2 == 1 && arm.gravity() == 0.0
+}
+
+/// [`step_under`], of an arm that needs its first angle or does not.
 #[inline(always)]
 pub(super) fn step_as<const N: usize, const WEIGHS: bool>(
     arm: &Arm<N>,

@@ -26,7 +26,7 @@ use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
 pub use self::increments::step_under;
-use self::increments::{add, step_as};
+use self::increments::{add, leaves_out_first_angle, step_as};
 pub use self::input::ArmInput;
 use super::arm::{Arm, State};
 use super::integrator::Method;
@@ -143,8 +143,8 @@ impl<const N: usize> Simulation<N> {
         if self.divergence.is_some() {
             return 0;
         }
-        // Asked once for all steps: in every one it would cost as much as 2 links save by it.
-        if self.arm.gravity() == 0.0 {
+        // Asked once for all steps: in every one it would cost as much as it saves.
+        if leaves_out_first_angle(&self.arm) {
             self.take_steps::<false>(steps, observe)
         } else {
             self.take_steps::<true>(steps, observe)
@@ -173,7 +173,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// One step, unless its result is not finite: then nothing changes, and `false`.
-    #[inline(always)] // into both loops: called, it takes a dozen instructions more
+    #[inline]
     fn take_step<const WEIGHS: bool>(&mut self) -> bool {
         let mut control = if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)

@@ -11,7 +11,7 @@ use crate::protocol::messages::Stamp;
 
 /// Where a frame is in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct FramePose {
     /// \[m\].
     x: f64,
     /// \[m\].
@@ -20,7 +20,7 @@ struct Place {
     angle: f64,
 }
 
-impl Place {
+impl FramePose {
     /// The same as seen from `other`.
     fn seen_from(self, other: Self) -> Self {
         let (sin, cos) = other.angle.sin_cos();
@@ -51,8 +51,8 @@ impl Place {
 }
 
 /// Every frame of an arm with these lengths \[m\] at these joint positions \[rad\], and where it is in the world.
-fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, Place)> {
-    let mut at = Place {
+fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, FramePose)> {
+    let mut at = FramePose {
         x: 0.0,
         y: 0.0,
         angle: 0.0,
@@ -140,12 +140,13 @@ mod tests {
     #[test]
     fn a_frame_is_where_the_links_put_it() {
         let right = std::f64::consts::FRAC_PI_2;
-        let hand = seen("world", "/hand", [right, -right]);
+        let end_effector = seen("world", "/hand", [right, -right]);
         // A sine and a cosine, each good to an ulp.
         assert!(
-            (hand.translation.x - 0.5).abs() < 1e-15 && (hand.translation.y - 1.0).abs() < 1e-15
+            (end_effector.translation.x - 0.5).abs() < 1e-15
+                && (end_effector.translation.y - 1.0).abs() < 1e-15
         );
-        assert!((hand.rotation.w - 1.0).abs() < 1e-15);
+        assert!((end_effector.rotation.w - 1.0).abs() < 1e-15);
         let back = seen("hand", "world", [0.0, 0.0]);
         assert_eq!((back.translation.x, back.translation.y), (-1.5, 0.0));
         // From one link to the next: the length of the first, whatever the pose.
