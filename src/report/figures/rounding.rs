@@ -31,8 +31,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     // Only with the smallest truncation error is there anything to be seen after so many steps.
     let steps = |method: Method, quick: bool| match (method, quick) {
         (Method::Rk4, false) => 100_000_000,
-        (Method::Rk4, true) => 10_000_000,
-        (_, false) => 10_000_000,
+        (Method::Rk4, true) | (_, false) => 10_000_000,
         (_, true) => 1_000_000,
     };
     let mut runs = Vec::new();
