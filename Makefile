@@ -15,7 +15,10 @@ build: ## Build the program (release); needs no network once the dependencies ar
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
 
-run: build ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3"
+run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3". Without cargo a program that is there runs
+	@if command -v "$(firstword $(CARGO))" > /dev/null; then $(MAKE) --no-print-directory build; \
+	elif [ -x "$(TARGET_DIR)/release/pendularm" ]; then echo "make run: no cargo here; the program that is built already runs"; \
+	else echo "make run: needs cargo, or a program that is built already: $(TARGET_DIR)/release/pendularm" >&2; exit 1; fi
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
@@ -44,7 +47,7 @@ test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS
 	@echo "make test-browser: the page in headless Chromium"
 	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
-test-clients: build ## Run clients that nobody here wrote against it: roslibpy, roslib 1 and 2, Lichtblick's packages, roslibrust
+test-clients: build ## Run clients that nobody here wrote against it: roslibpy, compas_fab, roslib 1 and 2, Lichtblick's packages, roslibrust
 	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 

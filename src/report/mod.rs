@@ -154,7 +154,7 @@ fn side_by_side(
     made.into_iter().collect()
 }
 
-/// The value of a lock; one that a section left by a panic is as good as before.
+/// Takes the lock: the work of a section that panicked is as good as before.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

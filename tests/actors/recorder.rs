@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use pendularm::actors::arm::sim::Tell;
 use pendularm::actors::gateway::messages::Overhear;
-use pendularm::actors::recorder::{MAX_FRAME, listeners};
+use pendularm::actors::recorder::limits::MAX_RECORDED_FRAME;
+use pendularm::actors::recorder::listeners;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Topic;
 use pendularm::record::{
@@ -147,6 +148,7 @@ where
 
 #[test]
 fn whatever_clients_do_every_recorded_state_is_reached_again_bit_for_bit() {
+    let (mut steps, mut states) = (0, 0);
     for seed in 0..6 {
         for entries in [
             in_virtual_time(random_run::<2>(seed)),
@@ -157,13 +159,19 @@ fn whatever_clients_do_every_recorded_state_is_reached_again_bit_for_bit() {
             let told = entries.iter().filter(inputs).count() as u64;
             assert_eq!(verdict.difference, None, "seed {seed}");
             assert_eq!(verdict.inputs, told - 1, "all but the beginning");
-            assert!(verdict.steps > 200 && verdict.states > 20, "{verdict:?}");
+            steps += verdict.steps;
+            states += verdict.states;
             assert_eq!(
                 (verdict.losses, verdict.ending),
                 (0, Some(RecordEnding::Whole))
             );
         }
     }
+    // A run may spend most of its two seconds paused, but not all of them do.
+    assert!(
+        steps > 5000 && states > 300,
+        "{steps} steps, {states} states"
+    );
 }
 
 #[test]
@@ -376,7 +384,7 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
             None => counts.1 += 1,
         }
     });
-    for length in [MAX_FRAME, MAX_FRAME + 1] {
+    for length in [MAX_RECORDED_FRAME, MAX_RECORDED_FRAME + 1] {
         eavesdropper(Overheard::Answered {
             to: ConnectionId(1),
             service: Service::Rollout,
@@ -417,7 +425,7 @@ fn a_record_that_was_damaged_is_no_proof_of_a_difference() {
     let file = file(&entries);
     let mut rng = fastrand::Rng::with_seed(9);
     let mut refused = 0;
-    for _ in 0..300 {
+    for _ in 0..100 {
         let mut damaged = file.clone();
         let at = rng.usize(..file.len());
         damaged[at] ^= 1 << rng.u32(..8);
@@ -427,7 +435,7 @@ fn a_record_that_was_damaged_is_no_proof_of_a_difference() {
             Err(_) => refused += 1,
         }
     }
-    assert!(refused > 150, "{refused} of 300");
+    assert!(refused > 50, "{refused} of 100");
     assert!(matches!(
         Recording::new(&b"no record at all"[..]).next_passage(),
         Err(ReadError::Mcap(_))

@@ -29,6 +29,10 @@ fn census() -> Census {
             service("/add", Some("demo/srv/Add")),
             service("/nameless", None),
         ],
+        actions: vec![
+            service("/dance", Some("demo/action/Dance")),
+            service("/untyped", None),
+        ],
     }
 }
 
@@ -101,7 +105,7 @@ fn topics_of_a_type_are_found_by_either_of_its_names() {
     for type_name in ["std_msgs/String", "std_msgs/msg/String"] {
         assert_eq!(
             values(Rosapi::TopicsForType, json!({"type": type_name})),
-            json!({"topics": ["/robot_description", "/chat"]})
+            json!({"topics": ["/robot_description", "/robot_description_semantic", "/chat"]})
         );
     }
     let none = values(Rosapi::TopicsForType, json!({"type": "demo/X"}));
@@ -451,6 +455,6 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
 fn the_version_is_2_of_a_distribution_of_our_own() {
     assert_eq!(
         values(Rosapi::GetRosVersion, json!({})),
-        json!({"version": 2, "distro": "pendularm"})
+        json!({"version": 2, "distro": "jazzy"})
     );
 }

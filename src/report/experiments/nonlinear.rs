@@ -99,7 +99,7 @@ impl PeriodicSwing {
     /// the one of small amplitude.
     #[must_use]
     pub fn of(amplitude: f64) -> Option<Self> {
-        // The slow mode of two equal rods has this q₂ per q₁.
+        // Amplitudes of the slow mode of two equal rods: q₂ per q₁.
         let (mut one, mut other) = (0.43 * amplitude, 0.45 * amplitude);
         let mut off_one = through_hanging(amplitude, one)?.0;
         for _ in 0..60 {

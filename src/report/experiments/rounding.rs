@@ -1,4 +1,4 @@
-//! Energy over very many steps, with the rounding of sums carried along and without.
+//! The effect of rounding on energy over very many steps, with the rounding of sums carried along and without.
 //!
 //! A regular swing keeps its energy, so all that changes it is the method's truncation and rounding. With small steps
 //! truncation is out of sight, and rounding alone is left: errors that have no sign on average add up like a random

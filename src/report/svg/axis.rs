@@ -261,7 +261,7 @@ pub(crate) fn plain(text: &str) -> String {
             .find(|letter| !in_number(letter))
             .unwrap_or(number.len());
         let (number, after) = number.split_at(end);
-        // A full stop or a dash at the end is no part of a number.
+        // The end of a sentence or of a range is no part of a number.
         let trimmed = number.trim_end_matches(|letter: char| !letter.is_ascii_digit());
         let value = trimmed
             .split_once('e')

@@ -21,7 +21,8 @@ use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{Compression, Op, Subscribe};
+use crate::protocol::op::{Compression, Encoding, Op, Subscribe};
+use crate::protocol::ros::stamps::is_ros1_name;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
 
@@ -60,9 +61,11 @@ impl Registry {
                 self.advertise_service(&origin, &service, type_name.as_deref())
             }
             Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
-            Op::SetLevel(verbosity) => {
+            Op::Pursue { action, pursuit } => self.pursue(&origin, &action, pursuit),
+            Op::SetLevel { verbosity, errors } => {
                 if let Some(client) = self.clients.get_mut(&origin.from) {
                     client.verbosity = verbosity;
+                    client.set_error_form(errors);
                 }
                 Ok(())
             }
@@ -248,7 +251,10 @@ impl Registry {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
-            encoding: subscribe.encoding,
+            encoding: Encoding {
+                ros1_stamps: has_ros1_stamps(subscribe),
+                ..subscribe.encoding
+            },
             _size: size,
             _share: share,
         });
@@ -309,7 +315,8 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains_key(service) {
+        let provided = client.provided.len() + client.pursued.len();
+        if provided >= MAX_PROVIDED && !client.provided.contains_key(service) {
             return Err(Refusal::TooManyProvided);
         }
         let Some(client) = self.clients.get_mut(&origin.from) else {
@@ -355,6 +362,17 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
         Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
         _ => Ok(()),
     }
+}
+
+/// Whether stamps are to have the names of ROS 1 too: on a topic of the runtime's own that was asked for by its type of
+/// ROS 1. CDR has no names.
+fn has_ros1_stamps(subscribe: &Subscribe) -> bool {
+    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
+    let asked = subscribe.type_name.as_deref();
+    subscribe.encoding.compression != Compression::CborRaw
+        && own
+            .zip(asked)
+            .is_some_and(|(topic, asked)| is_ros1_name(asked, topic.type_name()))
 }
 
 /// Whether the runtime itself subscribes to the topic.
