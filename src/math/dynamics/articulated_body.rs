@@ -53,7 +53,7 @@ pub fn forward_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    recursion(arm, arm.gravity(), q, qd, tau)
+    recursion::<N, true>(arm, q, qd, tau)
 }
 
 /// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
@@ -71,13 +71,12 @@ pub fn weightless_dynamics<const N: usize>(
         // A constant, whose sine and cosine the compiler takes.
         *first = 0.0;
     }
-    recursion(arm, 0.0, &turned, qd, tau)
+    recursion::<N, false>(arm, &turned, qd, tau)
 }
 
 #[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
-fn recursion<const N: usize>(
+fn recursion<const N: usize, const WEIGHS: bool>(
     arm: &Arm<N>,
-    gravity: f64,
     q: &[f64; N],
     qd: &[f64; N],
     tau: &[f64; N],
@@ -117,6 +116,7 @@ fn recursion<const N: usize>(
     }
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
+    let gravity = if WEIGHS { arm.gravity() } else { 0.0 };
     let mut tip = DVec2::new(0.0, gravity);
     let mut inner = 0.0;
     std::array::from_fn(|i| {

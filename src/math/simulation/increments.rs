@@ -14,7 +14,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{forward_dynamics, weightless_dynamics};
 use crate::math::integrator::{Increment, Method, increment, two_sum};
 
-/// What a step of `h` \[s\] under the constant `effort` \[N m\] adds to positions and velocities.
+/// The increments of positions and velocities in a step of `h` \[s\] under the constant `effort` \[N m\].
 #[inline(always)]
 #[must_use]
 pub fn step_under<const N: usize>(

@@ -1,4 +1,4 @@
-//! The cost of an error by stiffness, explicit methods beside implicit baselines.
+//! Cost of an error by stiffness, explicit methods beside implicit baselines.
 //!
 //! **Invariant:** what was not run because it would take too many steps is shown as a prediction, and said to be one.
 
@@ -209,9 +209,9 @@ fn class(solver: Solver) -> (&'static str, Marker) {
 }
 
 fn figure(costs: &[CheapestRun]) -> Figure {
-    let families = FAMILIES.into_iter();
-    let plots: Vec<Plot> = families
-        .flat_map(|(by, words)| family(costs, by, words))
+    let plots: Vec<Plot> = FAMILIES
+        .into_iter()
+        .flat_map(|family| panels(costs, family))
         .collect();
     let mut keys: Vec<Key> = Solver::ALL
         .into_iter()
@@ -246,26 +246,17 @@ fn figure(costs: &[CheapestRun]) -> Figure {
     )
 }
 
-/// Evaluations and run time of one way of getting stiff.
-fn family(costs: &[CheapestRun], by: By, words: &str) -> [Plot; 2] {
-    let x = || {
-        Axis::log_between(
-            "stiffness ratio: the elbow's rate per the swing's",
-            Unit::Number,
-            0.5,
-            2e8,
-        )
+/// Evaluations and run time of one family.
+fn panels(costs: &[CheapestRun], (by, words): (By, &str)) -> [Plot; 2] {
+    let panel = |what: &str, y| {
+        let x = "stiffness ratio: the elbow's rate per the swing's";
+        let x = Axis::log_between(x, Unit::Number, 0.5, 2e8);
+        Plot::new(format!("Stiff by {words}: {what}"), x, y)
     };
-    let mut evaluations = Plot::new(
-        format!("Stiff by {words}: evaluations"),
-        x(),
-        Axis::log_between("evaluations of the dynamics", Unit::Number, 10.0, 1e10),
-    );
-    let mut times = Plot::new(
-        format!("Stiff by {words}: run time"),
-        x(),
-        Axis::log_between("run time", Unit::Seconds, 1e-6, 1.0),
-    );
+    let y = Axis::log_between("evaluations of the dynamics", Unit::Number, 10.0, 1e10);
+    let mut evaluations = panel("evaluations", y);
+    let y = Axis::log_between("run time", Unit::Seconds, 1e-6, 1.0);
+    let mut times = panel("run time", y);
     for solver in Solver::ALL {
         let (class, marker) = class(solver);
         let line = |points: Vec<Point>, dashed| Curve {
@@ -275,34 +266,24 @@ fn family(costs: &[CheapestRun], by: By, words: &str) -> [Plot; 2] {
             dashed,
             points,
         };
-        let run = |value: &dyn Fn(&(StiffRun, Timing)) -> f64,
-                   words: &dyn Fn(f64) -> String|
-         -> Vec<Point> {
-            let points = of(costs, by, solver).filter_map(|cost| {
-                let value = value(cost.run.as_ref()?);
-                Some(Point::new(
-                    cost.ratio,
-                    value,
-                    format!("{}: {}", solver.name(), words(value)),
-                ))
-            });
-            points.collect()
-        };
-        #[allow(clippy::cast_precision_loss, reason = "counts are below 2^53")]
-        let counted = run(&|run| run.0.evaluations as f64, &scientific);
-        evaluations.series.push(line(counted, false));
-        times
-            .series
-            .push(line(run(&|run| run.1.minimum, &seconds), false));
-        if let Solver::Explicit(method) = solver {
-            let predicted = of(costs, by, solver)
-                .filter_map(|cost| {
-                    let least = cost.fewest? * f64::from(method.evaluations());
-                    Some(Point::new(cost.ratio, least, ""))
-                })
-                .collect();
-            evaluations.series.push(line(predicted, true));
+        let (mut counted, mut timed, mut predicted) = (vec![], vec![], vec![]);
+        for cost in of(costs, by, solver) {
+            if let Some((run, timing)) = &cost.run {
+                #[allow(clippy::cast_precision_loss, reason = "counts are below 2^53")]
+                let count = run.evaluations as f64;
+                let tooltip = format!("{}: {}", solver.name(), run.evaluations);
+                counted.push(Point::new(cost.ratio, count, tooltip));
+                let tooltip = format!("{}: {}", solver.name(), seconds(timing.minimum));
+                timed.push(Point::new(cost.ratio, timing.minimum, tooltip));
+            }
+            if let (Some(fewest), Solver::Explicit(method)) = (cost.fewest, solver) {
+                let least = fewest * f64::from(method.evaluations());
+                predicted.push(Point::new(cost.ratio, least, ""));
+            }
         }
+        evaluations.series.push(line(counted, false));
+        evaluations.series.push(line(predicted, true));
+        times.series.push(line(timed, false));
     }
     [evaluations, times]
 }
