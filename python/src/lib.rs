@@ -29,5 +29,5 @@ mod native {
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]
-    use crate::study::{plan, rollout, stability};
+    use crate::study::{plan, rollout, stability, suggest_gains};
 }

@@ -71,8 +71,8 @@
 //! [`SuggestGains`], [`PlanRun`], from the registry: computations. [`HeldLimit`], from `arm_sim`: the largest stable
 //! timestep of a control loop.
 //!
-//! To `recorder`: [`node::Call`] of `StartRecording` and `StopRecording`, from the registry; `RecordTo` and `EndRecord`,
-//! from the runtime: the beginning and the end of a record.
+//! To `recorder`: [`node::Call`] of `StartRecording` and `StopRecording`, from the registry; `RecordTo` and
+//! `EndRecord`, from the runtime: the beginning and the end of a record.
 //!
 //! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
 //!

@@ -28,7 +28,7 @@ pub(super) const RECORD_DIR: LaunchOption = LaunchOption {
     is_switch: false,
 };
 
-/// What is recorded, as chosen at launch.
+/// Records, as chosen at launch.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct RecordOptions {
     /// The file into which this run is recorded, if it is.

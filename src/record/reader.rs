@@ -1,7 +1,7 @@
 //! Reads a record back, message by message, as far as the file goes.
 //!
-//! **Invariant:** of a chunk that was damaged nothing is read; a message is read by the definition that is ours, one that
-//! was recorded by another is left out.
+//! **Invariant:** of a chunk that was damaged nothing is read; a message is read by the definition that is ours, one
+//! that was recorded by another is left out.
 
 use std::collections::HashMap;
 use std::io::Read;

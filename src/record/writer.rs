@@ -21,7 +21,7 @@ use crate::protocol::ros::cdr;
 /// Length of a chunk, from which on it is written without waiting for the next second.
 pub const CHUNK_BYTES: u64 = 64 * 1024;
 
-/// What is said of the run besides its inputs.
+/// Facts about the run besides its inputs.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RunSettings {
     /// How many links the arm has.

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex};
 
 use pendularm::actors::arm::sim::Tell;
 use pendularm::actors::gateway::messages::Overhear;
-use pendularm::actors::recorder::{MAX_FRAME, listeners};
+use pendularm::actors::recorder::limits::MAX_RECORDED_FRAME;
+use pendularm::actors::recorder::listeners;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Topic;
 use pendularm::record::{
@@ -376,7 +377,7 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
             None => counts.1 += 1,
         }
     });
-    for length in [MAX_FRAME, MAX_FRAME + 1] {
+    for length in [MAX_RECORDED_FRAME, MAX_RECORDED_FRAME + 1] {
         eavesdropper(Overheard::Answered {
             to: ConnectionId(1),
             service: Service::Rollout,

@@ -145,7 +145,7 @@ def find(number, program):
 
 def main():
     chosen = [int(word) for word in sys.argv[1:]] or list(range(1, len(FAULTS) + 1))
-    parts = ("src", "page", "tests", "fuzz/src", "Cargo.toml", "Cargo.lock", "README.md", "benches/Cargo.toml")
+    parts = ("src", "page", "tests", "client", "fuzz/src", "Cargo.toml", "Cargo.lock", "README.md")
     missing = plant(ROOT, COPY, parts, FAULTS)
     lost = [number for number in missing if number in chosen]
     program = build()

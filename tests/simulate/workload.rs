@@ -372,19 +372,22 @@ impl Desk<'_> {
 
     /// More than an outbox holds, for another client that subscribes to it; gives that one's place.
     pub fn flood(&mut self) -> Option<usize> {
-        let at = self.at;
+        // A thousand pieces of each of its messages would take all the time there is, and hostile clients ask for pieces on one topic.
+        let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
+        let in_pieces: Vec<&str> = subscriptions
+            .filter(|one| one.is_in_pieces)
+            .map(|one| one.topic.as_str())
+            .chain([TOPICS[1]])
+            .collect();
         let listens = |(place, one): (usize, &Honest)| {
             let mut all = one.subscriptions.values();
-            let plain = all.find(|one| one.phase == Phase::On && one.throttle.is_none())?;
-            (place != at && one.is_active()).then(|| (place, plain.topic.clone()))
+            let plain = all.find(|one| {
+                let is_on = one.phase == Phase::On && one.throttle.is_none();
+                is_on && !in_pieces.contains(&one.topic.as_str())
+            })?;
+            (place != self.at && one.is_active()).then(|| (place, plain.topic.clone()))
         };
         let (deaf, topic) = self.all.iter().enumerate().find_map(listens)?;
-        // A thousand pieces of each of its messages would take all the time there is. Hostile clients ask for them on one topic.
-        let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
-        let are_pieces = |one: &Subscription| one.is_in_pieces && one.topic == topic;
-        if topic == TOPICS[1] || subscriptions.into_iter().any(are_pieces) {
-            return None;
-        }
         self.advertise(&topic);
         self.court.count("floods");
         let long = format!("\"{}\"", "x".repeat(FLOODING));

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use pendularm::actors::recorder::MAX_FILE_NAME;
+use pendularm::actors::recorder::limits::MAX_FILE_NAME;
 use pendularm::record::{
     CALLS, Content, INPUTS, Passage, RecordEnding, RecordEntry, Recording, RunSettings, STATES,
     Scribe, replay,
@@ -198,7 +198,7 @@ fn clients_record_into_the_operators_folder_and_nowhere_else() {
     assert_eq!(nothing["status"], "nothing is being recorded");
     let long = "x".repeat(MAX_FILE_NAME + 1);
     for name in [
-        "../x", "/tmp/x", "a/b", ".hidden", "", "a\\b", "a b", "\u{e9}", "x\0", &long,
+        "../x", "/x", "a/b", ".hidden", "", "a\\b", "a b", "\u{e9}", "x\0", &long,
     ] {
         let refused = client.call("/recorder/start", json!({"name": name}));
         assert_eq!(refused["result"], false, "{name:?}");

@@ -11,7 +11,7 @@ from importlib.metadata import version as _version
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
 from .report import read_report
-from .study import Critical, Plan, Rollout, Stability, plan, rollout, stability
+from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
 
 __version__ = _version("pendularm")
@@ -26,6 +26,7 @@ __all__ = [
     "Run",
     "Simulation",
     "Stability",
+    "SuggestedGains",
     "Sweep",
     "default_gains",
     "dynamics",
@@ -35,5 +36,6 @@ __all__ = [
     "read_report",
     "rollout",
     "stability",
+    "suggest_gains",
     "sweep",
 ]

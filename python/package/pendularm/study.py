@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from ._native import Arm
 
-__all__ = ["Critical", "Plan", "Rollout", "Stability", "plan", "rollout", "stability"]
+__all__ = [
+    "Critical",
+    "Plan",
+    "Rollout",
+    "Stability",
+    "SuggestedGains",
+    "plan",
+    "rollout",
+    "stability",
+    "suggest_gains",
+]
 
 Floats = NDArray[np.float64]
 
@@ -107,6 +117,46 @@ class Plan:
     timesteps: Floats
     evaluations: NDArray[np.uint64]
     errors: Floats
+
+
+@dataclass(frozen=True)
+class SuggestedGains:
+    """Gains that are stable in every pose and settle in time, and how they fared."""
+
+    kp: Floats
+    """[N m/rad], (links,)."""
+    ki: Floats
+    """[N m/(rad s)], (links,)."""
+    kd: Floats
+    """[N m s/rad], (links,)."""
+    timestep_limit: float | None
+    """The smallest stable timestep over all poses [s]; `None` where nothing limits."""
+    certified: bool
+    """Whether that is proven to 1 %."""
+    margin: float | None
+    """How many timesteps it is."""
+    settled_after: float
+    """How long the slowest of ten moves took to settle [s]."""
+
+
+def suggest_gains(
+    arm: Arm | None = None,
+    *,
+    settling_time: float = 4.0,
+    margin: float = 1.25,
+    timestep: float = 0.001,
+    integrator: str = "rk4",
+) -> SuggestedGains:
+    """Finds gains for an arm and a timestep [s], as ``/study/gains`` does.
+
+    The smallest stable timestep over all poses is to be `margin` timesteps, 1 at least, and ten moves are to settle within
+    `settling_time` [s]. Raises `ValueError` where there are none.
+    """
+    return SuggestedGains(
+        **_native.suggest_gains(
+            arm, settling_time=settling_time, margin=margin, timestep=timestep, integrator=integrator
+        )
+    )
 
 
 def stability(

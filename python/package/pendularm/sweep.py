@@ -4,6 +4,7 @@ A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor th
 """
 
 import json
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -26,6 +27,15 @@ SETTLED = 0.02
 
 IN_FLIGHT = 256
 """Pieces that are handed to an executor before the first of them is done."""
+
+MOST_SETTINGS = 10_000_000
+"""Combinations of one sweep: their results are kept in memory, some 100 MB a metric."""
+
+MOST_SAMPLES = 100_000
+"""Samples of a run, as many as a rollout has."""
+
+MOST_ROWS = 10_000_000
+"""Samples times settings of a piece: some 1 GB where it is done."""
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
 SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
@@ -115,7 +125,7 @@ def sweep(
     servo: bool = True,
     executor: Executor | None = None,
     folder: str | os.PathLike[str] | None = None,
-    piece: int = 1024,
+    piece: int | None = None,
     progress: bool = True,
     **settings: Any,
 ) -> Sweep:
@@ -129,7 +139,7 @@ def sweep(
     `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of a `Run`,
     which an executor has to be able to send.
 
-    Pieces of so many settings go to `executor`, anything that hands out futures as `concurrent.futures` does (Dask's
+    Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that hands out futures as `concurrent.futures` does (Dask's
     `Client.get_executor()`, say), or to as many threads as there are cores. In `folder` every finished piece is kept, and a
     sweep that was stopped goes on there. Raises `ValueError` for a setting that cannot be, and where the folder holds
     another sweep.
@@ -142,9 +152,15 @@ def sweep(
             raise ValueError(f"grid[{name!r}] must have at least one value")
     if not axes:
         raise ValueError("grid must have at least one setting")
-    for field, number, least in [("samples", samples, 2), ("piece", piece, 1)]:
-        if number < least:
-            raise ValueError(f"{field} must be at least {least}, got {number}")
+    total = math.prod(len(choices) for choices in axes.values())
+    if total > MOST_SETTINGS:
+        raise ValueError(f"grid must have at most {MOST_SETTINGS} combinations, got {total}")
+    if not 2 <= samples <= MOST_SAMPLES:
+        raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
+    if piece is None:
+        piece = max(1, min(1024, MOST_ROWS // 10 // samples))
+    if not 1 <= piece <= MOST_ROWS // samples:
+        raise ValueError(f"piece must be between 1 and {MOST_ROWS // samples} with {samples} samples, got {piece}")
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
     if isinstance(metric, str) and metric not in METRICS:
@@ -160,7 +176,6 @@ def sweep(
     )
     question.check()
     kept = None if folder is None else _Folder(Path(folder), question, piece)
-    total = int(np.prod(question.shape))
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     threads = ThreadPoolExecutor() if executor is None else None
@@ -283,7 +298,7 @@ def _run(
     progress: bool,
 ) -> None:
     """Has the pieces done that are left, and takes in each as it comes."""
-    total = int(np.prod(question.shape))
+    total = math.prod(question.shape)
     left = iter(starts)
     under_way: dict[Future[Any], int] = {}
     with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:

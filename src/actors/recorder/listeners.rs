@@ -1,10 +1,10 @@
-//! What arm and registry tell, as entries of the record.
+//! Makes entries of the record out of what arm and registry tell.
 //!
 //! **Invariant:** a listener copies and does not wait.
 
 use bytes::Bytes;
 
-use super::MAX_FRAME;
+use super::limits::MAX_RECORDED_FRAME;
 use crate::actors::arm::sim::{ArmEvent, ArmListener, ArmNews};
 use crate::actors::gateway::messages::{Eavesdropper, Overheard};
 use crate::record::{Content, Note, write_note};
@@ -42,7 +42,7 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesd
             Overheard::Heard(_, msg) => msg.line().len(),
             Overheard::Called { args, .. } => args.line().len(),
         };
-        if length > MAX_FRAME {
+        if length > MAX_RECORDED_FRAME {
             return put(None);
         }
         put(Some(match what {
@@ -74,7 +74,7 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesd
     })
 }
 
-/// A frame counts towards what its client holds as long as it is shared, so that a slow file would be the client's fault.
+/// A frame counts towards what its client holds as long as it is shared: a slow file would be the client's fault.
 fn copied(frame: &Bytes) -> Bytes {
     Bytes::copy_from_slice(frame)
 }

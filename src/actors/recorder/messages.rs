@@ -1,6 +1,7 @@
 //! The questions to the recorder.
 //!
-//! **Invariant:** an answer comes when what was asked for is done: a file that is told of exists, one that has ended is whole.
+//! **Invariant:** an answer comes when what was asked for is done: a file that is named exists, one that has ended is
+//! whole.
 
 use std::path::PathBuf;
 

@@ -2,17 +2,20 @@
 //!
 //! **Invariant:** there is one record at a time; arm and registry tell nothing without one.
 
+mod clock;
+pub mod limits;
 pub mod listeners;
 mod messages;
 mod tape;
 mod wire;
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
 
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
+use self::clock::TapeClock;
+use self::limits::MAX_RECORD_BYTES;
 pub use self::messages::{
     EndRecord, NotRecorded, RecordTo, Recorded, StartRecording, StopRecording,
 };
@@ -21,21 +24,6 @@ use crate::actors::arm::sim::Tell;
 use crate::actors::gateway::messages::Overhear;
 use crate::actors::node::Call;
 use crate::record::RunSettings;
-
-/// Entries that may wait for the file. Topics may take half of that, the rest is for inputs.
-pub const MAX_WAITING_ENTRIES: usize = 8192;
-/// Bytes that may wait for the file, in the same way.
-pub const MAX_WAITING_BYTES: usize = 16 * 1024 * 1024;
-/// Longest frame that is recorded: what the gateway's thread copies in a fraction of a millisecond.
-pub const MAX_FRAME: usize = 1024 * 1024;
-/// What a killed program may cost of a record.
-pub const FLUSH_PERIOD: Duration = Duration::from_secs(1);
-/// Length of a record that a client has started; it ends there. Some nine hours of an arm that is left alone.
-pub const MAX_RECORD_BYTES: u64 = 1024 * 1024 * 1024;
-/// Records in the folder beyond which no client starts another.
-pub const MAX_RECORDS: usize = 100;
-/// Longest name of a record.
-pub const MAX_FILE_NAME: usize = 64;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -226,10 +214,7 @@ impl<const N: usize> Recorder<N> {
 
 /// The place of a client's record: the file's name, and all about the file.
 fn place(folder: &Path, name: Option<String>) -> (String, TapeTarget) {
-    let made_up = || {
-        let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-        format!("run-{}", since_1970.as_millis())
-    };
+    let made_up = || format!("run-{}", TapeClock::start().now());
     let mut name = name.unwrap_or_else(made_up);
     if !name.ends_with(".mcap") {
         name.push_str(".mcap");

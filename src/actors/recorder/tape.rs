@@ -10,12 +10,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::thread;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::Instant;
 
 use tokio::sync::oneshot;
 
+use super::clock::TapeClock;
+use super::limits::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
 use super::messages::{NotRecorded, Recorded};
-use super::{FLUSH_PERIOD, MAX_RECORDS, MAX_WAITING_BYTES, MAX_WAITING_ENTRIES};
 use crate::record::{Content, RecordEntry, RecordError, RunSettings, Scribe};
 
 /// The end of a record's file name.
@@ -34,13 +35,6 @@ pub(super) struct Tape {
     entries: SyncSender<RecordEntry>,
     counts: Arc<TapeCounts>,
     clock: TapeClock,
-}
-
-/// A clock that tells the time of day and never runs backwards.
-#[derive(Clone, Copy)]
-struct TapeClock {
-    began: Instant,
-    since_1970: Duration,
 }
 
 #[derive(Default)]
@@ -161,22 +155,6 @@ impl Tape {
             self.counts.dropped.fetch_add(1, Ordering::Relaxed);
         }
         content.is_some_and(|content| self.put(content))
-    }
-}
-
-impl TapeClock {
-    fn start() -> Self {
-        let since_1970 = SystemTime::UNIX_EPOCH.elapsed().unwrap_or_default();
-        Self {
-            began: Instant::now(),
-            since_1970,
-        }
-    }
-
-    /// Nanoseconds since 1970.
-    fn now(&self) -> u64 {
-        let now = self.since_1970 + self.began.elapsed();
-        u64::try_from(now.as_nanos()).unwrap_or(u64::MAX)
     }
 }
 
@@ -341,12 +319,12 @@ mod tests {
     }
 
     #[test]
-    fn a_record_ends_at_its_limit_and_its_tapes_are_told() {
+    fn a_record_ends_at_its_limit_and_says_so() {
         let folder = std::env::temp_dir().join(format!("pendularm-tape-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let path = folder.join("short.mcap");
         let _ = fs::remove_file(&path);
-        let (tell, told) = std::sync::mpsc::channel();
+        let (tell, heard) = std::sync::mpsc::channel();
         let settings = RunSettings { links: 2, seed: 0 };
         let target = TapeTarget {
             path: path.clone(),
@@ -355,7 +333,7 @@ mod tests {
         let begun = begin(target, settings, move || tell.send(()).unwrap());
         let Begun { tape, end } = begun.blocking_recv().unwrap().unwrap();
         while tape.put(input()) {}
-        told.recv().unwrap();
+        heard.recv().unwrap();
         let recorded = end.blocking_recv().unwrap();
         assert!(
             recorded.bytes >= 1000 && recorded.bytes < 1100,

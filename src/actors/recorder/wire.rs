@@ -6,8 +6,9 @@ use actix::prelude::*;
 use bytes::Bytes;
 use serde::Serialize;
 
+use super::Recorder;
+use super::limits::MAX_FILE_NAME;
 use super::messages::{NotRecorded, Recorded, StartRecording, StopRecording};
-use super::{MAX_FILE_NAME, Recorder};
 use crate::actors::wire::{Address, Answered, Callable, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;

@@ -1,6 +1,7 @@
 //! Reads what [`cdr`](super::cdr) writes: a message's bytes by its type, back to JSON.
 //!
-//! **Invariant:** bytes that do not fit the type are refused; however they lie, no more is allocated than they are long.
+//! **Invariant:** bytes that do not fit the type are refused; however they lie, no more is allocated than some multiple
+//! of their length.
 
 use serde_json::{Map, Value};
 

@@ -1,4 +1,4 @@
-//! Whoever overhears what passes the registry: the recorder, while it records.
+//! An ear for what passes the registry: the recorder has it, while it records.
 //!
 //! **Invariant:** without an eavesdropper nothing is made for it.
 

@@ -1,7 +1,7 @@
 //! Everything that the arm's steps depend on, for whoever records it, with the number of steps before it.
 //!
-//! **Invariant:** a listener that has not taken an input hears nothing more but the whole simulation, until it has taken
-//! that.
+//! **Invariant:** a listener that has not taken an input hears nothing more but the whole simulation, until it has
+//! taken that.
 
 use actix::prelude::*;
 
@@ -13,7 +13,7 @@ use crate::math::simulation::{ArmInput, Checkpoint, Simulation};
 pub struct ArmNews<const N: usize> {
     /// Steps taken so far; goes on through resets.
     pub step: u64,
-    /// What there is to say.
+    /// The news.
     pub event: ArmEvent<N>,
 }
 

@@ -13,7 +13,7 @@ use super::reader::{Passage, ReadError, RecordEnding, Recording};
 use super::schema::{INPUTS, STATES};
 use crate::math::simulation::Simulation;
 
-/// What came of a replay.
+/// The outcome of a replay.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReplayVerdict {
     /// How many links the arm has.
