@@ -11,7 +11,7 @@ use crate::protocol::messages::Stamp;
 
 /// Where a frame is in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Place {
+struct FramePlace {
     /// \[m\].
     x: f64,
     /// \[m\].
@@ -20,7 +20,7 @@ struct Place {
     angle: f64,
 }
 
-impl Place {
+impl FramePlace {
     /// The same as seen from `other`.
     fn seen_from(self, other: Self) -> Self {
         let (sin, cos) = other.angle.sin_cos();
@@ -51,8 +51,8 @@ impl Place {
 }
 
 /// Every frame of an arm with these lengths \[m\] at these joint positions \[rad\], and where it is in the world.
-fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, Place)> {
-    let mut at = Place {
+fn places(lengths: &[f64], positions: &[f64]) -> Vec<(String, FramePlace)> {
+    let mut at = FramePlace {
         x: 0.0,
         y: 0.0,
         angle: 0.0,
