@@ -140,12 +140,10 @@ mod tests {
     #[test]
     fn a_frame_is_where_the_links_put_it() {
         let right = std::f64::consts::FRAC_PI_2;
-        let hand = seen("world", "/hand", [right, -right]);
+        let end = seen("world", "/hand", [right, -right]);
         // A sine and a cosine, each good to an ulp.
-        assert!(
-            (hand.translation.x - 0.5).abs() < 1e-15 && (hand.translation.y - 1.0).abs() < 1e-15
-        );
-        assert!((hand.rotation.w - 1.0).abs() < 1e-15);
+        assert!((end.translation.x - 0.5).abs() < 1e-15 && (end.translation.y - 1.0).abs() < 1e-15);
+        assert!((end.rotation.w - 1.0).abs() < 1e-15);
         let back = seen("hand", "world", [0.0, 0.0]);
         assert_eq!((back.translation.x, back.translation.y), (-1.5, 0.0));
         // From one link to the next: the length of the first, whatever the pose.

@@ -44,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_group_reaches_from_the_world_to_the_hand_and_home_names_every_joint() {
+    fn the_group_reaches_from_the_world_to_the_end_effector_and_home_names_every_joint() {
         let xml = describe_semantics(&["joint1", "joint2", "joint3"]);
         assert!(xml.contains("<chain base_link=\"world\" tip_link=\"hand\"/>"));
         assert_eq!(xml.matches("<joint name=").count(), 3);

@@ -361,8 +361,8 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
     }
 }
 
-/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that is
-/// asked for by its type of ROS 1. CDR has no names.
+/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that
+/// is asked for by its type of ROS 1. CDR has no names.
 fn encoding_for(subscribe: &Subscribe) -> Encoding {
     let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
     let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
