@@ -19,7 +19,7 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
 }
 
 /// Contract section 3, the table, and what came later: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 25] = [
+const SERVICES: [(&str, &[&str], &[&str]); 27] = [
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -165,6 +165,12 @@ const SERVICES: [(&str, &[&str], &[&str]); 25] = [
             "evaluations",
             "errors",
         ],
+    ),
+    ("/recorder/start", &["name"], &["file"]),
+    (
+        "/recorder/stop",
+        &[],
+        &["file", "messages", "bytes", "dropped"],
     ),
 ];
 
@@ -320,7 +326,8 @@ fn five_services_compute_and_those_with_one_purpose_take_all_or_nothing() {
             Service::Stability,
             Service::Rollout,
             Service::SuggestGains,
-            Service::Plan
+            Service::Plan,
+            Service::RecorderStart
         ]
     );
 }
@@ -439,6 +446,7 @@ fn every_node_has_a_name_of_its_own() {
             "joint_trajectory_controller",
             "study",
             "tf2_web_republisher",
+            "recorder",
             "gateway",
             "rosapi"
         ])

@@ -397,11 +397,19 @@ fn a_type_that_is_not_known_is_refused_by_the_name_of_the_field() {
 fn actions_are_listed_with_their_type() {
     assert_eq!(
         values(Rosapi::ActionServers, json!({})),
-        json!({"action_servers": ["/ik_action"]})
+        json!({"action_servers": [
+            "/ik_action",
+            "/tf2_web_republisher",
+            "/joint_trajectory_controller/follow_joint_trajectory",
+            "/dance",
+            "/untyped"
+        ]})
     );
     for (action, type_name) in [
         ("/ik_action", "pendularm_interfaces/action/MoveTo"),
         ("ik_action", "pendularm_interfaces/action/MoveTo"),
+        ("dance", "demo/action/Dance"),
+        ("/untyped", ""),
         ("/ik", ""),
     ] {
         assert_eq!(
@@ -437,22 +445,34 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
         "geometry_msgs/msg/Vector3",
         "geometry_msgs/msg/Quaternion",
         "rosapi_msgs/msg/TypeDef",
-        "pendularm_interfaces/action/MoveTo",
+        "actionlib_msgs/msg/GoalStatus",
+        "control_msgs/msg/JointTolerance",
+        "rcl_interfaces/msg/FloatingPointRange",
+        "rcl_interfaces/msg/IntegerRange",
+        "rcl_interfaces/msg/ListParametersResult",
+        "rcl_interfaces/msg/Parameter",
+        "rcl_interfaces/msg/ParameterDescriptor",
+        "rcl_interfaces/msg/ParameterValue",
+        "rcl_interfaces/msg/SetParametersResult",
+        "tf2_web_republisher/msg/TFSubscriptionFeedback",
+        "tf2_web_republisher/msg/TFSubscriptionGoal",
     ];
+    let actions = Action::ALL.map(Action::type_name);
     let mut expected: Vec<&str> = topics
         .into_iter()
         .chain(services)
         .chain(questions)
         .chain(inside)
+        .chain(actions)
         .collect();
     expected.sort_unstable();
-    // Two topics have frames.
+    // Two topics have frames, two have texts.
     expected.dedup();
     assert_eq!(found, expected);
 }
 
 #[test]
-fn the_version_is_2_of_a_distribution_of_our_own() {
+fn the_version_is_2_of_a_distribution_that_clients_know() {
     assert_eq!(
         values(Rosapi::GetRosVersion, json!({})),
         json!({"version": 2, "distro": "jazzy"})

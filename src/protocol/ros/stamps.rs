@@ -22,13 +22,13 @@ pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
 pub fn with_ros1_names(frame: &[u8]) -> Bytes {
     let mut text = Vec::with_capacity(2 * frame.len());
     let mut rest = frame;
-    while let Some((upto, seconds, nanoseconds)) = next_stamp(rest) {
-        let (before, behind) = rest.split_at(upto);
+    while let Some(stamp) = next_stamp(rest) {
+        let (before, behind) = rest.split_at(stamp.end);
         text.extend_from_slice(before);
         text.extend_from_slice(b",\"secs\":");
-        text.extend_from_slice(seconds);
+        text.extend_from_slice(stamp.seconds);
         text.extend_from_slice(b",\"nsecs\":");
-        text.extend_from_slice(nanoseconds);
+        text.extend_from_slice(stamp.nanoseconds);
         rest = behind;
     }
     text.extend_from_slice(rest);
@@ -36,8 +36,16 @@ pub fn with_ros1_names(frame: &[u8]) -> Bytes {
     Bytes::from(text)
 }
 
-/// The end of the first stamp in `text`, and its two numbers.
-fn next_stamp(text: &[u8]) -> Option<(usize, &[u8], &[u8])> {
+/// A stamp in a text.
+struct StampText<'a> {
+    /// Where it ends.
+    end: usize,
+    seconds: &'a [u8],
+    nanoseconds: &'a [u8],
+}
+
+/// The first stamp in `text`.
+fn next_stamp(text: &[u8]) -> Option<StampText<'_>> {
     let mut from = 0;
     loop {
         let found = text.get(from..)?;
@@ -50,7 +58,11 @@ fn next_stamp(text: &[u8]) -> Option<(usize, &[u8], &[u8])> {
             continue;
         };
         let (nanoseconds, behind) = number(behind);
-        return Some((text.len() - behind.len(), seconds, nanoseconds));
+        return Some(StampText {
+            end: text.len() - behind.len(),
+            seconds,
+            nanoseconds,
+        });
     }
 }
 

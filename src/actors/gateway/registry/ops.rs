@@ -232,10 +232,7 @@ impl Registry {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
-            encoding: Encoding {
-                ros1_stamps: has_ros1_stamps(subscribe),
-                ..subscribe.encoding
-            },
+            encoding: encoding_for(subscribe),
             _size: size,
             _share: share,
         });
@@ -372,15 +369,16 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
     }
 }
 
-/// Whether stamps are to have the names of ROS 1 too: on a topic of the runtime's own that was asked for by its type of
-/// ROS 1. CDR has no names.
-fn has_ros1_stamps(subscribe: &Subscribe) -> bool {
+/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that
+/// is asked for by its type of ROS 1. CDR has no names.
+fn encoding_for(subscribe: &Subscribe) -> Encoding {
     let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
-    let asked = subscribe.type_name.as_deref();
-    subscribe.encoding.compression != Compression::CborRaw
-        && own
-            .zip(asked)
-            .is_some_and(|(topic, asked)| is_ros1_name(asked, topic.type_name()))
+    let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
+    let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
+    Encoding {
+        ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
+        ..subscribe.encoding
+    }
 }
 
 /// Whether the runtime itself subscribes to the topic.
