@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -15,7 +15,10 @@ build: ## Build the program (release); needs no network once the dependencies ar
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
 
-run: build ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3"
+run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3". Without cargo a program that is there runs
+	@if command -v "$(firstword $(CARGO))" > /dev/null; then $(MAKE) --no-print-directory build; \
+	elif [ -x "$(TARGET_DIR)/release/pendularm" ]; then echo "make run: no cargo here; the program that is built already runs"; \
+	else echo "make run: needs cargo, or a program that is built already: $(TARGET_DIR)/release/pendularm" >&2; exit 1; fi
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
@@ -26,6 +29,10 @@ test: ## Run every test but those of the page
 test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"
 	$(CARGO) test --locked --test wire -- faults_slow:: memory_slow:: --ignored --nocapture --test-threads 1
+
+check-study: ## Try every answer of the study on COUNT=10000 random arms, gains, poses and setpoints; FROM=n begins at case n
+	@echo "make check-study: an optimised build, then some minutes for each 10000"
+	COUNT="$(or $(COUNT),10000)" FROM="$(or $(FROM),0)" $(CARGO) test --locked --release --test study -- properties:: --nocapture
 
 test-page: node_modules ## Check the page's types and try its logic without a browser; needs node 20 with npm
 	@echo "make test-page: types, then unit tests"
@@ -40,7 +47,7 @@ test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS
 	@echo "make test-browser: the page in headless Chromium"
 	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
-test-clients: build ## Run clients that nobody here wrote against it: roslibpy, roslib 1 and 2, Lichtblick's packages, roslibrust
+test-clients: build ## Run clients that nobody here wrote against it: roslibpy, compas_fab, roslib 1 and 2, Lichtblick's packages, roslibrust
 	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 

@@ -34,7 +34,8 @@ export class Rosbridge {
     socket.onopen = () => {
       this.retryMs = FIRST_RETRY_MS;
       // Errors about what we publish are worth showing; over WebSocket they come only when asked for.
-      this.send({ op: "set_level", level: "error" });
+      // `values` of a refused call are the values as they now are, not the text that `status` has too.
+      this.send({ op: "set_level", level: "error", errors: "object" });
       for (const topic of this.handlers.keys()) this.send(this.subscription(topic));
       this.onState("open");
     };

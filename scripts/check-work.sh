@@ -30,7 +30,7 @@ per_step() { # variant
 }
 
 # Steps of the arm and a constant force only: sine and cosine there are our own, not the system's, which vary.
-variants=(step-{2,3}-{euler,midpoint,verlet,rk4}-free step-{2,3}-rk4-pid particle-rk4-constant)
+variants=(step-{2,3}-{euler,midpoint,verlet,rk4}-free step-{2,3}-rk4-{pid,weightless} particle-rk4-constant)
 if [ "${1:-}" = --record ]; then
     { echo "# $toolchain"; echo "step,instructions"; for variant in "${variants[@]}"; do echo "$variant,$(per_step "$variant")"; done; } >"$recorded.part"
     mv "$recorded.part" "$recorded"

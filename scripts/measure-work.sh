@@ -33,7 +33,7 @@ echo "name,value,unit" >"$scratch/work.csv"
 put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
 
 count=20000
-for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd,pid,weightless-pd} \
+for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd,pi,pid,pushed,weightless-pd} \
     step-3-rk4-{free,weightless,pd,pid} particle-rk4-{constant,cosine}; do
     once=$(instructions "$target/release/work" "$variant" $count)
     twice=$(instructions "$target/release/work" "$variant" $((2 * count)))

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Installs the wheel that `make wheel` left into a fresh virtual environment, and tests it there: test-python.sh [pytest's arguments].
+# Installs the wheel that `make wheel` left into a fresh virtual environment, and tests it there. Arguments are pytest's.
 set -euo pipefail
 cd "$(dirname "$0")/../python"
 wheel=$(realpath target/wheels/*.whl)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Builds the Python wheel: wheel.sh PROGRAM. The release program goes in as it is, beside the library; maturin comes from PyPI into
-# python/.venv. The wheel is left in python/target/wheels/, alone.
+# Builds the Python wheel: wheel.sh PROGRAM. The release program goes in as it is, beside the library; maturin comes
+# from PyPI into python/.venv. The wheel is left in python/target/wheels/, alone.
 set -euo pipefail
 program=$(realpath "$1")
 cd "$(dirname "$0")/../python"
@@ -10,7 +10,6 @@ maturin=1.16.0
 say() { echo "wheel: $*"; }
 fail() { echo "wheel: $*" >&2; exit 1; }
 
-command -v objdump >/dev/null || fail "objdump (binutils) is needed"
 if [ "$(.venv/bin/maturin --version 2>/dev/null)" != "maturin $maturin" ]; then
     say "installing maturin $maturin into python/.venv"
     [ -x .venv/bin/python ] || python3 -m venv .venv
@@ -25,6 +24,7 @@ chmod 755 target/wheel-data/scripts/pendularm
 # On Linux the wheel says which C library it needs at least, and maturin looks at what it builds itself only.
 compatibility=()
 if [ "$(uname -s)" = Linux ]; then
+    command -v objdump >/dev/null || fail "objdump (binutils) is needed"
     glibc=$(objdump -T "$program" | grep -o 'GLIBC_[0-9][0-9.]*' | sort -Vu | tail -n 1)
     glibc=${glibc#GLIBC_}
     compatibility=(--compatibility "manylinux_${glibc//./_}")

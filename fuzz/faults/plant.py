@@ -51,6 +51,7 @@ def plant(root, copy, parts, faults):
         if (root / part).is_dir():
             shutil.copytree(root / part, copy / part)
         elif (root / part).exists():
+            (copy / part).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(root / part, copy / part)
     library = copy / "src/lib.rs"
     library.write_text(library.read_text() + SWITCH)

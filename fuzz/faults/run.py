@@ -132,7 +132,7 @@ def find(number, target, binaries, more=()):
 def main():
     words = sys.argv[1:]
     chosen = [number for number, fault in enumerate(FAULTS, 1) if not words or str(number) in words or fault[0] in words]
-    parts = ("src", "page", "fuzz", "Cargo.toml", "Cargo.lock", "README.md")
+    parts = ("src", "page", "client", "fuzz", "Cargo.toml", "Cargo.lock", "README.md")
     missing = plant(ROOT, COPY, parts, [fault[1:] for fault in FAULTS])
     binaries = build()
     lost = [number for number in missing if number in chosen]

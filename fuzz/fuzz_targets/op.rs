@@ -14,9 +14,9 @@ use libfuzzer_sys::fuzz_target;
 use pendularm::protocol::catalog::Topic;
 use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages::trajectory::joint_trajectory;
-use pendularm::protocol::messages::{self, Level};
+use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::{
-    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
+    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, PursuerOp,
 };
 use pendularm::protocol::wire::frame::FrameReader;
 use pendularm::protocol::wire::payload::Payload;
@@ -75,7 +75,9 @@ fn judge(frame: &str) {
             );
             let line = match &error {
                 OpError::Status(_) => messages::status(Level::Error, &why, id),
-                OpError::Call { service, .. } => messages::failure(service, id, &why),
+                OpError::Call { service, .. } => {
+                    messages::failure(service, id, &why, ErrorForm::Object)
+                }
             };
             let line = check_line(&line);
             assert_eq!(line.get("id").is_some(), id.is_some(), "{frame:?}");
@@ -149,7 +151,26 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
         }
         Op::SendActionGoal(goal) => check_name(json, "action", &goal.action),
         Op::CancelActionGoal { action } => check_name(json, "action", action),
-        Op::Fragment(_) | Op::SetLevel(_) | Op::Auth { .. } => {}
+        Op::Pursue { action, pursuit } => {
+            check_name(json, "action", action);
+            match pursuit {
+                PursuerOp::Advertise { .. } | PursuerOp::Unadvertise => {}
+                PursuerOp::Feedback { values } => {
+                    let line = check_line(&messages::action_feedback_raw(action, id, values));
+                    check_passed_on(json.get("values"), line.get("values"));
+                }
+                PursuerOp::End {
+                    values,
+                    status,
+                    result,
+                } => {
+                    assert!(*status <= 6, "a status of a goal");
+                    let line = messages::action_result_raw(action, id, values, *status, *result);
+                    check_line(&line);
+                }
+            }
+        }
+        Op::Fragment(_) | Op::SetLevel { .. } | Op::Auth { .. } => {}
     }
 }
 

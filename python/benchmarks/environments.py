@@ -1,8 +1,9 @@
 """Steps a second beside Acrobot and MuJoCo, in one run on one core: environments.py [seconds per row].
 
-Needs gymnasium and mujoco beside the wheel (`requirements.txt` in this folder). Every row is measured in turn, three rounds,
-in processor time of this process, which other programs on the machine disturb less than the clock; the best round counts.
-A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python, one of pendularm and of MuJoCo two over 0.025 s.
+Needs gymnasium and mujoco beside the wheel (`requirements.txt` in this folder). Every row is measured in turn, three
+rounds, in processor time of this process, which other programs on the machine disturb less than the clock; the best
+round counts. A step of Acrobot is one of Runge-Kutta 4 over 0.2 s in Python, one of pendularm and of MuJoCo two over
+0.025 s.
 """
 
 import sys
@@ -22,8 +23,9 @@ ROUNDS = 3
 
 ROD = """<body pos="{at} 0 0"><joint axis="0 0 1"/><geom type="capsule" size=".01" fromto="0 0 0 1 0 0" mass="0"/>
 <inertial pos=".5 0 0" mass="1" diaginertia="1e-6 .083333333333 .083333333333"/>{further}</body>"""
-ARM = f"""<mujoco><option timestep=".025" integrator="RK4" gravity="0 -9.81 0"><flag contact="disable"/></option><worldbody>
-{ROD.format(at=0, further=ROD.format(at=1, further=""))}</worldbody></mujoco>"""
+LINKS = ROD.format(at=0, further=ROD.format(at=1, further=""))
+ARM = f"""<mujoco><option timestep=".025" integrator="RK4" gravity="0 -9.81 0"><flag contact="disable"/></option>
+<worldbody>{LINKS}</worldbody></mujoco>"""
 
 
 def single(env: gymnasium.Env) -> Callable[[], int]:

@@ -1,7 +1,7 @@
 """Settings a second of one sweep by the number of workers: workers.py [settings].
 
-On threads, as `sweep` does by itself, and on a Dask cluster on loopback whose workers are processes of one thread (needs
-`distributed` beside the wheel). Clock time, the best of three rounds; other programs on the machine count.
+On threads, as `sweep` does by itself, and on a Dask cluster on loopback whose workers are processes of one thread
+(needs `distributed` beside the wheel). Clock time, the best of three rounds; other programs on the machine count.
 """
 
 import os
@@ -38,10 +38,8 @@ def main() -> None:
     while workers <= (os.cpu_count() or 1):
         with ThreadPoolExecutor(workers) as threads:
             on_threads = rate(settings, threads)
-        with (
-            distributed.LocalCluster(workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as cluster,
-            distributed.Client(cluster) as client,
-        ):
+        here = {"host": "127.0.0.1", "dashboard_address": None, "threads_per_worker": 1}
+        with distributed.LocalCluster(workers, **here) as cluster, distributed.Client(cluster) as client:
             print(f"| {workers} | {on_threads:,.0f} | {rate(settings, client.get_executor()):,.0f} |")
         workers *= 2
 

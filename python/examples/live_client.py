@@ -1,4 +1,5 @@
-"""Moves the arm of a live runtime with roslibpy: live_client.py [HOST:PORT]. `pendularm` starts one; look at its page meanwhile.
+"""Moves the arm of a live runtime with roslibpy: live_client.py [HOST:PORT]. `pendularm` starts one; look at its page
+meanwhile.
 
 The library says where the joints have to be, the runtime takes them there, and its own topic says how it went.
 """

@@ -1,8 +1,8 @@
 """A policy that swings the arm up, found in about a minute: policy.py [seconds].
 
-CMA-ES (the package `cma`) draws some dozens of small networks; a vector environment tries each of them on several arms at once,
-and the best half shapes the next draw. Needs `pip install "pendularm[gym]" cma`. Prints the reward of a random policy and what is
-found, on starts that were not trained on, and keeps the network in `policy.npz`.
+CMA-ES (the package `cma`) draws some dozens of small networks; a vector environment tries each of them on several arms
+at once, and the best half shapes the next draw. Needs `pip install "pendularm[gym]" cma`. Prints the reward of a
+random policy and what is found, on starts that were not trained on, and keeps the network in `policy.npz`.
 """
 
 import sys
@@ -57,7 +57,8 @@ def train(seconds: float = np.inf, generations: float = np.inf) -> np.ndarray:
         generation += 1
         steps += len(drawn) * STARTS * STEPS
         if generation % 20 == 0:
-            print(f"{time.monotonic() - began:5.1f} s, {steps / 1e6:5.1f} million steps: best {-search.best.f:.3f}", flush=True)
+            took = time.monotonic() - began
+            print(f"{took:5.1f} s, {steps / 1e6:5.1f} million steps: best {-search.best.f:.3f}", flush=True)
     return search.result.xfavorite
 
 

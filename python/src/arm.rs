@@ -30,8 +30,9 @@ pub(crate) use for_either;
 
 /// An arm: a chain of 2 or 3 uniform rods on revolute joints, and gravity along -y. It never changes.
 ///
-/// Joint angles are relative to the link before (the first to +x), counter-clockwise. `lengths` [m] and `masses` [kg] have one
-/// number per link, 1 unless given; `gravity` [m/s²] is 9.81 unless given. Raises `ValueError` for a number that no arm can have.
+/// Joint angles are relative to the link before (the first to +x), counter-clockwise. `lengths` [m] and `masses` [kg]
+/// have one number per link, 1 unless given; `gravity` [m/s²] is 9.81 unless given. Raises `ValueError` for a number
+/// that no arm can have.
 #[pyclass(frozen, eq, module = "pendularm")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Arm {

@@ -66,7 +66,8 @@ fn each_row<'py, const N: usize, const K: usize>(
     Ok(flat.into_pyarray(py).reshape(shape)?.into_any())
 }
 
-/// Mass matrix M(q) [kg m²] at joint positions `q` [rad], of shape (links,) or (n, links): (links, links) or (n, links, links).
+/// Mass matrix M(q) [kg m²] at joint positions `q` [rad], of shape (links,) or (n, links): (links, links) or (n,
+/// links, links).
 #[pyfunction]
 pub(crate) fn mass_matrix<'py>(
     py: Python<'py>,
@@ -90,7 +91,8 @@ pub(crate) fn mass_matrix<'py>(
     for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
 }
 
-/// Coriolis and centrifugal effort C(q, qd) qd [N m] at positions `q` [rad] and rates `qd` [rad/s], of shape (links,) or (n, links).
+/// Coriolis and centrifugal effort C(q, qd) qd [N m] at positions `q` [rad] and rates `qd` [rad/s], of shape (links,)
+/// or (n, links).
 #[pyfunction]
 pub(crate) fn coriolis<'py>(
     py: Python<'py>,
@@ -135,7 +137,8 @@ pub(crate) fn gravity_load<'py>(
     for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
 }
 
-/// Joint accelerations [rad/s²] under `effort` [N m] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n, links).
+/// Joint accelerations [rad/s²] under `effort` [N m] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n,
+/// links).
 #[pyfunction]
 pub(crate) fn forward_dynamics<'py>(
     py: Python<'py>,
@@ -163,7 +166,8 @@ pub(crate) fn forward_dynamics<'py>(
     for_either!(Chain, &arm.get().chain, arm => of(py, arm, [&q, &qd, &effort]))
 }
 
-/// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n, links).
+/// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape (links,)
+/// or (n, links).
 #[pyfunction]
 pub(crate) fn inverse_dynamics<'py>(
     py: Python<'py>,
@@ -217,7 +221,8 @@ pub(crate) fn kinetic_energy<'py>(
     for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q, &qd))
 }
 
-/// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a number, or (n,).
+/// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a number,
+/// or (n,).
 #[pyfunction]
 pub(crate) fn potential_energy<'py>(
     py: Python<'py>,
@@ -257,8 +262,8 @@ pub(crate) fn end_effector<'py>(
 
 /// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].
 ///
-/// `phi` [rad] is the heading of the last link of 3; `present` [rad] decides what the target leaves open, as `/ik/solve` does by
-/// the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
+/// `phi` [rad] is the heading of the last link of 3; `present` [rad] decides what the target leaves open, as
+/// `/ik/solve` does by the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
 #[pyfunction]
 #[pyo3(signature = (arm, x, y, phi=None, *, present=None))]
 pub(crate) fn inverse_kinematics<'py>(

@@ -1,15 +1,16 @@
-//! The arm of pendularm for Python: what the live runtime steps, as a library that NumPy arrays go into and come out of.
+//! The arm of pendularm for Python: what the live runtime steps, as a library that NumPy arrays go into and come out
+//! of.
 //!
-//! Thin: values are read and named here, and everything is computed by the `pendularm` crate, whose simulation every arm is
-//! stepped by. `package/pendularm/` is what users import; it words what this module answers.
+//! Thin: values are read and named here, and everything is computed by the `pendularm` crate, whose simulation every
+//! arm is stepped by. `package/pendularm/` is what users import; it words what this module answers.
 //!
-//! **Invariant:** whatever takes longer than a moment runs with the interpreter's lock released, and ends when a signal asks for it.
+//! **Invariant:** whatever takes longer than a moment runs with the interpreter's lock released, and ends when a
+//! signal asks for it.
 
 mod arm;
 mod batch;
 mod dynamics;
 mod fields;
-mod lanes;
 mod patience;
 mod simulation;
 mod study;
@@ -29,5 +30,5 @@ mod native {
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]
-    use crate::study::{plan, rollout, stability};
+    use crate::study::{plan, rollout, stability, suggest_gains};
 }

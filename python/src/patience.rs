@@ -1,10 +1,12 @@
-//! Long computations: without the interpreter's lock, and in pieces, so that Ctrl-C ends them.
+//! Long computations, and waiting for them: without the interpreter's lock, and in pieces, so that Ctrl-C ends them.
 //!
 //! **Invariant:** a signal is heard within a fraction of a second, whatever is computed.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use pyo3::prelude::*;
+use pyo3::prelude::{PyResult, Python};
+use pyo3::sync::MutexExt;
 
 /// How long a piece is: short for who presses Ctrl-C, long beside the time that it takes to look.
 const PIECE: Duration = Duration::from_millis(50);
@@ -32,4 +34,11 @@ pub(crate) fn until_done<T: Send>(
         }
         py.check_signals()?;
     }
+}
+
+/// Waits for a lock without keeping the interpreter's. What is behind it is whole, also after a panic of another
+/// thread.
+pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
+    one.lock_py_attached(py)
+        .unwrap_or_else(PoisonError::into_inner)
 }

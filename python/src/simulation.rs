@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** every step is the live arm's own, so that the same calls give the same bits as the runtime.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, PoisonError};
 
 use numpy::{PyArray1, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
@@ -12,12 +12,11 @@ use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation as Loop;
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
-use pyo3::sync::MutexExt;
 use pyo3::types::PyDict;
 
 use crate::arm::{Arm, Chain, for_either, or_default};
 use crate::fields::{self, Bound, Held, Object, joints, joints_or, refused};
-use crate::patience::until_done;
+use crate::patience::{hold, until_done};
 
 /// Steps between two looks at the clock: some hundred microseconds.
 const STEPS_PER_LOOK: u64 = 1000;
@@ -50,19 +49,14 @@ impl Divergence {
 
 /// One arm under control, advanced in whole steps: the live arm of the runtime, without its clock.
 ///
-/// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`, `midpoint`, `verlet` or
-/// `rk4`; `timestep` [s] is the control period too; `gains` is `{"kp": [N m/rad], "ki": [N m/(rad s)], "kd": [N m s/rad]}`, (links,)
-/// each, and what is left out of it is as in a fresh runtime. Threads may share one.
+/// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`,
+/// `midpoint`, `verlet` or `rk4`; `timestep` [s] is the control period too; `gains` is `{"kp": [N m/rad], "ki": [N
+/// m/(rad s)], "kd": [N m s/rad]}`, (links,) each, and what is left out of it is as in a fresh runtime. Threads may
+/// share one.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {
     own: Either,
-}
-
-/// Waits for a lock without keeping the interpreter's. What is behind it is whole, also after a panic of another thread.
-fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
-    one.lock_py_attached(py)
-        .unwrap_or_else(PoisonError::into_inner)
 }
 
 /// A simulation of this arm.
@@ -100,8 +94,8 @@ impl Simulation {
         Ok(Self { own })
     }
 
-    /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged. The interpreter's lock is
-    /// released meanwhile, and Ctrl-C ends it between two steps.
+    /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged. The
+    /// interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
     #[pyo3(signature = (steps=1))]
     fn step(&self, py: Python<'_>, steps: u64) -> PyResult<u64> {
         let mut left = steps;
@@ -118,8 +112,8 @@ impl Simulation {
         })
     }
 
-    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, disturbance ended, divergence cleared. On or off,
-    /// gains, arm, method and timestep stay.
+    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, disturbance ended, divergence
+    /// cleared. On or off, gains, arm, method and timestep stay.
     fn reset(&self, py: Python<'_>) {
         for_either!(Either, &self.own, one => hold(py, one).reset());
     }
@@ -130,7 +124,8 @@ impl Simulation {
         for_either!(Either, &self.own, one => hold(py, one).enable(data));
     }
 
-    /// Where the controller holds the arm: `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,) each.
+    /// Where the controller holds the arm: `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,)
+    /// each.
     #[pyo3(signature = (positions, velocities=None))]
     fn set_setpoint(
         &self,
@@ -145,7 +140,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Changes the gains that are given, (links,) each: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The integral stays.
+    /// Changes the gains that are given, (links,) each: `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad]. The
+    /// integral stays.
     #[pyo3(signature = (kp=None, ki=None, kd=None))]
     fn set_gains(
         &self,
@@ -166,8 +162,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Puts the arm into another state, `position` [rad] and `velocity` [rad/s] (zeros unless given), (links,) each. Clock and
-    /// controller stay.
+    /// Puts the arm into another state, `position` [rad] and `velocity` [rad/s] (zeros unless given), (links,) each.
+    /// Clock and controller stay.
     #[pyo3(signature = (position, velocity=None))]
     fn set_state(
         &self,
@@ -185,8 +181,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Adds `effort` [N m], (links,), to that of every step that begins within `duration` [s] from now, in place of what was added so
-    /// far. With the controller off, this is all the effort there is.
+    /// Adds `effort` [N m], (links,), to that of every step that begins within `duration` [s] from now, in place of
+    /// what was added so far. With the controller off, this is all the effort there is.
     fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: f64) -> PyResult<()> {
         let duration = fields::number("duration", duration, Bound::Positive)?;
         for_either!(Either, &self.own, one => {

@@ -8,6 +8,7 @@ use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::{ControlLoop, no_control};
+use pendularm::study::gains::{GainsSearch, Wish};
 use pendularm::study::motion::Motion;
 use pendularm::study::planner::{Planned, Planning, Task};
 use pendularm::study::rollout::{Deviation, Plan, Rollout};
@@ -189,6 +190,45 @@ fn listed_run<'py, const N: usize>(
     )?;
     found.set_item("divergence", divergence)?;
     Ok(found)
+}
+
+// ---- gains ----------------------------------------------------------------------------------------------------------
+
+#[pyfunction]
+#[pyo3(signature = (arm=None, *, settling_time=4.0, margin=1.25, timestep=0.001, integrator="rk4"))]
+pub(crate) fn suggest_gains<'py>(
+    py: Python<'py>,
+    arm: Option<Held<'py, Arm>>,
+    settling_time: f64,
+    margin: f64,
+    timestep: f64,
+    integrator: &str,
+) -> PyResult<Held<'py, PyDict>> {
+    let wish = Wish {
+        settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
+        margin: fields::number("margin", margin, Bound::Positive)?,
+    };
+    if margin < 1.0 {
+        return Err(refused(format_args!(
+            "margin must be at least 1, got {margin}"
+        )));
+    }
+    let method = fields::method("integrator", integrator)?;
+    let timestep = fields::number("timestep", timestep, Bound::Positive)?;
+    for_either!(Chain, or_default(arm.as_ref()), arm => {
+        let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
+        let mut search = GainsSearch::new(&control, wish).map_err(refused)?;
+        let found = until_done(py, || search.advance())?.map_err(refused)?;
+        let listed = PyDict::new(py);
+        listed.set_item("kp", found.gains.kp.to_pyarray(py))?;
+        listed.set_item("ki", found.gains.ki.to_pyarray(py))?;
+        listed.set_item("kd", found.gains.kd.to_pyarray(py))?;
+        listed.set_item("timestep_limit", found.limit)?;
+        listed.set_item("certified", found.certified)?;
+        listed.set_item("margin", found.limit.map(|limit| limit / timestep))?;
+        listed.set_item("settled_after", found.settled_after)?;
+        Ok(listed)
+    })
 }
 
 // ---- plan -----------------------------------------------------------------------------------------------------------

@@ -161,11 +161,17 @@ def test_arrays_go_in_as_they_lie():
         (lambda batch: batch.step(-1), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(1, [[1, 2]]), "effort must have the shape (2,) or (3, 2), got [1, 2]"),
         (lambda batch: batch.step(1, [np.nan, 0]), "effort[0] must be finite, got NaN"),
-        (lambda batch: batch.step(1, batch.position), "this batch's own arrays are in use elsewhere: hand in copies of them"),
+        (
+            lambda batch: batch.step(1, batch.position),
+            "this batch's own arrays are in use elsewhere: hand in copies of them",
+        ),
         (lambda batch: batch.set_gains(ki=[[0, 0], [0, -1], [0, 0]]), "ki[1][1] must be finite and at least 0, got -1"),
         (lambda batch: batch.set_params([1, 2, -3]), "gravity[2] must be finite and at least 0, got -3"),
         (lambda batch: batch.set_params(masses=[0, 1]), "masses[0] must be finite and greater than 0, got 0"),
-        (lambda batch: batch.set_integrator(timestep=[1, 1]), "timestep must be a number or have the shape (3,), got [2]"),
+        (
+            lambda batch: batch.set_integrator(timestep=[1, 1]),
+            "timestep must be a number or have the shape (3,), got [2]",
+        ),
         (lambda batch: batch.set_integrator("heun"), 'method must be one of euler, midpoint, verlet, rk4, got "heun"'),
         (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
         (lambda batch: batch.reset([3]), "arms must be a mask of 3 or indices below that"),
@@ -183,7 +189,7 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
 
 
 def test_the_interpreters_lock_is_released_while_it_steps():
-    """Another thread gets on in the middle of a call, with an interpreter that takes its lock from nobody who keeps it."""
+    """Another thread gets on in the middle of a call, with an interpreter that takes its lock from nobody."""
     batch = pendularm.Batch(64, threads=1)
     seen, done = 0, threading.Event()
 

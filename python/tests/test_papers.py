@@ -19,7 +19,8 @@ def blocks(text):
 
 def run(code, folder):
     here = {**os.environ, "MPLBACKEND": "Agg"}
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, env=here, capture_output=True, text=True, timeout=300)
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=folder, env=here, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0, done.stderr
     return done.stdout
 

@@ -133,7 +133,10 @@ def test_arms_are_values():
         (lambda arm: arm.set_gains(kd=[1, -2]), "kd[1] must be finite and at least 0, got -2"),
         (lambda arm: arm.set_state([0, math.nan]), "position[1] must be finite, got NaN"),
         (lambda arm: arm.disturb([0, 0], 0.0), "duration must be finite and greater than 0, got 0"),
-        (lambda arm: setattr(arm, "method", "leapfrog"), 'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"'),
+        (
+            lambda arm: setattr(arm, "method", "leapfrog"),
+            'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"',
+        ),
         (lambda arm: setattr(arm, "timestep", 0.0), "timestep must be finite and greater than 0, got 0"),
         (lambda arm: setattr(arm, "arm", pendularm.Arm(3)), "arm must have as many links as the one before"),
         (lambda arm: pendularm.Simulation(gains={"kx": [1, 1]}), "gains has kp, ki and kd, got 'kx'"),

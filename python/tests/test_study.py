@@ -81,16 +81,34 @@ def test_a_plan_is_the_services(runtime, links):
     assert ours == theirs
 
 
+def test_suggested_gains_are_the_services(runtime, links):
+    runtime.call("/arm_sim/pause", data=True)
+    runtime.call("/arm_sim/reset")
+    params = {"masses": [0.5, 0.4, 0.3][:links], "lengths": [0.6, 0.5, 0.4][:links]}
+    theirs = runtime.call("/study/gains", params=params, settling_time=6.0, margin=1.5, timestep=0.0005)
+    found = pendularm.suggest_gains(pendularm.Arm(links, **params), settling_time=6.0, margin=1.5, timestep=0.0005)
+    assert plain(found) == theirs
+    assert found.margin >= 1.5
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
         (lambda: pendularm.plan(-1.0), "error must be finite and greater than 0, got -1"),
         (lambda: pendularm.plan(0.1, duration=1e4), "duration must be at most 1000 s, got 10000"),
+        (lambda: pendularm.suggest_gains(margin=0.5), "margin must be at least 1, got 0.5"),
+        (
+            lambda: pendularm.suggest_gains(settling_time=1e6),
+            "settling_time / timestep must be at most 1e6 steps, got 1e9",
+        ),
         (lambda: pendularm.rollout(timestep=0.0), "timestep must be greater than 0, got 0"),
         (lambda: pendularm.rollout(samples=1), "samples must be between 2 and 100000, got 1"),
         (lambda: pendularm.rollout(gains={"kp": [1, -1]}), "gains.kp[1] must be finite and at least 0, got -1"),
         (lambda: pendularm.rollout(q0=[1]), "q0 must be an array of 2 numbers, got [1]"),
-        (lambda: pendularm.stability(integrator="ab2"), 'integrator must be one of euler, midpoint, verlet, rk4, got "ab2"'),
+        (
+            lambda: pendularm.stability(integrator="ab2"),
+            'integrator must be one of euler, midpoint, verlet, rk4, got "ab2"',
+        ),
     ],
 )
 def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):

@@ -1,4 +1,4 @@
-"""Sweeps: the same bits from any number of workers, kept on disk and gone on with, on a real cluster that loses a worker."""
+"""Sweeps: the same bits from any number of workers, kept on disk and gone on with, also where a worker is lost."""
 
 import json
 import subprocess
@@ -119,7 +119,17 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"method": ["heun"]}), "method must be one of euler, midpoint, verlet, rk4"),
         (lambda: pendularm.sweep({"kp": [1]}, "speed"), "metric must be one of final_error, settling_time"),
         (lambda: pendularm.sweep({"kp": [1]}, duration=-1), "duration must be finite and greater than 0, got -1"),
-        (lambda: pendularm.sweep({"kp": [1]}, samples=1), "samples must be at least 2, got 1"),
+        (lambda: pendularm.sweep({"kp": [1]}, samples=1), "samples must be between 2 and 100000, got 1"),
+        (lambda: pendularm.sweep({"kp": [1]}, samples=10**9), "samples must be between 2 and 100000, got 1000000000"),
+        (lambda: pendularm.sweep({"kp": [1]}, piece=0), "piece must be between 1 and 24937 with 401 samples, got 0"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, piece=10**6),
+            "piece must be between 1 and 24937 with 401 samples, got 1000000",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": range(4000), "kd": range(4000)}),
+            "grid must have at most 10000000 combinations, got 16000000",
+        ),
     ],
 )
 def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):

@@ -25,7 +25,7 @@
 //! To the registry, from nodes:
 //!
 //! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what the arm says.
-//! - [`node::Feedback`], from `ik_action`: feedback of a goal, for the client that sent it by the action.
+//! - [`node::Feedback`], from `ik_action`, `follow` and `tf_web`: feedback of a goal, for the client that sent it.
 //! - [`Overhear`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
 //!
@@ -47,6 +47,13 @@
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], [`RefuseSteps`], from the runtime: whom to ask for the largest stable timestep; the end, at which
 //!   steps that are still to be taken are refused.
+//! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
+//!
+//! To `follow`: [`FollowPath`], [`StopFollowing`], from the registry: a path, and its end.
+//!
+//! To `parameters`: [`node::Call`] of [`GetParameters`] and its like, from the registry: the arm's, as ROS 2 has them.
+//!
+//! To `tf_web`: [`WishFrames`], [`ForgetFrames`], from the registry: frames for a web viewer, and their end.
 //!
 //! To `ik`: [`node::Call`] of [`Solve`], from the registry and `ik_action`: joint positions for a target.
 //!
@@ -69,6 +76,13 @@
 //!
 //! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
 //!
+//! [`ArmMotion`]: arm::sim::ArmMotion
+//! [`MoveSetpoint`]: arm::sim::MoveSetpoint
+//! [`FollowPath`]: arm::follow::FollowPath
+//! [`StopFollowing`]: arm::follow::StopFollowing
+//! [`GetParameters`]: ros::parameters::GetParameters
+//! [`WishFrames`]: ros::tf_web::WishFrames
+//! [`ForgetFrames`]: ros::tf_web::ForgetFrames
 //! [`Connect`]: gateway::messages::Connect
 //! [`Disconnect`]: gateway::messages::Disconnect
 //! [`Ended`]: gateway::messages::Ended

@@ -17,6 +17,7 @@ use tokio::runtime::Builder;
 use tokio::time::{Instant, sleep, timeout};
 
 use super::signals::Signals;
+use crate::actors::arm::follow::{PathArm, PathFollower};
 use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
@@ -32,8 +33,10 @@ use crate::actors::gateway::registry::{Attach, Registry};
 #[cfg(feature = "record")]
 use crate::actors::recorder::{EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
 use crate::actors::ros::rosout::Rosout;
+use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
@@ -220,10 +223,18 @@ where
     });
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
+    Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
     let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
     Rosapi::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
+
+    let frames = TfRepublisher::new(
+        arm.clone().recipient(),
+        arm.clone().recipient(),
+        registry.clone().recipient(),
+    );
+    TfRepublisher::attach(&frames.start(), nodes);
 
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
@@ -232,6 +243,7 @@ where
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
+    PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
     let tracker = GoalTracker {
         track: arm.clone().recipient(),
         command: arm.clone().recipient(),

@@ -13,5 +13,6 @@ pub mod pacer;
 pub mod particle;
 pub mod pid;
 pub mod simulation;
+pub mod trajectory;
 pub mod trial;
 pub mod trig;

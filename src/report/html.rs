@@ -1,4 +1,4 @@
-//! The page: findings in words, verdicts, then figures and tables. One file, no script, no network.
+//! The page: answers, findings in words, figures and tables, then verdicts. One file, no script, no network.
 //!
 //! **Invariant:** everything that comes from a section is escaped, but for the panels, which are SVG of our own making.
 
@@ -10,6 +10,12 @@ use super::svg::{STYLE, escape};
 
 const PAGE_STYLE: &str = include_str!("page.css");
 
+/// The section that only a maintainer asks for.
+const LAST: &str = "work";
+
+/// Rows of a table beyond which it is folded.
+const FOLDED: usize = 8;
+
 /// The whole page.
 pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
     let mut out = format!(
@@ -19,16 +25,21 @@ pub(crate) fn page(sections: &[Section], machine: &Machine) -> String {
     );
     header(&mut out, sections, machine);
     out.push_str("<main>");
-    findings(&mut out, sections);
     for section in sections {
-        for table in &section.glance {
+        for block in &section.glance {
             out.push_str("<section class=\"glance\">");
-            self::table(&mut out, table, "h2");
+            self::block(&mut out, block, "h2");
             out.push_str("</section>");
         }
     }
+    findings(&mut out, sections);
+    // A maintainer's sections come last.
+    let (others, last): (Vec<_>, Vec<_>) = sections.iter().partition(|it| it.name != LAST);
+    for section in others {
+        body(&mut out, section);
+    }
     verdicts(&mut out, sections);
-    for section in sections {
+    for section in last {
         body(&mut out, section);
     }
     making(&mut out, sections, machine);
@@ -101,13 +112,17 @@ fn body(out: &mut String, section: &Section) {
         ),
     );
     for block in &section.blocks {
-        match block {
-            Block::Text(text) => append(out, format_args!("<p>{}</p>", emphasised(text))),
-            Block::Figure(figure) => self::figure(out, figure),
-            Block::Table(table) => self::table(out, table, "h3"),
-        }
+        self::block(out, block, "h3");
     }
     out.push_str("</section>");
+}
+
+fn block(out: &mut String, block: &Block, heading: &str) {
+    match block {
+        Block::Text(text) => append(out, format_args!("<p>{}</p>", emphasised(text))),
+        Block::Figure(figure) => self::figure(out, figure),
+        Block::Table(table) => self::table(out, table, heading),
+    }
 }
 
 fn figure(out: &mut String, figure: &Figure) {
@@ -153,6 +168,11 @@ fn table(out: &mut String, table: &Table, heading: &str) {
             format_args!("<p class=\"caption\">{}</p>", escape(&table.caption)),
         );
     }
+    let folded = table.rows.len() > FOLDED;
+    if folded {
+        let rows = table.rows.len();
+        append(out, format_args!("<details><summary>{rows} rows</summary>"));
+    }
     out.push_str("<div class=\"scroll\"><table><thead><tr>");
     for head in &table.head {
         append(out, format_args!("<th>{}</th>", escape(head)));
@@ -175,6 +195,9 @@ fn table(out: &mut String, table: &Table, heading: &str) {
         out.push_str("</tr>");
     }
     out.push_str("</tbody></table></div>");
+    if folded {
+        out.push_str("</details>");
+    }
 }
 
 fn making(out: &mut String, sections: &[Section], machine: &Machine) {
@@ -185,7 +208,8 @@ fn making(out: &mut String, sections: &[Section], machine: &Machine) {
             format_args!("<dt>{}</dt><dd>{}</dd>", escape(name), escape(value)),
         );
     }
-    out.push_str("</dl><p>Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
+    out.push_str("</dl><p>Sections are made side by side on the cores there are, those that measure times one after \
+         the other. Times are the minimum of repeats after one untimed run, on one thread; whiskers are the \
          quartiles. While the clock runs nothing is counted, compared or written. Errors come from separate runs of \
          the same steps. References are Taylor series of order 30 in double-double arithmetic, from the Lagrangian and \
          not from the arm's own kernel; their own uncertainty is the distance to a second series of other order and \

@@ -3,6 +3,7 @@
 //! **Invariant:** a section writes nothing by itself: what it keeps is written by the report.
 
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use super::csv::Csv;
 use super::progress::ProgressBar;
@@ -13,7 +14,9 @@ pub(crate) struct Making<'a> {
     pub(super) quick: bool,
     /// Where the report is written, and counts from outside are looked for.
     pub(super) out: &'a Path,
-    pub(super) progress: &'a mut ProgressBar,
+    /// The section's name, and where it says how far it is.
+    pub(super) section: &'static str,
+    pub(super) progress: &'a Mutex<ProgressBar>,
     /// Stems and contents of `.csv` files.
     pub(super) tables: Vec<(String, Csv)>,
 }
@@ -29,7 +32,9 @@ impl Making<'_> {
             clippy::cast_precision_loss,
             reason = "counts of runs are far below 2^53"
         )]
-        self.progress.at(done as f64 / of as f64);
+        let part = done as f64 / of as f64;
+        let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        progress.at(self.section, part);
     }
 
     pub(super) fn keep(&mut self, stem: &str, csv: Csv) {

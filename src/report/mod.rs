@@ -1,9 +1,9 @@
 //! The study as a page to look at: `pendularm report --out report/`.
 //!
-//! Runs the sections in `figures`, keeps each in a file of its own, and writes `index.html`, `report.json`, and one
-//! `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others are taken from their
-//! files. What is measured is in [`experiments`], on `math` and `study`; this is where the clock, the files and the
-//! drawing are.
+//! Runs the sections in `figures` side by side, keeps each in a file of its own, and writes `index.html`,
+//! `report.json`, and one `.csv` and `.svg` per figure. With `--only` the named sections are made anew and the others
+//! are taken from their files. What is measured is in [`experiments`], on `math` and `study`; this is where the clock,
+//! the files and the drawing are.
 //!
 //! **Invariant:** an interrupted report loses at most the section under way, and no file is ever half written.
 
@@ -20,10 +20,12 @@ mod timing;
 
 use std::fs;
 use std::io;
+use std::num::NonZero;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use figures::SECTIONS;
+use figures::{Maker, SECTIONS};
 use machine::Machine;
 use making::Making;
 use progress::ProgressBar;
@@ -84,25 +86,22 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     })?;
     let wanted =
         |name: &str| options.only.is_empty() || options.only.iter().any(|only| only == name);
-    let weight = |maker: &figures::Maker| if options.quick { 1.0 } else { maker.weight };
-    let total = SECTIONS
-        .iter()
-        .filter(|maker| wanted(maker.name))
-        .map(weight)
-        .sum();
-    let mut progress = ProgressBar::new(total);
+    let weight = |maker: &Maker| if options.quick { 1.0 } else { maker.weight };
+    let makers = || SECTIONS.iter().filter(|maker| wanted(maker.name));
+    let progress = Mutex::new(ProgressBar::new(makers().map(weight).sum()));
+    let made = side_by_side(makers().collect(), |maker| {
+        lock(&progress).begin(maker.name, weight(maker));
+        let section = make(maker, options, &machine, &progress)?;
+        let file = kept.join(format!("{}.json", maker.name));
+        write(&file, &serde_json::to_string(&section).unwrap_or_default())?;
+        lock(&progress).end(maker.name);
+        Ok(section)
+    })?;
     let mut sections = Vec::new();
     for maker in &SECTIONS {
-        let file = kept.join(format!("{}.json", maker.name));
-        if wanted(maker.name) {
-            progress.begin(maker.name, weight(maker));
-            let section = make(maker, options, &machine, &mut progress)?;
-            progress.end();
-            write(&file, &serde_json::to_string(&section).unwrap_or_default())?;
-            sections.push(section);
-        } else if let Some(section) = read(&file) {
-            sections.push(section);
-        }
+        let section = made.iter().find(|section| section.name == maker.name);
+        let kept = || read(&kept.join(format!("{}.json", maker.name)));
+        sections.extend(section.cloned().or_else(kept));
     }
     let page = options.out.join("index.html");
     write(&page, &html::page(&sections, &machine))?;
@@ -116,23 +115,61 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         .flat_map(|section| &section.verdicts)
         .filter(|verdict| !verdict.holds)
         .count();
-    progress.finish(&format!(
+    lock(&progress).finish(&format!(
         "report: {} ({short} verdicts fall short)",
         page.display()
     ));
     Ok(page)
 }
 
+/// Makes sections on all cores. Those that measure times are made one after the other.
+fn side_by_side(
+    makers: Vec<&'static Maker>,
+    make: impl Fn(&'static Maker) -> Result<Section, ReportError> + Sync,
+) -> Result<Vec<Section>, ReportError> {
+    let (mut timed, mut others): (Vec<_>, Vec<_>) = makers.into_iter().partition(|it| it.timed);
+    for queue in [&mut timed, &mut others] {
+        // The longest last, where it is taken first.
+        queue.sort_by(|a: &&Maker, b| a.weight.total_cmp(&b.weight));
+    }
+    let (timed, others) = (Mutex::new(timed), Mutex::new(others));
+    let made = Mutex::new(Vec::new());
+    let cores = std::thread::available_parallelism().map_or(1, NonZero::get);
+    std::thread::scope(|scope| {
+        for worker in 0..cores {
+            let (timed, others, made, make) = (&timed, &others, &made, &make);
+            scope.spawn(move || {
+                loop {
+                    let first = (worker == 0).then(|| lock(timed).pop()).flatten();
+                    let Some(maker) = first.or_else(|| lock(others).pop()) else {
+                        return;
+                    };
+                    let section = make(maker);
+                    lock(made).push(section);
+                }
+            });
+        }
+    });
+    let made = made.into_inner().unwrap_or_else(PoisonError::into_inner);
+    made.into_iter().collect()
+}
+
+/// Takes the lock: the work of a section that panicked is as good as before.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 fn make(
-    maker: &figures::Maker,
+    maker: &Maker,
     options: &ReportOptions,
     machine: &Machine,
-    progress: &mut ProgressBar,
+    progress: &Mutex<ProgressBar>,
 ) -> Result<Section, ReportError> {
     let started = Instant::now();
     let mut making = Making {
         quick: options.quick,
         out: &options.out,
+        section: maker.name,
         progress,
         tables: Vec::new(),
     };
@@ -140,7 +177,7 @@ fn make(
     for (stem, csv) in making.tables {
         write(&options.out.join(format!("{stem}.csv")), &csv.into_text())?;
     }
-    for block in &section.blocks {
+    for block in section.glance.iter().chain(&section.blocks) {
         if let Block::Figure(figure) = block {
             let path = options.out.join(format!("{}.svg", figure.name));
             write(&path, &figure.sheet)?;
@@ -157,11 +194,12 @@ fn make(
 /// Everything but the drawings.
 fn summary(sections: &[Section], machine: &Machine, quick: bool) -> Value {
     let tables = |section: &Section| -> Vec<Value> {
-        let in_body = section.blocks.iter().filter_map(|block| match block {
+        let blocks = section.glance.iter().chain(&section.blocks);
+        let tables = blocks.filter_map(|block| match block {
             Block::Table(table) => Some(table),
             Block::Text(_) | Block::Figure(_) => None,
         });
-        section.glance.iter().chain(in_body).map(rows).collect()
+        tables.map(rows).collect()
     };
     let sections: Vec<Value> = sections
         .iter()

@@ -13,17 +13,17 @@ const PLAIN: Duration = Duration::from_secs(10);
 
 const CELLS: usize = 30;
 
+/// Sections are made side by side, so that several may be under way.
+///
 /// Work is measured in weights, which are about seconds on the machine they were chosen on.
 #[derive(Debug)]
 pub(crate) struct ProgressBar {
     terminal: bool,
     started: Instant,
     shown: Option<Instant>,
-    section: String,
     done: f64,
-    /// Weight of the section under way, and how much of it is done.
-    current: f64,
-    part: f64,
+    /// Sections under way: weight, and how much is done.
+    current: Vec<(&'static str, f64, f64)>,
     total: f64,
 }
 
@@ -33,32 +33,33 @@ impl ProgressBar {
             terminal: io::stderr().is_terminal(),
             started: Instant::now(),
             shown: None,
-            section: String::new(),
             done: 0.0,
-            current: 0.0,
-            part: 0.0,
+            current: Vec::new(),
             total,
         }
     }
 
     /// A section of this weight begins.
-    pub(crate) fn begin(&mut self, section: &str, weight: f64) {
-        section.clone_into(&mut self.section);
-        self.current = weight;
-        self.part = 0.0;
+    pub(crate) fn begin(&mut self, section: &'static str, weight: f64) {
+        self.current.push((section, weight, 0.0));
         self.show(true);
     }
 
-    /// The section is this far, from 0 to 1.
-    pub(crate) fn at(&mut self, part: f64) {
-        self.part = part.clamp(0.0, 1.0);
+    /// A section is this far, from 0 to 1.
+    pub(crate) fn at(&mut self, section: &str, part: f64) {
+        for current in self.current.iter_mut().filter(|it| it.0 == section) {
+            current.2 = part.clamp(0.0, 1.0);
+        }
         self.show(false);
     }
 
-    /// The section is done.
-    pub(crate) fn end(&mut self) {
-        self.done += self.current;
-        self.current = 0.0;
+    /// A section is done.
+    pub(crate) fn end(&mut self, section: &str) {
+        self.current.retain(|current| {
+            let ends = current.0 == section;
+            self.done += if ends { current.1 } else { 0.0 };
+            !ends
+        });
     }
 
     /// All is done; `line` is the last word.
@@ -74,7 +75,10 @@ impl ProgressBar {
             return;
         }
         self.shown = Some(Instant::now());
-        let fraction = ((self.done + self.part * self.current) / self.total).clamp(0.0, 1.0);
+        let under_way: f64 = self.current.iter().map(|it| it.1 * it.2).sum();
+        let fraction = ((self.done + under_way) / self.total).clamp(0.0, 1.0);
+        let names: Vec<&str> = self.current.iter().map(|it| it.0).collect();
+        let names = names.join(", ");
         let elapsed = self.started.elapsed().as_secs_f64();
         // Early on the estimate would be wild.
         let left = if fraction > 0.02 {
@@ -87,11 +91,10 @@ impl ProgressBar {
             let bar = bar(fraction);
             write!(
                 io::stderr(),
-                "\r\x1b[K{bar} {percent:3.0} %  {left}  {}",
-                self.section
+                "\r\x1b[K{bar} {percent:3.0} %  {left}  {names}"
             )
         } else {
-            writeln!(io::stderr(), "{percent:3.0} %, {left}: {}", self.section)
+            writeln!(io::stderr(), "{percent:3.0} %, {left}: {names}")
         };
     }
 }

@@ -18,8 +18,8 @@ pub(crate) struct Section {
     /// Sentences that open the report.
     pub(crate) findings: Vec<String>,
     pub(crate) verdicts: Vec<Verdict>,
-    /// Tables that stand right after the findings.
-    pub(crate) glance: Vec<Table>,
+    /// Tables and figures that answer at once: they open the page.
+    pub(crate) glance: Vec<Block>,
     pub(crate) blocks: Vec<Block>,
     /// Seconds it took, and the commit that made it.
     pub(crate) seconds: f64,

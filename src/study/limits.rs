@@ -111,6 +111,8 @@ pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
 pub struct LimitSearch<const N: usize> {
     control: ControlLoop<N>,
     limits: Limits<N>,
+    /// How the loop rests, unless it runs away.
+    at_rest: Rest,
     stage: Stage<N>,
 }
 
@@ -148,6 +150,7 @@ impl<const N: usize> LimitSearch<N> {
                 critical: None,
                 advised: None,
             },
+            at_rest: Rest::Setpoint,
             stage: Stage::Setpoint,
         }
     }
@@ -160,6 +163,10 @@ impl<const N: usize> LimitSearch<N> {
             Stage::Setpoint => Stage::Held(self.settle()),
             Stage::Held(linear) => {
                 limits.held = largest_timestep(&linear, method, Sampling::Held);
+                // A joint that nothing draws back drifts; what is stable at some timestep does not run away.
+                if limits.held == Some(0.0) && Modes::of(&linear).run_away() {
+                    limits.rest = Rest::Unstable;
+                }
                 Stage::Continuous(linear)
             }
             Stage::Continuous(linear) => {
@@ -191,9 +198,7 @@ impl<const N: usize> LimitSearch<N> {
         let linear = Linear::at(control, &rest.position, &rest.integrating);
         let mut off = rest.position.iter().zip(&control.setpoint.position);
         self.limits.equilibrium = rest.position;
-        self.limits.rest = if Modes::of(&linear).run_away() {
-            Rest::Unstable
-        } else if rest.balanced {
+        self.at_rest = if rest.balanced {
             Rest::Saddle
         } else if control.is_free() {
             Rest::Hanging
@@ -202,6 +207,7 @@ impl<const N: usize> LimitSearch<N> {
         } else {
             Rest::Sagging
         };
+        self.limits.rest = self.at_rest;
         linear
     }
 
@@ -230,6 +236,7 @@ impl<const N: usize> LimitSearch<N> {
             // Beside rates a trillion times their own, slow modes seem to grow by rounding alone. A proof does not
             // round.
             self.limits.held = Some(timestep);
+            self.limits.rest = self.at_rest;
             found.0 = self.limits.held;
         }
         if found.0.is_some_and(|least| agree(timestep, least)) {

@@ -25,7 +25,9 @@ against() {
     runtime=
 }
 
-against .venv/bin/python python/roslibpy_client.py
+for client in roslibpy compas_fab; do
+    against .venv/bin/python "python/${client}_client.py"
+done
 for client in roslib2 roslib1 lichtblick; do
     against node "node/$client.mjs"
 done

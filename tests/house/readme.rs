@@ -3,6 +3,8 @@
 //! **Invariant:** each check reads both sides, so that neither can change alone.
 
 use std::collections::BTreeSet;
+use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use crate::limits::sources;
@@ -65,6 +67,44 @@ fn make_alone_shows_the_help() {
             "{row:?} is not in\n{help}"
         );
     }
+}
+
+/// As after unpacking a release on a machine without a toolchain.
+#[cfg(unix)]
+#[test]
+fn make_run_runs_a_program_that_is_there_where_there_is_no_cargo() {
+    use std::os::unix::fs::symlink;
+    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).join("make-run");
+    let _ = fs::remove_dir_all(&target);
+    fs::create_dir_all(target.join("release")).unwrap();
+    let run = || {
+        Command::new("make")
+            .args(["run", "CARGO=/nowhere/cargo", "ARGS=--version"])
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .env("CARGO_TARGET_DIR", &target)
+            .env_remove("MAKEFLAGS")
+            .env_remove("MAKELEVEL")
+            .output()
+            .unwrap()
+    };
+    let without = run();
+    assert!(!without.status.success());
+    let why = String::from_utf8_lossy(&without.stderr);
+    assert!(
+        why.contains("needs cargo, or a program that is built already"),
+        "{why}"
+    );
+    symlink(
+        env!("CARGO_BIN_EXE_pendularm"),
+        target.join("release/pendularm"),
+    )
+    .unwrap();
+    let with = run();
+    let said = String::from_utf8_lossy(&with.stdout);
+    assert!(
+        with.status.success() && said.contains("\npendularm "),
+        "{said}"
+    );
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::{
     coriolis, energy, forward_dynamics, gravity_load, inverse_dynamics, mass_matrix,
+    weightless_dynamics,
 };
 use proptest::array::uniform;
 use proptest::prelude::*;
@@ -284,6 +285,20 @@ fn without_gravity_the_first_angle_changes_no_bit() {
             q[0] = first;
             let after = forward_dynamics(&arm, &q, &qd, &tau);
             prop_assert_eq!(before.map(f64::to_bits), after.map(f64::to_bits));
+            Ok(())
+        });
+    }
+    for_one_to_six_links!(check);
+}
+
+#[test]
+fn leaving_out_the_first_angle_changes_no_bit() {
+    fn check<const N: usize>() {
+        for_any(motion::<N>(), |Motion { arm, q, qd, tau }| {
+            let arm = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap();
+            let whole = forward_dynamics(&arm, &q, &qd, &tau);
+            let less = weightless_dynamics(&arm, &q, &qd, &tau);
+            prop_assert_eq!(whole.map(f64::to_bits), less.map(f64::to_bits));
             Ok(())
         });
     }

@@ -30,5 +30,6 @@ mod kinematics;
 mod pacer;
 mod particle;
 mod simulation;
+mod trajectory;
 mod trial;
 mod trig;

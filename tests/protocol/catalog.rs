@@ -19,7 +19,7 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
 }
 
 /// Contract section 3, the table, and what came later: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 19] = [
+const SERVICES: [(&str, &[&str], &[&str]); 27] = [
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -43,6 +43,15 @@ const SERVICES: [(&str, &[&str], &[&str]); 19] = [
         &["effort", "duration"],
         &["effort", "duration"],
     ),
+    (
+        "/arm_sim/list_parameters",
+        &["prefixes", "depth"],
+        &["result"],
+    ),
+    ("/arm_sim/get_parameters", &["names"], &["values"]),
+    ("/arm_sim/get_parameter_types", &["names"], &["types"]),
+    ("/arm_sim/describe_parameters", &["names"], &["descriptors"]),
+    ("/arm_sim/set_parameters", &["parameters"], &["results"]),
     ("/pid_controller/enable", &["data"], &["data"]),
     (
         "/pid_controller/set_gains",
@@ -63,6 +72,18 @@ const SERVICES: [(&str, &[&str], &[&str]); 19] = [
     ),
     ("/ik_trial/skip", &[], &[]),
     ("/ik_trial/stop", &[], &[]),
+    (
+        "/republish_tfs",
+        &[
+            "source_frames",
+            "target_frame",
+            "angular_thres",
+            "trans_thres",
+            "rate",
+            "timeout",
+        ],
+        &["topic_name"],
+    ),
     (
         "/study/stability",
         &["integrator", "gains", "params", "setpoint"],
@@ -145,6 +166,12 @@ const SERVICES: [(&str, &[&str], &[&str]); 19] = [
             "errors",
         ],
     ),
+    ("/recorder/start", &["name"], &["file"]),
+    (
+        "/recorder/stop",
+        &[],
+        &["file", "messages", "bytes", "dropped"],
+    ),
 ];
 
 #[test]
@@ -166,61 +193,81 @@ fn the_services_are_those_of_the_contract() {
     assert_eq!(listed, expected);
 }
 
+/// Name, type, and which way it goes.
+const TOPICS: [(&str, &str, Direction); 17] = {
+    use Direction::{Published, Subscribed};
+    [
+        (
+            "/joint_trajectory",
+            "trajectory_msgs/msg/JointTrajectory",
+            Subscribed,
+        ),
+        ("/joint_states", "sensor_msgs/msg/JointState", Published),
+        ("/clock", "rosgraph_msgs/msg/Clock", Published),
+        (
+            "/diagnostics",
+            "diagnostic_msgs/msg/DiagnosticArray",
+            Published,
+        ),
+        (
+            "/ik_action/feedback",
+            "pendularm_interfaces/msg/IkFeedback",
+            Published,
+        ),
+        (
+            "/ik_action/result",
+            "pendularm_interfaces/msg/IkResult",
+            Published,
+        ),
+        (
+            "/ik_trial/status",
+            "pendularm_interfaces/msg/TrialStatus",
+            Published,
+        ),
+        ("/tf", "tf2_msgs/msg/TFMessage", Published),
+        ("/tf_static", "tf2_msgs/msg/TFMessage", Published),
+        (
+            "/tf2_web_republisher/frames",
+            "tf2_web_republisher/msg/TFArray",
+            Published,
+        ),
+        (
+            "/tf2_web_republisher/goal",
+            "tf2_web_republisher/msg/TFSubscriptionActionGoal",
+            Subscribed,
+        ),
+        (
+            "/tf2_web_republisher/cancel",
+            "actionlib_msgs/msg/GoalID",
+            Subscribed,
+        ),
+        (
+            "/tf2_web_republisher/feedback",
+            "tf2_web_republisher/msg/TFSubscriptionActionFeedback",
+            Published,
+        ),
+        ("/robot_description", "std_msgs/msg/String", Published),
+        (
+            "/robot_description_semantic",
+            "std_msgs/msg/String",
+            Published,
+        ),
+        ("/rosout", "rcl_interfaces/msg/Log", Published),
+        (
+            "/arm_sim/error_estimate",
+            "pendularm_interfaces/msg/ErrorEstimate",
+            Published,
+        ),
+    ]
+};
+
 #[test]
 fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
     let listed: Vec<_> = Topic::ALL
         .iter()
         .map(|topic| (topic.name(), topic.type_name(), topic.direction()))
         .collect();
-    assert_eq!(
-        listed,
-        [
-            (
-                "/joint_trajectory",
-                "trajectory_msgs/msg/JointTrajectory",
-                Direction::Subscribed
-            ),
-            (
-                "/joint_states",
-                "sensor_msgs/msg/JointState",
-                Direction::Published
-            ),
-            ("/clock", "rosgraph_msgs/msg/Clock", Direction::Published),
-            (
-                "/diagnostics",
-                "diagnostic_msgs/msg/DiagnosticArray",
-                Direction::Published
-            ),
-            (
-                "/ik_action/feedback",
-                "pendularm_interfaces/msg/IkFeedback",
-                Direction::Published
-            ),
-            (
-                "/ik_action/result",
-                "pendularm_interfaces/msg/IkResult",
-                Direction::Published
-            ),
-            (
-                "/ik_trial/status",
-                "pendularm_interfaces/msg/TrialStatus",
-                Direction::Published
-            ),
-            ("/tf", "tf2_msgs/msg/TFMessage", Direction::Published),
-            ("/tf_static", "tf2_msgs/msg/TFMessage", Direction::Published),
-            (
-                "/robot_description",
-                "std_msgs/msg/String",
-                Direction::Published
-            ),
-            ("/rosout", "rcl_interfaces/msg/Log", Direction::Published),
-            (
-                "/arm_sim/error_estimate",
-                "pendularm_interfaces/msg/ErrorEstimate",
-                Direction::Published
-            ),
-        ]
-    );
+    assert_eq!(listed, TOPICS);
 }
 
 #[test]
@@ -232,6 +279,10 @@ fn required_fields_are_those_that_have_no_default() {
             Service::Step => &["steps"],
             Service::Disturb => &["effort", "duration"],
             Service::Plan => &["error"],
+            Service::GetParameters | Service::GetParameterTypes | Service::DescribeParameters => {
+                &["names"]
+            }
+            Service::SetParameters => &["parameters"],
             _ => &[],
         };
         assert_eq!(required(service.fields()), expected, "{}", service.name());
@@ -239,7 +290,7 @@ fn required_fields_are_those_that_have_no_default() {
 }
 
 #[test]
-fn five_services_compute_and_ten_take_all_or_nothing() {
+fn five_services_compute_and_those_with_one_purpose_take_all_or_nothing() {
     let of = |chosen: fn(Service) -> bool| -> Vec<Service> {
         Service::ALL
             .into_iter()
@@ -262,25 +313,38 @@ fn five_services_compute_and_ten_take_all_or_nothing() {
             Service::IntegrationStep,
             Service::Step,
             Service::Disturb,
+            Service::ListParameters,
+            Service::GetParameters,
+            Service::GetParameterTypes,
+            Service::DescribeParameters,
+            Service::SetParameters,
             Service::Solve,
             Service::SendGoal,
+            Service::CancelGoal,
             Service::TrialStart,
+            Service::RepublishTfs,
             Service::Stability,
             Service::Rollout,
             Service::SuggestGains,
-            Service::Plan
+            Service::Plan,
+            Service::RecorderStart
         ]
     );
 }
 
 /// What changes seldom has to reach those that come late.
 #[test]
-fn the_fixed_frames_and_the_description_are_latched_and_nothing_else_is() {
+fn the_fixed_frames_and_the_descriptions_are_latched_and_nothing_else_is() {
     let latched: Vec<_> = Topic::ALL
         .into_iter()
         .filter(|topic| topic.is_latched())
         .collect();
-    assert_eq!(latched, [Topic::TfStatic, Topic::RobotDescription]);
+    let lasting = [
+        Topic::TfStatic,
+        Topic::RobotDescription,
+        Topic::RobotSemantics,
+    ];
+    assert_eq!(latched, lasting);
 }
 
 #[test]
@@ -320,9 +384,10 @@ fn names_and_types_are_given_once_and_in_the_form_that_ros_gives_them() {
     let services = Service::ALL.map(|service| (service.name(), service.type_name(), "srv"));
     let mut seen = HashSet::new();
     for (name, type_name, kind) in topics.into_iter().chain(services) {
-        // Frames that move and frames that do not have one type.
+        // Frames that move and frames that do not have one type, and so have all texts.
+        let shares = ["/tf_static", "/robot_description_semantic"].contains(&name);
         assert!(
-            seen.insert(name) && (seen.insert(type_name) || name == "/tf_static"),
+            seen.insert(name) && (seen.insert(type_name) || shares),
             "{name} or {type_name} is listed twice"
         );
         let parts: Vec<&str> = type_name.split('/').collect();
@@ -378,7 +443,10 @@ fn every_node_has_a_name_of_its_own() {
             "ik",
             "ik_action",
             "ik_trial",
+            "joint_trajectory_controller",
             "study",
+            "tf2_web_republisher",
+            "recorder",
             "gateway",
             "rosapi"
         ])

@@ -146,10 +146,14 @@ fn null_means_absent_only_in_optional_fields_of_services_that_take_all_or_nothin
     });
     assert_eq!(value, (None, None));
     assert_eq!(status, "x must be a number, got null");
-    let (_, status) = reading(Service::CancelGoal, r#"{"goal_id":null}"#, |fields| {
+    let (value, status) = reading(Service::CancelGoal, r#"{"goal_id":null}"#, |fields| {
         fields.text("goal_id").map(std::borrow::Cow::into_owned)
     });
-    assert_eq!(status, "goal_id must be a string, got null");
+    assert_eq!((value, status.as_str()), (None, ""));
+    let (_, status) = reading(Service::SetParams, r#"{"gravity":null}"#, |fields| {
+        fields.number("gravity", Bound::NonNegative)
+    });
+    assert_eq!(status, "gravity must be a number, got null");
 }
 
 #[test]

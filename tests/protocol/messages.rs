@@ -4,9 +4,9 @@
 
 use bytes::Bytes;
 use pendularm::protocol::messages::{
-    Clock, DiagnosticArray, DiagnosticStatus, Empty, Header, JointState, JointTrajectory,
-    JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, publish, publish_raw, respelled,
-    response, response_raw, status,
+    Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState,
+    JointTrajectory, JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, publish,
+    publish_raw, respelled, response, response_raw, status,
 };
 use pendularm::protocol::wire::fragments;
 use pendularm::protocol::wire::payload::Payload;
@@ -205,7 +205,7 @@ fn a_response_carries_the_callers_id_exactly() {
 #[test]
 fn an_id_that_never_came_is_left_out() {
     assert_eq!(
-        line(&failure("/s", None, "x is required")),
+        line(&failure("/s", None, "x is required", ErrorForm::Object)),
         r#"{"op":"service_response","service":"/s","values":{},"result":false,"status":"x is required"}"#
     );
     assert_eq!(
@@ -277,7 +277,7 @@ proptest! {
         for frame in [
             publish(&topic, &text),
             status(Level::Info, &text, None),
-            failure(&topic, None, &text),
+            failure(&topic, None, &text, ErrorForm::Text),
             call(&topic, &text, &raw("{}")),
         ] {
             prop_assert!(serde_json::from_str::<serde_json::Value>(line(&frame)).is_ok());

@@ -5,7 +5,7 @@
 use std::time::Duration;
 
 use pendularm::protocol::limits::MAX_NAME;
-use pendularm::protocol::messages::Level;
+use pendularm::protocol::messages::{ErrorForm, Level};
 use pendularm::protocol::op::{
     Arguments, CallService, Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError,
     Subscribe, read,
@@ -391,10 +391,11 @@ fn a_level_is_one_of_four_and_says_which_statuses_are_wanted() {
         ("error", [false, false, true]),
         ("none", [false, false, false]),
     ] {
-        let Op::SetLevel(verbosity) = op(&format!(r#"{{"op":"set_level","level":"{name}"}}"#))
-        else {
+        let frame = format!(r#"{{"op":"set_level","level":"{name}"}}"#);
+        let Op::SetLevel { verbosity, errors } = op(&frame) else {
             panic!("{name} is a level");
         };
+        assert_eq!(errors, None);
         assert_eq!(Level::ALL.map(|level| verbosity.wants(level)), wanted);
     }
     assert_eq!(
@@ -404,6 +405,23 @@ fn a_level_is_one_of_four_and_says_which_statuses_are_wanted() {
     for level in [r#""loud""#, r#""Info""#, "3", "null"] {
         let status = status(&format!(r#"{{"op":"set_level","level":{level}}}"#));
         let expected = "set_level: level must be info, warning, error or none, got ";
+        assert!(status.starts_with(expected), "{status}");
+    }
+}
+
+#[test]
+fn the_form_of_errors_is_one_of_two() {
+    for (name, form) in [("object", ErrorForm::Object), ("text", ErrorForm::Text)] {
+        let frame = format!(r#"{{"op":"set_level","level":"none","errors":"{name}"}}"#);
+        let Op::SetLevel { errors, .. } = op(&frame) else {
+            panic!("{name} is a form");
+        };
+        assert_eq!(errors, Some(form));
+    }
+    for form in [r#""words""#, "true", "null"] {
+        let frame = format!(r#"{{"op":"set_level","level":"none","errors":{form}}}"#);
+        let status = status(&frame);
+        let expected = "set_level: errors must be object or text, got ";
         assert!(status.starts_with(expected), "{status}");
     }
 }

@@ -202,6 +202,7 @@ fn of_two_encodings_the_denser_and_the_smaller_pieces_count() {
     let one = |compression, fragment_size| Encoding {
         compression,
         fragment_size,
+        ros1_stamps: false,
     };
     for (first, second, both) in [
         (

@@ -29,6 +29,10 @@ fn census() -> Census {
             service("/add", Some("demo/srv/Add")),
             service("/nameless", None),
         ],
+        actions: vec![
+            service("/dance", Some("demo/action/Dance")),
+            service("/untyped", None),
+        ],
     }
 }
 
@@ -101,7 +105,7 @@ fn topics_of_a_type_are_found_by_either_of_its_names() {
     for type_name in ["std_msgs/String", "std_msgs/msg/String"] {
         assert_eq!(
             values(Rosapi::TopicsForType, json!({"type": type_name})),
-            json!({"topics": ["/robot_description", "/chat"]})
+            json!({"topics": ["/robot_description", "/robot_description_semantic", "/chat"]})
         );
     }
     let none = values(Rosapi::TopicsForType, json!({"type": "demo/X"}));
@@ -393,11 +397,19 @@ fn a_type_that_is_not_known_is_refused_by_the_name_of_the_field() {
 fn actions_are_listed_with_their_type() {
     assert_eq!(
         values(Rosapi::ActionServers, json!({})),
-        json!({"action_servers": ["/ik_action"]})
+        json!({"action_servers": [
+            "/ik_action",
+            "/tf2_web_republisher",
+            "/joint_trajectory_controller/follow_joint_trajectory",
+            "/dance",
+            "/untyped"
+        ]})
     );
     for (action, type_name) in [
         ("/ik_action", "pendularm_interfaces/action/MoveTo"),
         ("ik_action", "pendularm_interfaces/action/MoveTo"),
+        ("dance", "demo/action/Dance"),
+        ("/untyped", ""),
         ("/ik", ""),
     ] {
         assert_eq!(
@@ -433,24 +445,36 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
         "geometry_msgs/msg/Vector3",
         "geometry_msgs/msg/Quaternion",
         "rosapi_msgs/msg/TypeDef",
-        "pendularm_interfaces/action/MoveTo",
+        "actionlib_msgs/msg/GoalStatus",
+        "control_msgs/msg/JointTolerance",
+        "rcl_interfaces/msg/FloatingPointRange",
+        "rcl_interfaces/msg/IntegerRange",
+        "rcl_interfaces/msg/ListParametersResult",
+        "rcl_interfaces/msg/Parameter",
+        "rcl_interfaces/msg/ParameterDescriptor",
+        "rcl_interfaces/msg/ParameterValue",
+        "rcl_interfaces/msg/SetParametersResult",
+        "tf2_web_republisher/msg/TFSubscriptionFeedback",
+        "tf2_web_republisher/msg/TFSubscriptionGoal",
     ];
+    let actions = Action::ALL.map(Action::type_name);
     let mut expected: Vec<&str> = topics
         .into_iter()
         .chain(services)
         .chain(questions)
         .chain(inside)
+        .chain(actions)
         .collect();
     expected.sort_unstable();
-    // Two topics have frames.
+    // Two topics have frames, two have texts.
     expected.dedup();
     assert_eq!(found, expected);
 }
 
 #[test]
-fn the_version_is_2_of_a_distribution_of_our_own() {
+fn the_version_is_2_of_a_distribution_that_clients_know() {
     assert_eq!(
         values(Rosapi::GetRosVersion, json!({})),
-        json!({"version": 2, "distro": "pendularm"})
+        json!({"version": 2, "distro": "jazzy"})
     );
 }

@@ -112,8 +112,8 @@ impl Plan {
 
     /// Draws what the first of the kept seeds did not know; without it they stay what they were.
     pub fn with_bursts(mut self, court: &Court) -> Self {
-        self.bursts = swarm(court, Burst::ALL, 0.4);
-        self.burst = 0.01 + 0.05 * court.fraction();
+        self.bursts = swarm(court, Burst::ALL, 0.6);
+        self.burst = 0.02 + 0.06 * court.fraction();
         self.together = court.chance(0.5);
         self
     }

@@ -7,7 +7,7 @@ use pendularm::math::dynamics::{energy, gravity_load};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::equilibrium;
-use pendularm::study::stability::limit_held;
+use pendularm::study::stability::{Rest, limit_held, limits};
 
 fn at<const N: usize>(position: [f64; N]) -> Setpoint<N> {
     Setpoint {
@@ -36,6 +36,20 @@ fn soft<const N: usize>(rng: &mut fastrand::Rng) -> (Gains<N>, Setpoint<N>) {
 
 /// One of the false alarms: Newton steps ran into a saddle, and every timestep was called unstable. The arm rests, and
 /// its true limit, from an independent code, is 0.456 s.
+/// Without gravity a joint that has damping and no spring stays where it is put: that is no running away.
+#[test]
+fn a_joint_that_nothing_draws_back_is_not_unstable() {
+    let arm = Arm::<2>::new([0.6, 2.6], [0.3, 0.7], 0.0).unwrap();
+    let gains = Gains {
+        kp: [0.0, 26_952.0],
+        ki: [0.0; 2],
+        kd: [280.0, 136.0],
+    };
+    let found = limits(&ControlLoop::new(arm, gains, at([-3.6, -1.9])));
+    assert_eq!(found.rest, Rest::Setpoint, "{found:?}");
+    assert!(found.held.unwrap() > 1e-3 && found.continuous.unwrap() > 1e-3);
+}
+
 #[test]
 fn an_arm_that_sags_far_is_not_called_unstable() {
     let gains = Gains {

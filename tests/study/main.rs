@@ -19,11 +19,13 @@
 
 mod equilibrium;
 mod error;
+mod experiments;
 mod gains;
 mod growth;
 mod motion;
 mod planner;
 mod poses;
+mod properties;
 mod reference;
 mod report;
 mod rollout;

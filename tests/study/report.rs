@@ -52,6 +52,26 @@ fn a_section_leaves_page_figures_and_numbers() {
     assert_eq!(csv.lines().count(), 58);
 }
 
+/// Side by side, and yet each where it belongs.
+#[test]
+fn several_sections_are_made_and_shown_in_their_order() {
+    let scratch = Scratch::new("several");
+    let page = run(&quick(&scratch.0, &["forcing", "conditioning", "drift"])).unwrap();
+    let html = fs::read_to_string(page).unwrap();
+    let at = |name: &str| html.find(&format!("<section id=\"{name}\">")).unwrap();
+    assert!(at("forcing") < at("drift") && at("drift") < at("conditioning"));
+    // A force, a method, and eleven timesteps each.
+    let csv = fs::read_to_string(scratch.0.join("forcing.csv")).unwrap();
+    assert_eq!(csv.lines().count(), 1 + 6 * 4 * 11);
+    let report = fs::read_to_string(scratch.0.join("report.json")).unwrap();
+    let report: serde_json::Value = serde_json::from_str(&report).unwrap();
+    for section in report["sections"].as_array().unwrap() {
+        for verdict in section["verdicts"].as_array().unwrap() {
+            assert_eq!(verdict["holds"], true, "{verdict}");
+        }
+    }
+}
+
 #[test]
 fn a_section_made_anew_keeps_the_others() {
     let scratch = Scratch::new("resume");

@@ -5,6 +5,7 @@
 use std::time::Duration;
 
 use crate::common::{Client, Runtime};
+use pendularm::protocol::catalog::Action;
 use serde_json::{Value, json};
 
 fn goal(id: &str, args: &Value) -> Value {
@@ -158,7 +159,10 @@ fn the_action_is_found_by_asking() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     let servers = client.ask("/rosapi/action_servers", json!({}));
-    assert_eq!(servers["action_servers"], json!(["/ik_action"]));
+    assert_eq!(
+        servers["action_servers"],
+        json!(Action::ALL.map(Action::name))
+    );
     let type_name =
         client.ask("/rosapi/action_type", json!({"action": "ik_action"}))["type"].clone();
     for (question, name, field) in [

@@ -227,6 +227,8 @@ fn every_topic_of_the_runtime_that_speaks_by_itself_can_be_had_as_cbor_raw() {
         "/tf",
         "/tf_static",
         "/robot_description",
+        "/robot_description_semantic",
+        "/tf2_web_republisher/frames",
     ] {
         subscribe(&mut socket, topic, "cbor-raw");
         let frame = binary(&mut socket);

@@ -88,6 +88,16 @@ fn a_reachable_goal_preempts_and_an_unreachable_one_does_not() {
 }
 
 #[test]
+fn a_cancellation_whose_goal_id_is_null_names_no_goal() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let cancel = "/ik_action/cancel_goal";
+    send_goal(&mut client, json!({"x": 1, "y": 1}));
+    assert_eq!(client.ask(cancel, json!({"goal_id": null})), json!({}));
+    client.refusal(cancel, json!({"goal_id": null}));
+}
+
+#[test]
 fn a_goals_trajectory_reaches_every_subscriber() {
     let runtime = Runtime::with_links(3);
     let (mut client, mut other) = (runtime.connect(), runtime.connect());

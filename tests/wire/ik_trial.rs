@@ -37,6 +37,31 @@ fn a_client_that_only_enables_and_starts_sees_targets_reached_with_3_links() {
     sees_two_targets_reached(3);
 }
 
+/// Never a running trial with a goal that nobody has accepted.
+#[test]
+fn the_first_status_after_start_and_skip_shows_the_goal_as_accepted() {
+    for links in [2, 3] {
+        let runtime = Runtime::with_links(links);
+        let mut client = runtime.connect();
+        client.subscribe(STATUS);
+        let mut targets = Vec::new();
+        for service in [START, "/ik_trial/skip", START] {
+            client.settle();
+            client.kept.clear();
+            client.ask(service, json!({}));
+            let status = client.message(STATUS);
+            assert_eq!(
+                (&status["running"], &status["action_status"]),
+                (&json!(true), &json!("active")),
+                "{status}"
+            );
+            assert_eq!(status["target"]["phi"].is_number(), links == 3);
+            assert!(!targets.contains(&status["target"]), "a new target");
+            targets.push(status["target"].clone());
+        }
+    }
+}
+
 fn first_target(client: &mut Client) -> Value {
     client.subscribe(STATUS);
     client.ask(START, json!({}));

@@ -3,7 +3,8 @@
 //! `cargo run --release --bin work -- VARIANT COUNT`
 //!
 //! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. `step-LINKS-METHOD-WHAT` is a step of
-//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges.
+//! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges. WHAT is
+//! `free`, `pid`, `pd` (no integral), `pi` (no damping) or `pushed` (`pid` under a disturbance of zeros), with `weightless` before it.
 
 use std::hint::black_box;
 
@@ -11,19 +12,22 @@ use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
 use pendularm::math::pid::Gains;
-use pendularm::report::experiments::step_scene::ready;
+use pendularm::report::experiments::step_scene::{ready, undamped};
 
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
     Gains<N>: Default,
 {
-    let gravity = if what.contains("weightless") {
-        0.0
-    } else {
-        9.81
-    };
-    let (pd, pid) = (what.contains("pd"), what.contains("pid"));
-    let mut simulation = ready::<N>(gravity, !pd, pd || pid, method);
+    let has = |word: &str| what.split('-').any(|part| part == word);
+    let gravity = if has("weightless") { 0.0 } else { 9.81 };
+    let control = ["pd", "pi", "pid", "pushed"].iter().any(|law| has(law));
+    let mut simulation = ready::<N>(gravity, !has("pd"), control, method);
+    if has("pi") {
+        simulation.set_gains(undamped());
+    }
+    if has("pushed") {
+        simulation.disturb([0.0; N], 1e9);
+    }
     assert_eq!(simulation.advance(count), count);
     black_box(simulation.state());
 }

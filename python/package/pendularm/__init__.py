@@ -1,7 +1,7 @@
 """The arm of pendularm: one (`Simulation`), many at once (`Batch`), its equation of motion (`dynamics`) and its study.
 
-All units are SI, angles are in rad, counter-clockwise, each relative to the link before. Names are those of the services
-of the live runtime, which `pendularm` on the command line, or `python -m pendularm`, starts.
+All units are SI, angles are in rad, counter-clockwise, each relative to the link before. Names are those of the
+services of the live runtime, which `pendularm` on the command line, or `python -m pendularm`, starts.
 
 A value that cannot be is a `ValueError` that names its field.
 """
@@ -11,7 +11,7 @@ from importlib.metadata import version as _version
 from . import dynamics
 from ._native import Arm, Batch, Divergence, Simulation, default_gains, end_effector, inverse_kinematics
 from .report import read_report
-from .study import Critical, Plan, Rollout, Stability, plan, rollout, stability
+from .study import Critical, Plan, Rollout, Stability, SuggestedGains, plan, rollout, stability, suggest_gains
 from .sweep import Run, Sweep, sweep
 
 __version__ = _version("pendularm")
@@ -26,6 +26,7 @@ __all__ = [
     "Run",
     "Simulation",
     "Stability",
+    "SuggestedGains",
     "Sweep",
     "default_gains",
     "dynamics",
@@ -35,5 +36,6 @@ __all__ = [
     "read_report",
     "rollout",
     "stability",
+    "suggest_gains",
     "sweep",
 ]

@@ -1,6 +1,6 @@
 """Stubs of the compiled part; `python -m mypy.stubtest` holds them to it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, final
 
 import numpy as np
@@ -24,6 +24,7 @@ __all__ = [
     "potential_energy",
     "rollout",
     "stability",
+    "suggest_gains",
 ]
 
 _Floats = NDArray[np.float64]
@@ -69,7 +70,7 @@ class Simulation:
         *,
         method: str = "rk4",
         timestep: float = 0.001,
-        gains: Mapping[str, ArrayLike] | None = None,
+        gains: dict[str, Any] | None = None,
     ) -> Simulation: ...
     arm: Arm
     method: str
@@ -182,6 +183,14 @@ def rollout(
     setpoint: ArrayLike | None = None,
     samples: int = 1001,
     reference: bool = False,
+) -> dict[str, Any]: ...
+def suggest_gains(
+    arm: Arm | None = None,
+    *,
+    settling_time: float = 4.0,
+    margin: float = 1.25,
+    timestep: float = 0.001,
+    integrator: str = "rk4",
 ) -> dict[str, Any]: ...
 def plan(
     error: float,

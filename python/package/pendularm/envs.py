@@ -1,10 +1,10 @@
-"""Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many arms
-``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
+"""Environments for Gymnasium, which this module's import registers: ``gymnasium.make("Pendularm-v0")``, and for many
+arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` likewise.
 
-The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has a random
-stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number. They truncate
-themselves, and reset an arm in the call after its end, whose action is ignored (`AutoresetMode.NEXT_STEP`). All arrays that are
-returned are fresh.
+The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has
+a random stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number.
+They truncate themselves, and reset an arm in the call after its end, whose action is ignored
+(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh.
 """
 
 from collections.abc import Sequence
@@ -104,6 +104,8 @@ class _Reach(_Task):
     def __init__(self, arms: int, links: int, threads: int | None) -> None:
         super().__init__(arms, links, threads)
         self.targets = np.zeros((arms, 2))
+        # Target less end effector, looked at twice a step.
+        self.away = np.zeros((arms, 2))
 
     def further_bounds(self) -> list[float]:
         reach = float(Arm(self.links).reach)
@@ -117,13 +119,17 @@ class _Reach(_Task):
         self.targets[list(arms)] = distance[:, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)
         self.batch.reset(list(arms))
         self.batch.set_state(np.pi * (2 * drawn[:, 2:] - 1), None, list(arms))
+        self.away = self.targets - self.batch.end_effector
+
+    def go_on(self, actions: Action) -> None:
+        super().go_on(actions)
+        self.away = self.targets - self.batch.end_effector
 
     def further(self) -> list[Floats]:
-        return [self.targets, self.targets - self.batch.end_effector]
+        return [self.targets, self.away]
 
     def reward(self) -> Floats:
-        away = self.targets - self.batch.end_effector
-        return 1.0 - np.hypot(away[:, 0], away[:, 1]) / (2 * self.reach)
+        return 1.0 - np.hypot(self.away[:, 0], self.away[:, 1]) / (2 * self.reach)
 
 
 class _Single(gymnasium.Env[Observation, Action]):
@@ -222,11 +228,11 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self._ended = self._ended & ~mask
 
 
-_SWING_UP = """An arm that hangs is to swing up and stay there, with efforts half as strong as would hold it stretched out.
+_SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as strong as would hold it stretched out.
 
     ## Action
-    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of half of what holds the stretched arm there:
-    9.81 and 2.4525 N m for 2 links.
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of half of what holds the stretched arm
+    there: 9.81 and 2.4525 N m for 2 links.
 
     ## Observation
     | index (2 links) | meaning | bounds | unit |
@@ -241,8 +247,8 @@ _SWING_UP = """An arm that hangs is to swing up and stay there, with efforts hal
     `(1 + y / reach) / 2` with the height y of the end effector: 0 hanging, 1 upright.
 
     ## Start and end
-    Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25 rad/s; truncated
-    after 200 steps (10 s).
+    Hanging, each angle and rate off by up to 0.1 rad and 0.1 rad/s. Terminated when a joint turns faster than 25
+    rad/s; truncated after 200 steps (10 s).
 
     ## Arguments
     `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
@@ -251,11 +257,11 @@ _SWING_UP = """An arm that hangs is to swing up and stay there, with efforts hal
     v0: the first.
     """
 
-_REACH = """The end effector is to come to a target and stay there, with efforts twice as strong as hold the arm stretched out.
+_REACH = """The end effector is to come to a target and stay, with efforts twice as strong as hold the arm stretched.
 
     ## Action
-    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of twice of what holds the stretched arm there:
-    39.24 and 9.81 N m for 2 links.
+    (links,), from -1 to 1: the effort at each joint, for 0.05 s, in parts of twice of what holds the stretched arm
+    there: 39.24 and 9.81 N m for 2 links.
 
     ## Observation
     | index (2 links) | meaning | bounds | unit |
@@ -272,8 +278,8 @@ _REACH = """The end effector is to come to a target and stay there, with efforts
     `1 - d / (2 reach)` with the distance d of the end effector from the target: 1 there.
 
     ## Start and end
-    At rest in any pose; the target is anywhere within 0.95 of the reach, evenly by area. Terminated when a joint turns faster than
-    25 rad/s; truncated after 100 steps (5 s).
+    At rest in any pose; the target is anywhere within 0.95 of the reach, evenly by area. Terminated when a joint turns
+    faster than 25 rad/s; truncated after 100 steps (5 s).
 
     ## Arguments
     `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.

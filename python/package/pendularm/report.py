@@ -15,12 +15,13 @@ Column = NDArray[np.float64] | NDArray[np.str_]
 def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str, Column]]:
     """Reads every table of the report in `folder`, by the stem of its file, as columns by their names.
 
-    A column is of doubles, the same bits as were measured, with NaN where there is none; or of text. `pandas.DataFrame` takes a
-    table as it is. Raises `FileNotFoundError` where there is no report.
+    A column is of doubles, the same bits as were measured, with NaN where there is none; or of text.
+    `pandas.DataFrame` takes a table as it is. Raises `FileNotFoundError` where there is no report.
     """
     files = sorted(Path(folder).glob("*.csv"))
     if not files:
-        raise FileNotFoundError(f"{os.fspath(folder)} holds no report: `pendularm report --out {os.fspath(folder)}` makes one")
+        name = os.fspath(folder)
+        raise FileNotFoundError(f"{name} holds no report: `pendularm report --out {name}` makes one")
     return {file.stem: _table(file) for file in files}
 
 

@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 from . import _native
 from ._native import Arm
 
-__all__ = ["Critical", "Plan", "Rollout", "Stability", "plan", "rollout", "stability"]
+__all__ = [
+    "Critical",
+    "Plan",
+    "Rollout",
+    "Stability",
+    "SuggestedGains",
+    "plan",
+    "rollout",
+    "stability",
+    "suggest_gains",
+]
 
 Floats = NDArray[np.float64]
 
@@ -80,7 +90,7 @@ class Rollout:
     wall_time: float
     """How long the run took by itself [s]."""
     error: float | None
-    """Largest distance of a joint from the reference [rad]; `None` without one, or where it is not known well enough."""
+    """Largest distance of a joint from the reference [rad]; `None` without one, or where it is not known so well."""
     error_uncertainty: float | None
     """Largest distance of two references from each other [rad]."""
     divergence: tuple[int, float] | None
@@ -109,6 +119,46 @@ class Plan:
     errors: Floats
 
 
+@dataclass(frozen=True)
+class SuggestedGains:
+    """Gains that are stable in every pose and settle in time, and how they fared."""
+
+    kp: Floats
+    """[N m/rad], (links,)."""
+    ki: Floats
+    """[N m/(rad s)], (links,)."""
+    kd: Floats
+    """[N m s/rad], (links,)."""
+    timestep_limit: float | None
+    """The smallest stable timestep over all poses [s]; `None` where nothing limits."""
+    certified: bool
+    """Whether that is proven to 1 %."""
+    margin: float | None
+    """How many timesteps it is."""
+    settled_after: float
+    """How long the slowest of ten moves took to settle [s]."""
+
+
+def suggest_gains(
+    arm: Arm | None = None,
+    *,
+    settling_time: float = 4.0,
+    margin: float = 1.25,
+    timestep: float = 0.001,
+    integrator: str = "rk4",
+) -> SuggestedGains:
+    """Finds gains for an arm and a timestep [s], as ``/study/gains`` does.
+
+    The smallest stable timestep over all poses is to be `margin` timesteps, 1 at least, and ten moves are to settle
+    within `settling_time` [s]. Raises `ValueError` where there are none.
+    """
+    return SuggestedGains(
+        **_native.suggest_gains(
+            arm, settling_time=settling_time, margin=margin, timestep=timestep, integrator=integrator
+        )
+    )
+
+
 def stability(
     arm: Arm | None = None,
     *,
@@ -120,9 +170,9 @@ def stability(
 ) -> Stability:
     """Predicts the largest timestep at which a control loop is stable, as ``/study/stability`` does.
 
-    `gains` are `kp`, `ki` and `kd`, (links,) each; those that are left out are the default ones, and zeros ask about an arm
-    left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state from which the
-    motion is ahead.
+    `gains` are `kp`, `ki` and `kd`, (links,) each; those that are left out are the default ones, and zeros ask about
+    an arm left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state
+    from which the motion is ahead.
     """
     found = _native.stability(
         arm, integrator=integrator, gains=None if gains is None else dict(gains), setpoint=setpoint, q=q, qd=qd
@@ -146,9 +196,9 @@ def rollout(
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
-    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start and end
-    among them, or every step if there are fewer. Without `gains` nothing controls the arm, and a member that is left out is
-    zeros. With `reference` the run is compared with the true motion under the same held control law.
+    It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start
+    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and a member that
+    is left out is zeros. With `reference` the run is compared with the true motion under the same held control law.
     """
     return Rollout(
         **_native.rollout(
@@ -176,11 +226,12 @@ def plan(
     gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
 ) -> Plan:
-    """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan`` does.
+    """Finds the method and timestep that keep the end effector within `error` [m] at least cost, as ``/study/plan``
+    does.
 
-    Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s]; with
-    them it moves to `setpoint` [rad] (4 s unless given), and holding the effort counts as error. Raises `ValueError` where the
-    motion cannot be known so well for so long.
+    Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s];
+    with them it moves to `setpoint` [rad] (4 s unless given), and holding the effort counts as error. Raises
+    `ValueError` where the motion cannot be known so well for so long.
     """
     return Plan(
         **_native.plan(

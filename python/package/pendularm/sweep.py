@@ -1,9 +1,11 @@
 """Many settings of one question: on this machine's cores, or on a cluster by way of an executor.
 
-A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor the size of a piece changes a bit of the results.
+A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor the size of a piece changes a bit of the
+results.
 """
 
 import json
+import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -26,6 +28,15 @@ SETTLED = 0.02
 
 IN_FLIGHT = 256
 """Pieces that are handed to an executor before the first of them is done."""
+
+MOST_SETTINGS = 10_000_000
+"""Combinations of one sweep: their results are kept in memory, some 100 MB a metric."""
+
+MOST_SAMPLES = 100_000
+"""Samples of a run, as many as a rollout has."""
+
+MOST_ROWS = 10_000_000
+"""Samples times settings of a piece: some 1 GB where it is done."""
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
 SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
@@ -80,7 +91,7 @@ def final_error(run: Run) -> Floats:
 
 
 def settling_time(run: Run) -> Floats:
-    """Time from which on every joint is within 0.02 rad of its setpoint [s]; infinite where that is not so at the end."""
+    """Time from which on every joint is within 0.02 rad of its setpoint [s]; infinite where it is not so at the end."""
     away: NDArray[np.bool_] = np.any(np.abs(run.positions - run.setpoint) > SETTLED, axis=2)
     still = np.cumsum(away[::-1], axis=0)[::-1] == 0
     first = np.argmax(still, axis=0)
@@ -115,24 +126,25 @@ def sweep(
     servo: bool = True,
     executor: Executor | None = None,
     folder: str | os.PathLike[str] | None = None,
-    piece: int = 1024,
+    piece: int | None = None,
     progress: bool = True,
     **settings: Any,
 ) -> Sweep:
     """Runs an arm for every combination of the settings in `grid`, and answers what `metric` makes of each run.
 
-    Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad], `q0` [rad]
-    and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and `method`. `grid` has a
-    sequence of each that varies; those that do not are given by name, and what is left out is as in a fresh runtime. Without
-    `servo` the controller is off. Every run lasts `duration` [s] and has `samples`, start and end among them.
+    Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
+    `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and
+    `method`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
+    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s] and has `samples`,
+    start and end among them.
 
-    `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of a `Run`,
-    which an executor has to be able to send.
+    `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of
+    a `Run`, which an executor has to be able to send.
 
-    Pieces of so many settings go to `executor`, anything that hands out futures as `concurrent.futures` does (Dask's
-    `Client.get_executor()`, say), or to as many threads as there are cores. In `folder` every finished piece is kept, and a
-    sweep that was stopped goes on there. Raises `ValueError` for a setting that cannot be, and where the folder holds
-    another sweep.
+    Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
+    hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
+    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. Raises
+    `ValueError` for a setting that cannot be, and where the folder holds another sweep.
     """
     axes = {name: list(values) for name, values in grid.items()}
     for name, choices in axes.items():
@@ -142,9 +154,15 @@ def sweep(
             raise ValueError(f"grid[{name!r}] must have at least one value")
     if not axes:
         raise ValueError("grid must have at least one setting")
-    for field, number, least in [("samples", samples, 2), ("piece", piece, 1)]:
-        if number < least:
-            raise ValueError(f"{field} must be at least {least}, got {number}")
+    total = math.prod(len(choices) for choices in axes.values())
+    if total > MOST_SETTINGS:
+        raise ValueError(f"grid must have at most {MOST_SETTINGS} combinations, got {total}")
+    if not 2 <= samples <= MOST_SAMPLES:
+        raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
+    if piece is None:
+        piece = max(1, min(1024, MOST_ROWS // 10 // samples))
+    if not 1 <= piece <= MOST_ROWS // samples:
+        raise ValueError(f"piece must be between 1 and {MOST_ROWS // samples} with {samples} samples, got {piece}")
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
     if isinstance(metric, str) and metric not in METRICS:
@@ -160,12 +178,12 @@ def sweep(
     )
     question.check()
     kept = None if folder is None else _Folder(Path(folder), question, piece)
-    total = int(np.prod(question.shape))
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     threads = ThreadPoolExecutor() if executor is None else None
     try:
-        _run(question, [start for start in starts if start not in done], piece, threads or executor, done, kept, progress)
+        left = [start for start in starts if start not in done]
+        _run(question, left, piece, threads or executor, done, kept, progress)
     finally:
         if threads is not None:
             threads.shutdown(cancel_futures=True)
@@ -283,7 +301,7 @@ def _run(
     progress: bool,
 ) -> None:
     """Has the pieces done that are left, and takes in each as it comes."""
-    total = int(np.prod(question.shape))
+    total = math.prod(question.shape)
     left = iter(starts)
     under_way: dict[Future[Any], int] = {}
     with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:

@@ -14,7 +14,7 @@ use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::budget::Memory;
 use crate::protocol::messages;
 use crate::protocol::op::{Compression, Encoding};
-use crate::protocol::ros::cbor;
+use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
 
 /// Longest message, or series of them, that is encoded where it is heard: in all the forms that there may be it takes
@@ -102,12 +102,15 @@ impl Encoded {
     fn encode(&self, plain: &Bytes) -> Option<Option<Bytes>> {
         let spelling = &*self.spelling;
         let type_name = self.type_name.as_deref();
+        let renamed = (self.encoding.ros1_stamps).then(|| stamps::with_ros1_names(plain));
+        let plain = renamed.as_ref().unwrap_or(plain);
         if self.encoding.compression == Compression::None {
             let size = self.encoding.fragment_size;
-            return Some(size.filter(|size| plain.len() > *size).map(|size| {
+            let split = size.filter(|size| plain.len() > *size).map(|size| {
                 let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
                 fragments::split(plain, size, &format!("pendularm:{number}"))
-            }));
+            });
+            return Some(split.or(renamed));
         }
         let msg = messages::message_text(spelling, plain);
         let msg: Value = serde_json::from_slice(msg).ok()?;

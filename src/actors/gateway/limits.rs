@@ -15,10 +15,12 @@ pub const MAX_SUBSCRIPTIONS: usize = 1024;
 pub const MAX_FRAGMENT_SIZES: usize = 16;
 /// Topics that one connection advertises.
 pub const MAX_ADVERTISED: usize = 1024;
-/// Services that one connection provides.
+/// Services and actions that one connection provides.
 pub const MAX_PROVIDED: usize = 256;
 /// Calls of one connection that wait for clients to answer.
 pub const MAX_WAITING_CALLS: usize = 256;
+/// Goals of one connection that other clients pursue.
+pub const MAX_WAITING_GOALS: usize = 256;
 /// How long a provider may take when its caller does not say.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Bytes of a registration, beside three times its name: its places in the tables.

@@ -4,7 +4,7 @@
 //! order sent.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -16,6 +16,7 @@ use crate::actors::ConnectionId;
 pub use crate::actors::node::{Feedback, Publish, Respond};
 use crate::actors::resources::budget::Account;
 use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::Op;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::payload::Payload;
@@ -36,6 +37,8 @@ pub struct Outlets {
     pub configure: Recipient<Configure>,
     /// The end.
     pub finish: Recipient<Finish>,
+    /// Set while the client is told why a call failed in `values` too.
+    pub wants_text: Arc<AtomicBool>,
     /// Set when the client is gone: heavy computations for it stop.
     pub gone: Arc<AtomicBool>,
     /// Bytes of responses that wait to be written; kept by the connection.
@@ -44,6 +47,23 @@ pub struct Outlets {
     pub account: Arc<Account>,
     /// Notified when the client loses its place to one that comes.
     pub displaced: Arc<Notify>,
+}
+
+impl Outlets {
+    /// How the client is told why a call failed.
+    #[must_use]
+    pub fn error_form(&self) -> ErrorForm {
+        form_of(&self.wants_text)
+    }
+}
+
+/// The form of errors that a connection's flag stands for.
+pub(super) fn form_of(wants_text: &AtomicBool) -> ErrorForm {
+    if wants_text.load(Ordering::Relaxed) {
+        ErrorForm::Text
+    } else {
+        ErrorForm::Object
+    }
 }
 
 /// Why a client was not taken.

@@ -22,9 +22,9 @@ thread_local! {
 #[derive(Clone, Copy)]
 struct Counted {
     began: Instant,
-    /// What a look costs.
+    /// The cost of a look.
     cost: Duration,
-    /// What all of them have cost so far.
+    /// The cost of all of them so far.
     spent: Duration,
 }
 

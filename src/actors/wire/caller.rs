@@ -16,7 +16,7 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::budget::{Account, NoRoom, Promise};
 use crate::protocol::catalog::Service;
-use crate::protocol::messages;
+use crate::protocol::messages::{self, ErrorForm};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
 
@@ -54,6 +54,8 @@ pub struct Address {
     service: Service,
     name: Box<str>,
     id: Option<Payload>,
+    /// How the caller is told why the call failed.
+    error_form: ErrorForm,
     /// Counts what the caller makes the program hold: the answer, too, until it has been written.
     account: Option<Arc<Account>>,
     /// Room that was taken for an answer of megabytes.
@@ -73,17 +75,21 @@ impl Address {
         self.id.as_ref()
     }
 
-    /// The response with `values`; `result` is true if `status` is empty.
+    /// The response with `values`; `result` is true if `status` is empty. Otherwise callers who want the text there get
+    /// that in place of `values`.
     #[must_use]
     pub fn response(&self, values: &impl Serialize, status: &str) -> Bytes {
         let is_good = status.is_empty();
+        if !is_good && self.error_form == ErrorForm::Text {
+            return self.failure(status);
+        }
         messages::response(&self.name, self.id.as_ref(), values, is_good, status)
     }
 
-    /// The response `result: false` with empty values.
+    /// The response `result: false` without values.
     #[must_use]
     pub fn failure(&self, why: &str) -> Bytes {
-        messages::failure(&self.name, self.id.as_ref(), why)
+        messages::failure(&self.name, self.id.as_ref(), why, self.error_form)
     }
 
     /// The response with values, or with the reason why there are none.
@@ -133,6 +139,7 @@ impl Caller {
             service,
             name,
             id,
+            error_form: ErrorForm::default(),
             account: None,
             promise: None,
         };
@@ -152,6 +159,15 @@ impl Caller {
     pub fn within(mut self, account: Arc<Account>) -> Self {
         if let Some(address) = &mut self.address {
             address.account = Some(account);
+        }
+        self
+    }
+
+    /// The caller is told in this form why the call failed.
+    #[must_use]
+    pub fn with_errors(mut self, form: ErrorForm) -> Self {
+        if let Some(address) = &mut self.address {
+            address.error_form = form;
         }
         self
     }

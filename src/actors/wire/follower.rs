@@ -3,6 +3,7 @@
 //! **Invariant:** feedback may be lost on its way to a slow client, the end of a goal may not, and it comes after it.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use actix::prelude::*;
 use serde::Serialize;
@@ -71,6 +72,8 @@ pub struct GoalFollower {
     pub id: Option<Payload>,
     /// Whether feedback was asked for.
     pub wants_feedback: bool,
+    /// Set when the client is gone.
+    pub gone: Arc<AtomicBool>,
     /// Its share of its client's account: a goal may last for as long as the client likes.
     pub share: Share,
 }
@@ -89,6 +92,12 @@ impl Canceller {
 }
 
 impl GoalFollower {
+    /// True once the client has disconnected.
+    #[must_use]
+    pub fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+
     /// Whether this goal is the one that is meant.
     #[must_use]
     pub fn is_meant_by(&self, who: &Canceller) -> bool {

@@ -14,7 +14,7 @@ use crate::actors::resources::aside::{Errand, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
 
 /// Arguments longer than this are read aside: some tenth of a millisecond. Only computations take such.
-const LONG_ARGUMENTS: usize = 16 * 1024;
+pub(in crate::actors) const LONG_ARGUMENTS: usize = 16 * 1024;
 
 /// Hands what has come to the node that is meant.
 pub type Route<T> = Box<dyn Fn(T) + Send>;

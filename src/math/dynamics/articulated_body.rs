@@ -22,7 +22,8 @@
 //! same two directions, because a heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff
 //! part would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise.
 //! Rotations are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
-//! acceleration of the base: two products, and so nothing that would be worth leaving out at gravity 0.
+//! acceleration of the base. Without it nothing depends on where the first link points to, and
+//! [`weightless_dynamics`] leaves out that angle's sine and cosine.
 //!
 //! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a
 //! heavy tip (`tests/math_dynamics.rs`). Known limit: where masses *and* lengths spread by many powers of ten at once,
@@ -45,8 +46,36 @@ use glam::DVec2;
 /// Never panics. The result is not finite where the input is not, or where an intermediate value leaves the range
 /// of `f64` (mass ratios of about 1e150 between neighbours).
 #[must_use]
-#[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
+#[inline(always)]
 pub fn forward_dynamics<const N: usize>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    qd: &[f64; N],
+    tau: &[f64; N],
+) -> [f64; N] {
+    recursion::<N, true>(arm, q, qd, tau)
+}
+
+/// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
+/// for fewer instructions. The first angle is not looked at, not even whether it is finite.
+#[must_use]
+#[inline(always)]
+pub fn weightless_dynamics<const N: usize>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    qd: &[f64; N],
+    tau: &[f64; N],
+) -> [f64; N] {
+    let mut turned = *q;
+    if let Some(first) = turned.first_mut() {
+        // A constant, whose sine and cosine the compiler takes.
+        *first = 0.0;
+    }
+    recursion::<N, false>(arm, &turned, qd, tau)
+}
+
+#[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
+fn recursion<const N: usize, const WEIGHS: bool>(
     arm: &Arm<N>,
     q: &[f64; N],
     qd: &[f64; N],
@@ -87,7 +116,8 @@ pub fn forward_dynamics<const N: usize>(
     }
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
-    let mut tip = DVec2::new(0.0, arm.gravity());
+    let gravity = if WEIGHS { arm.gravity() } else { 0.0 };
+    let mut tip = DVec2::new(0.0, gravity);
     let mut inner = 0.0;
     std::array::from_fn(|i| {
         let x_axis = DVec2::new(cos[i], sin[i]);

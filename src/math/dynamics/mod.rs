@@ -28,7 +28,7 @@
 
 mod articulated_body;
 
-pub use articulated_body::forward_dynamics;
+pub use articulated_body::{forward_dynamics, weightless_dynamics};
 
 use super::arm::{Arm, State};
 use super::trig;

@@ -4,7 +4,7 @@
 //!
 //! 1. with the controller on, the control law runs once ([`Pid::control`]); off, the effort is zero; a disturbance that
 //!    has not ended ([`Disturbance`]) is added to it;
-//! 2. that effort is held while [`increment`] evaluates [`forward_dynamics`] at the method's stages ([`step_under`]);
+//! 2. that effort is held while the method's stages evaluate the dynamics ([`step_under`]);
 //! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
 //!
 //! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
@@ -19,15 +19,17 @@
 )]
 
 mod checkpoint;
+mod increments;
 mod input;
 
 use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
+pub use self::increments::step_under;
+use self::increments::{add, leaves_out_first_angle, step_as};
 pub use self::input::ArmInput;
 use super::arm::{Arm, State};
-use super::dynamics::forward_dynamics;
-use super::integrator::{Increment, Method, increment, two_sum};
+use super::integrator::Method;
 use super::pid::{Control, Gains, Pid, Setpoint};
 
 /// Timestep until another is set \[s\]. A third of what the default gains are stable to.
@@ -136,14 +138,27 @@ impl<const N: usize> Simulation<N> {
     pub fn advance_with(
         &mut self,
         steps: u64,
-        mut observe: impl FnMut(&Self) -> ControlFlow<()>,
+        observe: impl FnMut(&Self) -> ControlFlow<()>,
     ) -> u64 {
         if self.divergence.is_some() {
             return 0;
         }
+        // Asked once for all steps: in every one it would cost as much as it saves.
+        if leaves_out_first_angle(&self.arm) {
+            self.take_steps::<false>(steps, observe)
+        } else {
+            self.take_steps::<true>(steps, observe)
+        }
+    }
+
+    fn take_steps<const WEIGHS: bool>(
+        &mut self,
+        steps: u64,
+        mut observe: impl FnMut(&Self) -> ControlFlow<()>,
+    ) -> u64 {
         // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
         for taken in 0..steps {
-            if !self.take_step() {
+            if !self.take_step::<WEIGHS>() {
                 self.divergence = Some(Divergence {
                     step: self.steps + 1,
                     time: self.time(),
@@ -159,7 +174,7 @@ impl<const N: usize> Simulation<N> {
 
     /// One step, unless its result is not finite: then nothing changes, and `false`.
     #[inline]
-    fn take_step(&mut self) -> bool {
+    fn take_step<const WEIGHS: bool>(&mut self) -> bool {
         let mut control = if self.pid.is_enabled() {
             self.pid.control(&self.state, self.timestep)
         } else {
@@ -173,7 +188,8 @@ impl<const N: usize> Simulation<N> {
         }
         let State { position, velocity } = &self.state;
         let effort = &control.effort;
-        let (dq, dv) = step_under(&self.arm, self.method, &self.state, effort, self.timestep);
+        let (dq, dv) =
+            step_as::<N, WEIGHS>(&self.arm, self.method, &self.state, effort, self.timestep);
         let (position, position_carry) = add(position, &self.carry.position, &dq);
         let (velocity, velocity_carry) = add(velocity, &self.carry.velocity, &dv);
         let next = State { position, velocity };
@@ -341,31 +357,4 @@ impl<const N: usize> Simulation<N> {
     pub fn divergence(&self) -> Option<Divergence> {
         self.divergence
     }
-}
-
-/// What a step of `h` \[s\] under the constant `effort` \[N m\] adds to positions and velocities.
-#[inline(always)]
-#[must_use]
-pub fn step_under<const N: usize>(
-    arm: &Arm<N>,
-    method: Method,
-    state: &State<N>,
-    effort: &[f64; N],
-    h: f64,
-) -> Increment<N> {
-    let State { position, velocity } = state;
-    // The motion does not depend on the time, so none is reckoned for the stages.
-    let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
-    increment(method, acceleration, 0.0, position, velocity, h)
-}
-
-/// `value + carry + increment`, and the carry that rounding leaves for the next step.
-#[inline(always)]
-fn add<const N: usize>(
-    value: &[f64; N],
-    carry: &[f64; N],
-    increment: &[f64; N],
-) -> ([f64; N], [f64; N]) {
-    let sums: [(f64, f64); N] = std::array::from_fn(|i| two_sum(value[i], increment[i] + carry[i]));
-    (sums.map(|sum| sum.0), sums.map(|sum| sum.1))
 }

@@ -282,9 +282,7 @@ impl Trial {
         if attempt <= ATTEMPTS
             && let Some(target) = sample()
         {
-            let send = self.ask(target, attempt);
-            self.view = View::of(Some(target), ActionStatus::Idle);
-            return vec![send, Action::PublishStatus];
+            return vec![self.ask(target, attempt)];
         }
         self.pursuit = Pursuit::Nothing;
         self.view = View::of(None, ActionStatus::Idle);
@@ -345,8 +343,8 @@ impl Trial {
         // The new goal would preempt the old one, but not if it is refused.
         let mut actions = self.abandon();
         actions.push(self.ask(target, 1));
-        self.view = View::of(Some(target), ActionStatus::Idle);
-        actions.push(Action::PublishStatus);
+        // Shown once its goal has been accepted, with what that goal then has.
+        self.view = View::of(None, ActionStatus::Idle);
         actions
     }
 

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec2;
 
-use crate::math::kinematics::{Reach, Target, solve};
+use crate::math::kinematics::{Reach, Target, heading, solve};
 
 /// Draws that [`sample`] makes before it gives up; the first one is reachable but for lengths at the end of the number
 /// range.
@@ -24,8 +24,8 @@ const MARGIN: f64 = 0.05;
 /// of the distance from the base. (Uniform distances or joint angles would crowd around the base.) One twentieth of the
 /// reach's width is left free at either edge: there the arm is stretched or folded, the end effector is slow to follow
 /// the joints, part of the epsilon around the target can't be entered, and a small change of the lengths would put the
-/// target out of reach. The orientation is left open, for 3 links too, so that the solver may keep the present one:
-/// only the position counts, and a demand that counts for nothing would only make the arm turn over.
+/// target out of reach. Three links get an orientation too: one of which each is as likely as any other, or where the
+/// arm can't have that, the nearest that it can have.
 pub fn sample<const N: usize>(
     lengths: &[f64; N],
     mut random: impl FnMut() -> f64,
@@ -38,11 +38,27 @@ pub fn sample<const N: usize>(
     (0..DRAWS).find_map(|_| {
         let distance = greatest * (hole + random() * (1.0 - hole)).sqrt();
         let bearing = TAU * random();
-        let position = distance * DVec2::from_angle(bearing);
         let target = Target {
-            position,
+            position: distance * DVec2::from_angle(bearing),
             orientation: None,
         };
-        solve(lengths, &[0.0; N], &target).is_ok().then_some(target)
+        if N < 3 {
+            return solve(lengths, &[0.0; N], &target).is_ok().then_some(target);
+        }
+        oriented(lengths, target, TAU * random())
     })
+}
+
+/// The target with the orientation nearest to `wanted` \[rad\] that the arm can have there.
+fn oriented<const N: usize>(lengths: &[f64; N], target: Target, wanted: f64) -> Option<Target> {
+    let mut present = [0.0; N];
+    if let Some(first) = present.first_mut() {
+        *first = wanted;
+    }
+    let pose = solve(lengths, &present, &target).ok()?;
+    let target = Target {
+        orientation: Some(heading(&pose).to_angle()),
+        ..target
+    };
+    solve(lengths, &present, &target).is_ok().then_some(target)
 }

@@ -1,12 +1,13 @@
 //! The actions: one row each. Goals with progress and an end, as rosbridge has them beside topics and services.
 //!
-//! **Invariant:** an action has the fields of the services and topics that do the same: there is one goal machine.
+//! **Invariant:** an action has the fields of the services and topics that do the same, where there are such; others
+//! have those of ROS 2.
 
-use super::entry::Field;
+use super::entry::{Field, optional, required};
 use super::node::Node;
-use super::services::Service;
+use super::services::{Service, WISH};
 use super::table::table;
-use super::topics::Topic;
+use super::topics::{TRANSFORMS, Topic};
 use crate::protocol::names;
 
 table! {
@@ -20,6 +21,38 @@ table! {
             goal: Service::SendGoal.fields(),
             result: Topic::IkResult.fields(),
             feedback: Topic::IkFeedback.fields(),
+        },
+        /// Frames for web viewers, as feedback.
+        TfSubscription = ActionEntry {
+            name: "/tf2_web_republisher",
+            type_name: "tf2_web_republisher_interfaces/action/TFSubscription",
+            owner: Node::TfRepublisher,
+            goal: &WISH,
+            result: &[],
+            feedback: &TRANSFORMS,
+        },
+        /// Leads the arm along a path.
+        FollowJointTrajectory = ActionEntry {
+            name: "/joint_trajectory_controller/follow_joint_trajectory",
+            type_name: "control_msgs/action/FollowJointTrajectory",
+            owner: Node::JointTrajectoryController,
+            goal: &[
+                required("trajectory", "trajectory_msgs/msg/JointTrajectory", ""),
+                optional("path_tolerance", "control_msgs/msg/JointTolerance[]", ""),
+                optional("goal_tolerance", "control_msgs/msg/JointTolerance[]", ""),
+                optional("goal_time_tolerance", "builtin_interfaces/msg/Duration", "s, ns"),
+            ],
+            result: &[
+                required("error_code", "int32", ""),
+                required("error_string", "string", ""),
+            ],
+            feedback: &[
+                required("header", "std_msgs/msg/Header", ""),
+                required("joint_names", "string[]", ""),
+                required("desired", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
+                required("actual", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
+                required("error", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
+            ],
         },
     }
 }
@@ -57,6 +90,12 @@ impl Action {
     #[must_use]
     pub const fn owner(self) -> Node {
         self.entry().owner
+    }
+
+    /// Whether a goal may be as long as a frame: it is read where it holds up nobody.
+    #[must_use]
+    pub const fn takes_long_goals(self) -> bool {
+        matches!(self, Self::FollowJointTrajectory)
     }
 
     /// The fields of a goal.

@@ -9,6 +9,7 @@
 mod actions;
 mod entry;
 mod node;
+mod parameter_types;
 pub mod rosapi;
 mod services;
 mod table;

@@ -13,10 +13,14 @@ table! {
         Ik = "ik",
         /// Drives the arm to a goal.
         IkAction = "ik_action",
+        /// Leads the arm along paths.
+        JointTrajectoryController = "joint_trajectory_controller",
         /// Timed trials.
         IkTrial = "ik_trial",
         /// Predictions and offline runs.
         Study = "study",
+        /// Puts frames together for web viewers.
+        TfRepublisher = "tf2_web_republisher",
         /// The rosbridge side: connections and registry.
         Gateway = "gateway",
         /// Tells what there is.

@@ -59,6 +59,36 @@ table! {
             .request(&DISTURBANCE)
             .response(&DISTURBANCE)
             .all_or_nothing(),
+        /// The names of the arm's parameters.
+        ListParameters = service("/arm_sim/list_parameters", "rcl_interfaces/srv/ListParameters", Node::ArmSim)
+            .request(fields![
+                optional("prefixes", "string[]", ""),
+                optional("depth", "uint64", ""),
+            ])
+            .response(fields![required("result", "rcl_interfaces/msg/ListParametersResult", "")])
+            .all_or_nothing(),
+        /// Their values.
+        GetParameters = service("/arm_sim/get_parameters", "rcl_interfaces/srv/GetParameters", Node::ArmSim)
+            .request(&NAMES)
+            .response(fields![required("values", "rcl_interfaces/msg/ParameterValue[]", "")])
+            .all_or_nothing(),
+        /// Their types.
+        GetParameterTypes = service(
+            "/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes", Node::ArmSim)
+            .request(&NAMES)
+            .response(fields![required("types", "uint8[]", "")])
+            .all_or_nothing(),
+        /// Their descriptions.
+        DescribeParameters = service(
+            "/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters", Node::ArmSim)
+            .request(&NAMES)
+            .response(fields![required("descriptors", "rcl_interfaces/msg/ParameterDescriptor[]", "")])
+            .all_or_nothing(),
+        /// Sets them.
+        SetParameters = service("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters", Node::ArmSim)
+            .request(fields![required("parameters", "rcl_interfaces/msg/Parameter[]", "")])
+            .response(fields![required("results", "rcl_interfaces/msg/SetParametersResult[]", "")])
+            .all_or_nothing(),
         /// The controller on or off.
         Enable = service("/pid_controller/enable", "pendularm_interfaces/srv/Enable", Node::ArmSim)
             .request(&SWITCH)
@@ -89,7 +119,8 @@ table! {
             .all_or_nothing(),
         /// Preempts the active goal.
         CancelGoal = service("/ik_action/cancel_goal", "pendularm_interfaces/srv/CancelGoal", Node::IkAction)
-            .request(fields![optional("goal_id", "string", "")]),
+            .request(fields![optional("goal_id", "string", "")])
+            .all_or_nothing(),
         /// Starts a timed trial afresh.
         TrialStart = service("/ik_trial/start", "pendularm_interfaces/srv/TrialStart", Node::IkTrial)
             .request(&TRIAL)
@@ -99,6 +130,18 @@ table! {
         TrialSkip = service("/ik_trial/skip", "pendularm_interfaces/srv/TrialSkip", Node::IkTrial),
         /// Ends the trial.
         TrialStop = service("/ik_trial/stop", "pendularm_interfaces/srv/TrialStop", Node::IkTrial),
+        /// Which topic has the frames that web viewers want.
+        RepublishTfs = service("/republish_tfs", "tf2_web_republisher/srv/RepublishTFs", Node::TfRepublisher)
+            .request(fields![
+                optional("source_frames", "string[]", ""),
+                optional("target_frame", "string", ""),
+                optional("angular_thres", "float32", ""),
+                optional("trans_thres", "float32", ""),
+                optional("rate", "float32", "Hz"),
+                optional("timeout", "builtin_interfaces/msg/Duration", "s, ns"),
+            ])
+            .response(fields![required("topic_name", "string", "")])
+            .all_or_nothing(),
         /// Predicts the largest stable timestep.
         Stability = service("/study/stability", "pendularm_interfaces/srv/Stability", Node::Study)
             .request(fields![
@@ -226,6 +269,7 @@ const PARAMS: [Field; 3] = [
     optional("masses", "float64[]", "kg"),
     optional("lengths", "float64[]", "m"),
 ];
+const NAMES: [Field; 1] = [required("names", "string[]", "")];
 const SWITCH: [Field; 1] = [optional("data", "bool", "")];
 const DISTURBANCE: [Field; 2] = [
     required("effort", "float64[]", "N m"),
@@ -240,6 +284,15 @@ const TRIAL: [Field; 3] = [
     optional("duration", "float64", "s"),
     optional("epsilon", "float64", "m"),
     optional("success_hold", "float64", "s"),
+];
+
+/// A viewer's wish: frames, as seen from another.
+pub(super) const WISH: [Field; 5] = [
+    required("source_frames", "string[]", ""),
+    required("target_frame", "string", ""),
+    optional("angular_thres", "float32", ""),
+    optional("trans_thres", "float32", ""),
+    optional("rate", "float32", "Hz"),
 ];
 
 /// The type of a request's `gains`; its members are the fields of `/pid_controller/set_gains`.

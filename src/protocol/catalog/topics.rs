@@ -66,8 +66,33 @@ table! {
         /// Where the end effector is on its link.
         TfStatic = published("/tf_static", Node::ArmSim, "tf2_msgs/msg/TFMessage", &TRANSFORMS)
             .latched(),
+        /// Every frame as seen from the world, 30 Hz: for web viewers.
+        TfWeb = published(
+            "/tf2_web_republisher/frames", Node::TfRepublisher, "tf2_web_republisher/msg/TFArray", &TRANSFORMS),
+        /// A viewer's wish for frames, as roslib 1 sends it.
+        TfWebGoal = subscribed("/tf2_web_republisher/goal", Node::TfRepublisher,
+            "tf2_web_republisher/msg/TFSubscriptionActionGoal", fields![
+            required("header", "std_msgs/msg/Header", ""),
+            required("goal_id", "actionlib_msgs/msg/GoalID", ""),
+            required("goal", "tf2_web_republisher/msg/TFSubscriptionGoal", ""),
+        ]),
+        /// Its end.
+        TfWebCancel = subscribed(
+            "/tf2_web_republisher/cancel", Node::TfRepublisher, "actionlib_msgs/msg/GoalID", &GOAL_ID),
+        /// The frames that were wished for.
+        TfWebFeedback = published("/tf2_web_republisher/feedback", Node::TfRepublisher,
+            "tf2_web_republisher/msg/TFSubscriptionActionFeedback", fields![
+            required("header", "std_msgs/msg/Header", ""),
+            required("status", "actionlib_msgs/msg/GoalStatus", ""),
+            required("feedback", "tf2_web_republisher/msg/TFSubscriptionFeedback", ""),
+        ]),
         /// The arm as URDF.
         RobotDescription = published("/robot_description", Node::ArmSim, "std_msgs/msg/String", fields![
+            required("data", "string", ""),
+        ])
+            .latched(),
+        /// The arm as planners want it beside that: SRDF.
+        RobotSemantics = published("/robot_description_semantic", Node::ArmSim, "std_msgs/msg/String", fields![
             required("data", "string", ""),
         ])
             .latched(),
@@ -103,7 +128,13 @@ const LOG_LEVELS: [Constant; 5] = [
     byte("FATAL", "50"),
 ];
 
-const TRANSFORMS: [Field; 1] = [required(
+/// A goal's name, as ROS 1 has it.
+const GOAL_ID: [Field; 2] = [
+    required("stamp", "builtin_interfaces/msg/Time", "s, ns"),
+    required("id", "string", ""),
+];
+
+pub(super) const TRANSFORMS: [Field; 1] = [required(
     "transforms",
     "geometry_msgs/msg/TransformStamped[]",
     "",

@@ -5,7 +5,9 @@
 
 pub use super::entry::{Constant, Count, Type};
 use super::entry::{Field, byte, message, required};
-use super::topics::Topic;
+use super::parameter_types;
+use super::services::WISH;
+use super::topics::{TRANSFORMS, Topic};
 use crate::protocol::names;
 
 /// Stands between the definitions of a type and of the types in it: 80 of these in a line.
@@ -13,7 +15,8 @@ const SEPARATOR: &str = "=";
 
 /// All message types: those of the topics, then those inside.
 pub fn all() -> impl Iterator<Item = Type> {
-    Topic::ALL.into_iter().map(Topic::message).chain(PARTS)
+    let topics = Topic::ALL.into_iter().map(Topic::message);
+    topics.chain(PARTS).chain(parameter_types::TYPES)
 }
 
 /// The type of that name; its middle part may be left out.
@@ -84,7 +87,7 @@ const TIME: [Field; 2] = [
 ];
 
 /// The types inside others.
-const PARTS: [Type; 12] = [
+const PARTS: [Type; 16] = [
     message(
         "std_msgs/msg/Header",
         &[
@@ -107,6 +110,28 @@ const PARTS: [Type; 12] = [
                 "s, ns",
             ),
         ],
+    ),
+    message(
+        "control_msgs/msg/JointTolerance",
+        &[
+            required("name", "string", ""),
+            required("position", "float64", "rad"),
+            required("velocity", "float64", "rad/s"),
+            required("acceleration", "float64", "rad/s^2"),
+        ],
+    ),
+    message(
+        "actionlib_msgs/msg/GoalStatus",
+        &[
+            required("goal_id", "actionlib_msgs/msg/GoalID", ""),
+            required("status", "uint8", ""),
+            required("text", "string", ""),
+        ],
+    ),
+    message("tf2_web_republisher/msg/TFSubscriptionGoal", &WISH),
+    message(
+        "tf2_web_republisher/msg/TFSubscriptionFeedback",
+        &TRANSFORMS,
     ),
     message(
         "diagnostic_msgs/msg/DiagnosticStatus",

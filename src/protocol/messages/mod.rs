@@ -6,6 +6,7 @@
 //! **Invariant:** one frame is one line of valid JSON.
 
 pub mod goal;
+pub mod republished;
 pub mod scene;
 mod telemetry;
 pub mod trajectory;
@@ -45,6 +46,30 @@ impl Level {
             Self::Info => "info",
             Self::Warning => "warning",
             Self::Error => "error",
+        }
+    }
+}
+
+/// As what a response with `result: false` says in `values` why it failed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ErrorForm {
+    /// An object, like that of any other response: what holds over raw TCP until the client says otherwise.
+    #[default]
+    Object,
+    /// The text of `status`, as `rosbridge_suite` has it and its clients expect: the same for WebSocket.
+    Text,
+}
+
+impl ErrorForm {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Object, Self::Text];
+
+    /// The form's name on the wire.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Object => "object",
+            Self::Text => "text",
         }
     }
 }
@@ -133,10 +158,13 @@ pub fn response_raw(
         .end()
 }
 
-/// The answer to a call that failed: `values` is `{}`, `status` says why.
+/// The answer to a call that failed: `values` is `{}` or says why, `status` says why.
 #[must_use]
-pub fn failure(service: &str, id: Option<&Payload>, status: &str) -> Bytes {
-    response(service, id, &Empty {}, false, status)
+pub fn failure(service: &str, id: Option<&Payload>, status: &str, form: ErrorForm) -> Bytes {
+    match form {
+        ErrorForm::Object => response(service, id, &Empty {}, false, status),
+        ErrorForm::Text => response(service, id, &status, false, status),
+    }
 }
 
 /// Progress of a goal.
@@ -164,6 +192,62 @@ pub fn action_result(
         .value("values", values)
         .value("status", &status)
         .value("result", &result)
+        .end()
+}
+
+/// Progress of a goal, as the client tells it that pursues it; `values` only pass through.
+#[must_use]
+pub fn action_feedback_raw(action: &str, id: Option<&Payload>, values: &Payload) -> Bytes {
+    Encoder::with_room("action_feedback", values.line().len() + USUAL_FRAME)
+        .text("action", action)
+        .optional_raw("id", id)
+        .raw("values", values)
+        .end()
+}
+
+/// The end of a goal, as the client tells it that pursued it; `values` only pass through.
+#[must_use]
+pub fn action_result_raw(
+    action: &str,
+    id: Option<&Payload>,
+    values: &Payload,
+    status: u8,
+    result: bool,
+) -> Bytes {
+    Encoder::with_room("action_result", values.line().len() + USUAL_FRAME)
+        .text("action", action)
+        .optional_raw("id", id)
+        .raw("values", values)
+        .value("status", &status)
+        .value("result", &result)
+        .end()
+}
+
+/// A goal that goes on to the client that pursues it, under an id of the runtime's own; `args` only pass through.
+#[must_use]
+pub fn action_goal(
+    action: &str,
+    id: &str,
+    type_name: Option<&str>,
+    args: &Payload,
+    feedback: bool,
+) -> Bytes {
+    let frame = Encoder::with_room("send_action_goal", args.line().len() + USUAL_FRAME)
+        .text("action", action)
+        .text("id", id);
+    let frame = match type_name {
+        Some(name) => frame.text("action_type", name),
+        None => frame,
+    };
+    frame.raw("args", args).value("feedback", &feedback).end()
+}
+
+/// The wish that a goal end, for the client that pursues it.
+#[must_use]
+pub fn cancellation(action: &str, id: &str) -> Bytes {
+    Encoder::op("cancel_action_goal")
+        .text("action", action)
+        .text("id", id)
         .end()
 }
 

@@ -13,7 +13,7 @@ use serde_json::value::RawValue;
 
 pub use super::rejections::{Bound, Reason, RejectedField, Rejections};
 
-use crate::protocol::catalog::{Field, Service};
+use crate::protocol::catalog::{Action, Field, Service};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::json;
 use crate::protocol::wire::text;
@@ -38,7 +38,19 @@ impl<'a> Fields<'a> {
     /// # Errors
     /// Where a positional array has more entries than the service has fields.
     pub fn read(args: &'a Arguments, service: Service) -> Result<Self, RejectedField> {
-        let mut read = Self::of(service);
+        Self::of(service).filled(args)
+    }
+
+    /// The same for the fields of a goal. One bad field rejects the whole goal.
+    ///
+    /// # Errors
+    /// Where a positional array has more entries than a goal has fields.
+    pub fn of_goal(args: &'a Arguments, action: Action) -> Result<Self, RejectedField> {
+        Self::with(action.goal_fields(), true).filled(args)
+    }
+
+    fn filled(self, args: &'a Arguments) -> Result<Self, RejectedField> {
+        let mut read = self;
         let (fields, values) = (read.fields, &mut read.values);
         let refused = |reason| RejectedField {
             field: "args".to_owned(),
@@ -98,11 +110,15 @@ impl<'a> Fields<'a> {
 
     /// The fields of a request that gives none.
     fn of(service: Service) -> Self {
+        Self::with(service.fields(), service.all_or_nothing())
+    }
+
+    fn with(fields: &'static [Field], null_is_absent: bool) -> Self {
         Self {
-            fields: service.fields(),
-            null_is_absent: service.all_or_nothing(),
+            fields,
+            null_is_absent,
             prefix: String::new(),
-            values: vec![None; service.fields().len()],
+            values: vec![None; fields.len()],
             rejections: Rejections::default(),
         }
     }
@@ -165,6 +181,37 @@ impl<'a> Fields<'a> {
             Some(text) => Some(text),
             None => self.mistyped(name, "a string", raw),
         }
+    }
+
+    /// The value as it came.
+    pub fn raw(&mut self, name: &'static str) -> Option<&'a RawValue> {
+        self.take(name)
+    }
+
+    /// An array of at most `most` values, whatever they are.
+    pub fn entries(&mut self, name: &'static str, most: usize) -> Option<Vec<&'a RawValue>> {
+        let raw = self.take(name)?;
+        let Some(entries) = json::entries(raw, most) else {
+            return self.mistyped(name, "an array", raw);
+        };
+        if entries.count > most {
+            let (limit, got) = (most, entries.count);
+            return self.rejected_as(name, Reason::TooMany { limit, got });
+        }
+        Some(entries.first)
+    }
+
+    /// An array of at most `most` strings.
+    pub fn texts(&mut self, name: &'static str, most: usize) -> Option<Vec<String>> {
+        let entries = self.entries(name, most)?;
+        let mut texts = Vec::with_capacity(entries.len());
+        for (index, entry) in entries.iter().enumerate() {
+            match json::text(entry) {
+                Some(text) => texts.push(text.into_owned()),
+                None => self.mistyped(&format!("{name}[{index}]"), "a string", entry)?,
+            }
+        }
+        Some(texts)
     }
 
     /// A whole number from 1 to `limit`; `10.0` counts as 10.

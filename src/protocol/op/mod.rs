@@ -6,6 +6,7 @@
 //! its `id` either way.
 
 pub mod fields;
+pub mod follow;
 mod reader;
 mod rejections;
 pub mod token;
@@ -14,7 +15,7 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
-use super::messages::Level;
+use super::messages::{ErrorForm, Level};
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
@@ -105,10 +106,22 @@ pub enum Op {
         /// Action name.
         action: String,
     },
+    /// An operation of a client that pursues goals of an action.
+    Pursue {
+        /// Action name.
+        action: String,
+        /// Which of them.
+        pursuit: PursuerOp,
+    },
     /// A piece of a longer frame.
     Fragment(Piece),
-    /// Which statuses the sender wants from now on.
-    SetLevel(Verbosity),
+    /// Which statuses the sender wants from now on, and how it wants to be told why a call failed.
+    SetLevel {
+        /// The statuses.
+        verbosity: Verbosity,
+        /// The form of errors, if it is to change.
+        errors: Option<ErrorForm>,
+    },
     /// Shows who the sender is, where the runtime asks for that.
     Auth {
         /// The token that it shows.
@@ -136,7 +149,11 @@ impl Op {
             Self::PublishLines(lines) => lines.frames.len(),
             Self::CallService(CallService { args, .. })
             | Self::SendActionGoal(ActionGoal { args, .. }) => args.payload().allocated(),
-            Self::ServiceResponse { values, .. } => values.allocated(),
+            Self::ServiceResponse { values, .. }
+            | Self::Pursue {
+                pursuit: PursuerOp::Feedback { values } | PursuerOp::End { values, .. },
+                ..
+            } => values.allocated(),
             // Names, which are short.
             _ => 0,
         }
@@ -183,10 +200,12 @@ pub struct Encoding {
     /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. None: in one piece always, as
     /// what is binary does.
     pub fragment_size: Option<usize>,
+    /// Whether stamps have the names of ROS 1 too. The registry knows: it depends on the topic.
+    pub ros1_stamps: bool,
 }
 
 impl Encoding {
-    /// Joins two subscriptions of one client: the denser encoding, the smaller pieces.
+    /// Joins two subscriptions of one client: the denser encoding, the smaller pieces, more names.
     #[must_use]
     pub fn merged(self, other: Self) -> Self {
         let compression = self.compression.max(other.compression);
@@ -194,6 +213,7 @@ impl Encoding {
         Self {
             compression,
             fragment_size: sizes.min().filter(|_| compression == Compression::None),
+            ros1_stamps: self.ros1_stamps || other.ros1_stamps,
         }
     }
 }
@@ -232,6 +252,32 @@ pub struct ActionGoal {
     pub args: Arguments,
     /// Whether feedback is wanted.
     pub feedback: bool,
+}
+
+/// An operation of a client that pursues goals; where it is about one goal, the frame's id says which.
+#[derive(Debug, Clone)]
+pub enum PursuerOp {
+    /// The sender pursues the action from now on.
+    Advertise {
+        /// Action type, if given.
+        type_name: Option<String>,
+    },
+    /// Withdraws that.
+    Unadvertise,
+    /// How a goal goes.
+    Feedback {
+        /// Any value.
+        values: Payload,
+    },
+    /// How a goal has ended.
+    End {
+        /// Any value.
+        values: Payload,
+        /// As `action_msgs/msg/GoalStatus` counts.
+        status: u8,
+        /// Whether it has come to a result.
+        result: bool,
+    },
 }
 
 /// The arguments of a call.

@@ -24,7 +24,7 @@ pub enum Bound {
 }
 
 impl Bound {
-    pub(super) fn holds(self, value: f64) -> bool {
+    pub(in crate::protocol::op) fn holds(self, value: f64) -> bool {
         match self {
             Self::Finite => true,
             Self::Positive => value > 0.0,
@@ -94,10 +94,10 @@ pub enum Reason {
         /// How many it has.
         got: usize,
     },
-    /// A positional array with more entries than the service has fields.
+    /// An array with more entries than it may have: a positional one has one for each field of the service.
     #[error("must have at most {limit} entries, got {got}")]
     TooMany {
-        /// Fields of the service.
+        /// Entries that it may have.
         limit: usize,
         /// Entries of the array.
         got: usize,

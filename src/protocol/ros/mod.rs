@@ -7,4 +7,6 @@ pub mod cdr;
 pub mod cdr_reader;
 pub mod parameters;
 pub mod rosapi;
+pub mod srdf;
+pub mod stamps;
 pub mod urdf;

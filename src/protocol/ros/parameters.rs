@@ -32,6 +32,32 @@ table! {
     }
 }
 
+/// Parameters that one call of a parameter service may name: each several times over.
+pub const MAX_NAMED: usize = 64;
+
+/// The type of a parameter, as `rcl_interfaces/msg/ParameterType` counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterType {
+    /// A number.
+    Double = 3,
+    /// A string.
+    Text = 4,
+    /// A number for each joint.
+    DoubleArray = 8,
+}
+
+impl ParameterType {
+    /// The type's name, as ROS 2 has it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Double => "double",
+            Self::Text => "string",
+            Self::DoubleArray => "double array",
+        }
+    }
+}
+
 /// A row: the parameter's name, and the field that is its value.
 pub(super) struct ParameterEntry {
     name: &'static str,
@@ -74,6 +100,35 @@ impl Parameter {
         let found = Self::ALL.into_iter().find(|one| one.name() == name)?;
         let described = found == Self::RobotDescription && node == Some(DESCRIBING_NODE);
         (described || node.is_none_or(|node| node == NODE.name())).then_some(found)
+    }
+
+    /// The type of its value.
+    #[must_use]
+    pub fn kind(self) -> ParameterType {
+        match self.unit_and_kind() {
+            (_, "float64") => ParameterType::Double,
+            (_, "float64[]") => ParameterType::DoubleArray,
+            _ => ParameterType::Text,
+        }
+    }
+
+    /// A description in a few words.
+    #[must_use]
+    pub fn description(self) -> String {
+        match (self.field(), self.unit_and_kind().0) {
+            (None, _) => "the arm as URDF, made from lengths and masses".to_owned(),
+            (Some((service, field)), "") => format!("{field} of {}", service.name()),
+            (Some((service, field)), unit) => format!("{field} of {}, in {unit}", service.name()),
+        }
+    }
+
+    /// Unit and type of the field that is its value, as the catalogue has them; empty for what is made from others.
+    fn unit_and_kind(self) -> (&'static str, &'static str) {
+        let field = self.field().and_then(|(service, name)| {
+            let mut fields = service.fields().iter();
+            fields.find(|field| field.name == name)
+        });
+        field.map_or(("", ""), |field| (field.unit, field.kind))
     }
 
     /// The service that answers for the parameter, and the field that is its value; none for what is made from others.

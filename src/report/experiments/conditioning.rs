@@ -24,7 +24,8 @@ pub enum PoseShape {
     Bent,
     /// Outer angles of some 1e-6 rad: nearly a straight line, where eliminating a joint-space matrix loses most.
     Stretched,
-    /// Outer angles of π but for some 1e-6 rad: the links lie on one another.
+    /// The second joint at π but for 1e-8 to 0.1 rad, the third anywhere: the first two links lie on one another, and
+    /// the third turns about a point next to the base.
     Folded,
 }
 
@@ -48,13 +49,11 @@ pub fn digits_lost(ratio: f64, pose: PoseShape, count: u32) -> Option<Lost> {
     let mut any = move || 2.0 * random.f64() - 1.0;
     let (mut recursion, mut dense, mut inherent) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..count {
-        let (about, within) = match pose {
-            PoseShape::Bent => (0.0, PI),
-            PoseShape::Stretched => (0.0, 1e-6),
-            PoseShape::Folded => (PI, 1e-6),
+        let (second, third) = match pose {
+            PoseShape::Bent => (PI * any(), PI * any()),
+            PoseShape::Stretched => (1e-6 * any(), 1e-6 * any()),
+            PoseShape::Folded => (PI - 10_f64.powf(-4.5 + 3.5 * any()), PI * any()),
         };
-        let mut outer = || about + within * any();
-        let (second, third) = (outer(), outer());
         let state = State {
             position: [PI * any(), second, third],
             velocity: [any(), any(), any()],

@@ -11,6 +11,10 @@
 //! | [`budget`] | truncation, rounding and control hold, apart |
 //! | [`step_scene`] | the arm whose steps are timed and counted |
 //! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
+//! | [`rounding`] | energy over very many steps, with the rounding of sums carried and without |
+//! | [`forcing`] | orders under forces that are hard on a method |
+//! | [`stiff`] | the cost of an error by stiffness, beside implicit baselines |
+//! | [`nonlinear`] | which moves and swings a timestep carries, and what becomes of deviations from a periodic swing |
 //!
 //! Everything steps through [`crate::math`], the live arm's own code, and is compared with [`crate::study`]'s
 //! predictions.
@@ -21,9 +25,13 @@ pub mod budget;
 pub mod chaos;
 pub mod conditioning;
 pub mod error;
+pub mod forcing;
 pub mod growth;
 pub mod measure;
+pub mod nonlinear;
 pub mod reference;
+pub mod rounding;
 mod sampled;
 pub mod scenarios;
 pub mod step_scene;
+pub mod stiff;

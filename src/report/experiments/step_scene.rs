@@ -8,6 +8,20 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
 
+/// The shipped gains without damping, and with hardly an integral, which would drive an undamped arm away.
+#[must_use]
+pub fn undamped<const N: usize>() -> Gains<N>
+where
+    Gains<N>: Default,
+{
+    let gains = Gains::default();
+    Gains {
+        kp: gains.kp,
+        ki: gains.ki.map(|ki| 1e-3 * ki),
+        kd: [0.0; N],
+    }
+}
+
 /// The arm before its first step, with the shipped gains or without their integral part, its controller on or off.
 #[must_use]
 pub fn ready<const N: usize>(

@@ -12,7 +12,7 @@ use crate::report::svg::{Axis, Curve, Key, Marker, Plot, Point, Unit, number, po
 const ALLOWED: f64 = 2.5;
 
 /// The panel of folded arms.
-const FOLDED: &str = "3 links, folded twice";
+const FOLDED: &str = "3 links, folded back once";
 
 type Column = (f64, Lost);
 
@@ -60,8 +60,9 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     Section {
         findings: vec![format!(
             "**With a last link 10⁹ times lighter or heavier than the others bent and stretched arms lose at most {} \
-             of 16 digits**; folded twice, up to {}, of which at most {} are the arm's own: the rest lies in the \
-             angles' last bits. Eliminating the mass matrix loses up to {}.",
+             of 16 digits**; with the second link folded back onto the first, up to {}, of \
+             which at most {} are the arm's own: the rest lies in the angles' last bits. Eliminating the mass matrix \
+             loses up to {}.",
             number(worst),
             number(lost_folded),
             number(own.max(0.0)),

@@ -6,6 +6,7 @@ use crate::report::csv::Csv;
 use crate::report::experiments::scenarios;
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Section, Table, Verdict};
+use crate::report::svg::plain;
 
 pub(super) fn make(making: &mut Making<'_>) -> Section {
     let all = scenarios::all();
@@ -20,8 +21,12 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     for (index, scene) in all.iter().enumerate() {
         // Slow ones take seconds each, which a quick look does not have.
         let verdict = (!scene.slow || !making.quick).then(|| scene.run());
+        let plainly = verdict.as_ref().map(|verdict| plain(&verdict.observed));
         let (observed, cell) = match &verdict {
-            Some(verdict) => (verdict.observed.as_str(), Cell::verdict(verdict.holds)),
+            Some(verdict) => (
+                plainly.as_deref().unwrap_or_default(),
+                Cell::verdict(verdict.holds),
+            ),
             None => (
                 "not run in a quick report",
                 Cell::new("not run").class("soft"),
@@ -46,8 +51,8 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         ]);
         table.rows.push(vec![
             Cell::new(scene.id),
-            Cell::new(scene.name).detail(scene.parameters),
-            Cell::new(scene.expected),
+            Cell::new(scene.name).detail(plain(scene.parameters)),
+            Cell::new(plain(scene.expected)),
             Cell::new(observed),
             cell,
         ]);

@@ -249,6 +249,34 @@ pub(crate) fn seconds(value: f64) -> String {
     format!("{}\u{a0}{unit}", number(value * factor))
 }
 
+/// A text in which numbers like `1.2e-9` are written as people write them: `1.2·10⁻⁹`.
+pub(crate) fn plain(text: &str) -> String {
+    let in_number =
+        |letter: char| letter.is_ascii_digit() || matches!(letter, '.' | 'e' | '-' | '+');
+    let mut out = String::new();
+    let mut rest = text;
+    while let Some(start) = rest.find(|letter: char| letter.is_ascii_digit()) {
+        let (before, number) = rest.split_at(start);
+        let end = number
+            .find(|letter| !in_number(letter))
+            .unwrap_or(number.len());
+        let (number, after) = number.split_at(end);
+        // The end of a sentence or of a range is no part of a number.
+        let trimmed = number.trim_end_matches(|letter: char| !letter.is_ascii_digit());
+        let value = trimmed
+            .split_once('e')
+            .and_then(|_| trimmed.parse::<f64>().ok());
+        out.push_str(before);
+        match value {
+            Some(value) => out.push_str(&scientific(value)),
+            None => out.push_str(trimmed),
+        }
+        out.push_str(number.get(trimmed.len()..).unwrap_or_default());
+        rest = after;
+    }
+    out + rest
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -269,6 +297,22 @@ mod tests {
         }
         assert_eq!(seconds(0.000_25), "250\u{a0}µs");
         assert_eq!(seconds(0.001), "1\u{a0}ms");
+    }
+
+    #[test]
+    fn powers_of_ten_in_a_text_are_written_as_people_write_them() {
+        let cases = [
+            ("off by 3.5600e-3 s, 2e9.", "off by 3.6·10⁻³ s, 2.0·10⁹."),
+            ("0.0000e0 rad", "0 rad"),
+            (
+                "euler 1.2e-9 (slope 1.0), step 2-3",
+                "euler 1.2·10⁻⁹ (slope 1.0), step 2-3",
+            ),
+            ("1 degree", "1 degree"),
+        ];
+        for (text, expected) in cases {
+            assert_eq!(plain(text), expected);
+        }
     }
 
     #[test]

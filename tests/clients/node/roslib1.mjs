@@ -35,6 +35,8 @@ async function overWebSocket() {
   packed.unsubscribe();
 
   check((await call(ros, "/pid_controller/enable", { data: true })).data, "enabled");
+  const refused = await call(ros, "/ik/solve", { x: 9, y: 9 }).then(() => "", String);
+  check(refused.includes("beyond"), `the words of a refusal: ${refused}`);
   const trajectory = new ROSLIB.Topic({ ros, name: "/joint_trajectory", messageType: "trajectory_msgs/JointTrajectory" });
   trajectory.publish(new ROSLIB.Message({ points: [{ positions: [0.2, 0.3] }] }));
   const results = new ROSLIB.Topic({ ros, name: "/ik_action/result", messageType: "pendularm_interfaces/IkResult" });
@@ -42,6 +44,16 @@ async function overWebSocket() {
   const { goal_id } = await call(ros, "/ik_action/send_goal", { x: 0.5, y: 1.2 });
   const end = await result;
   check(end.goal_id === goal_id && end.outcome === "reached", "reached");
+}
+
+/** What ros3d shows an arm by: as roslib has it by default, and by the service. */
+async function viewer(options) {
+  const ros = await connect({ url, ...options });
+  const tf = new ROSLIB.TFClient({ ros, fixedFrame: "/world", rate: 30 });
+  const hand = await within("the hand", (resolve) => tf.subscribe("hand", resolve));
+  check(Math.hypot(hand.translation.x, hand.translation.y) > 0.1, "where the hand is");
+  tf.dispose();
+  ros.close();
 }
 
 async function overTcp() {
@@ -56,5 +68,7 @@ async function overTcp() {
 
 run("roslib 1", async () => {
   await overWebSocket();
+  await viewer({});
+  await viewer({ groovyCompatibility: false });
   await overTcp();
 });

@@ -1,5 +1,5 @@
 // roslib 2.x, unmodified, over WebSocket.
-import { Action, Param, Ros, Service, Topic } from "roslib2";
+import { Action, Param, ROS2TFClient, Ros, Service, TFClient, Topic } from "roslib2";
 import { check, run, url, within } from "./common.mjs";
 
 run("roslib 2", async () => {
@@ -33,8 +33,33 @@ run("roslib 2", async () => {
 
   const enable = new Service({ ros, name: "/pid_controller/enable", serviceType: "pendularm_interfaces/srv/Enable" });
   check((await within("enabling", (ok, no) => enable.callService({ data: true }, ok, no))).data, "enabled");
+  const solve = new Service({ ros, name: "/ik/solve", serviceType: "pendularm_interfaces/srv/Solve" });
+  const refused = await within("a refusal", (ok, no) => solve.callService({ x: 9, y: 9 }, no, ok));
+  check(String(refused).includes("beyond"), `the words of a refusal: ${refused}`);
   const trajectory = new Topic({ ros, name: "/joint_trajectory", messageType: "trajectory_msgs/JointTrajectory" });
   trajectory.publish({ points: [{ positions: [0.2, 0.3] }] });
+
+  for (const Client of [TFClient, ROS2TFClient]) {
+    const tf = new Client({ ros, fixedFrame: "world", rate: 30 });
+    const hand = await within("the hand", (resolve) => tf.subscribe("hand", resolve));
+    check(Number.isFinite(hand.translation.x), `where the hand is, by ${Client.name}`);
+    tf.dispose();
+  }
+
+  const dance = new Action({ ros, name: "/dance", actionType: "demo/action/Dance" });
+  dance.advertise(
+    (goal, id) => {
+      dance.sendFeedback(id, { step: goal.steps });
+      dance.setSucceeded(id, { done: true });
+    },
+    () => {},
+  );
+  const dancer = new Action({ ros, name: "/dance", actionType: "demo/action/Dance" });
+  let steps = 0;
+  const danced = await within("a dance", (ok, no) =>
+    dancer.sendGoal({ steps: 3 }, ok, (feedback) => (steps = feedback.step), no),
+  );
+  check(danced.done === true && steps === 3, "an action of a client");
 
   const action = new Action({ ros, name: "/ik_action", actionType: "pendularm_interfaces/action/MoveTo" });
   let progress = 0;

@@ -43,6 +43,11 @@ gravity.set(9.5)
 params = roslibpy.Service(ros, "/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
 assert params.call(roslibpy.ServiceRequest({}))["gravity"] == 9.5
 gravity.set(9.81)
+try:
+    params.call(roslibpy.ServiceRequest({"gravity": -1}))
+    raise AssertionError("a negative gravity was taken")
+except roslibpy.core.ServiceException as why:
+    assert "gravity must be at least 0" in str(why), why
 
 state = Awaited("a state")
 states = roslibpy.Topic(ros, "/joint_states", "sensor_msgs/JointState")

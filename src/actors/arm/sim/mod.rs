@@ -10,6 +10,7 @@
 mod goals;
 mod limit;
 mod messages;
+mod motion;
 mod node;
 mod scene;
 mod services;
@@ -22,6 +23,7 @@ pub use self::messages::{
     ArmPose, ArmSettings, CommandGoal, Consult, EndGoal, GoalJudged, HeldLimit, Pose, Present,
     RefuseSteps, SimulationTime, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
+pub use self::motion::{ArmMotion, JointMotion, MoveSetpoint};
 pub use self::node::{ArmSim, BREATHER, PUBLISH_RATE, WAKE_UP_BUDGET, joint_names};
 pub use self::services::disturb::{Disturb, Push};
 pub use self::services::field_by_field::{Echo, FieldByField};

@@ -6,7 +6,7 @@ use super::node::ArmSim;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::Stamp;
 use crate::protocol::messages::scene::{StringMessage, fixed_frames, moving_frames};
-use crate::protocol::ros::urdf;
+use crate::protocol::ros::{srdf, urdf};
 
 impl<const N: usize> ArmSim<N> {
     /// `/tf`, if anybody wants it.
@@ -41,6 +41,12 @@ impl<const N: usize> ArmSim<N> {
                 let names = self.joint_names;
                 self.publish(topic, move || StringMessage {
                     data: urdf::describe(&names, arm.lengths(), arm.masses()),
+                });
+            }
+            Topic::RobotSemantics => {
+                let names = self.joint_names;
+                self.publish(topic, move || StringMessage {
+                    data: srdf::describe_semantics(&names),
                 });
             }
             _ => {}

@@ -74,12 +74,12 @@ fn computations_take_turns() {
 }
 
 /// Has a turn of five milliseconds, in which it computes or sleeps.
-struct Turn {
+struct TimedTurn {
     sleeps: bool,
     log: mpsc::Sender<bool>,
 }
 
-impl Computation for Turn {
+impl Computation for TimedTurn {
     fn advance(&mut self, _deadline: Instant) -> Progress {
         const TURN: Duration = Duration::from_millis(5);
         let before = work_clock::spent();
@@ -104,7 +104,7 @@ fn what_a_worker_was_kept_from_is_charged_to_nobody() {
     let pool = WorkerPool::without_threads();
     for (client, sleeps) in [(1, true), (2, false)] {
         let log = log.clone();
-        pool.submit(ConnectionId(client), Box::new(Turn { sleeps, log }));
+        pool.submit(ConnectionId(client), Box::new(TimedTurn { sleeps, log }));
     }
     for _ in 0..TURNS {
         assert!(pool.turn());

@@ -108,6 +108,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             respond: address.clone().recipient(),
             configure: address.clone().recipient(),
             finish: address.recipient(),
+            wants_text: Arc::clone(&self.shared.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
             backlog: Arc::clone(&self.shared.outgoing.backlog),
             account: Arc::clone(&self.shared.account),

@@ -7,7 +7,7 @@ use tokio::time::Instant;
 
 use super::reader::Reader;
 use crate::actors::gateway::limits::READ_HERE;
-use crate::actors::gateway::messages::{Request, Respond};
+use crate::actors::gateway::messages::{Request, Respond, form_of};
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::budget::Share;
@@ -67,7 +67,8 @@ impl Reader {
             Ok(op) => self.perform(id, op, share).await,
             Err(OpError::Call { service, problem }) => {
                 let why = problem.to_string();
-                self.say(messages::failure(&service, id.as_ref(), &why), None)
+                let form = form_of(&self.shared.wants_text);
+                self.say(messages::failure(&service, id.as_ref(), &why, form), None)
                     .await;
             }
             Err(OpError::Status(problem)) => {

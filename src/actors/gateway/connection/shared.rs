@@ -7,6 +7,7 @@ use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use actix::prelude::*;
 use bytes::Bytes;
@@ -29,6 +30,8 @@ pub(super) struct Shared {
     pub(super) account: Arc<Account>,
     pub(super) outgoing: Rc<Outgoing>,
     computations: RefCell<Computations>,
+    /// Set while the client is told why a call failed in `values` too.
+    pub(super) wants_text: Arc<AtomicBool>,
     /// Something was written or computed: the reader may go on.
     pub(super) room: Notify,
     /// Notified when the client loses its place to one that comes.
@@ -72,6 +75,7 @@ impl Shared {
             outgoing: Outgoing::new(gauges, Arc::clone(&account)),
             account,
             computations: RefCell::default(),
+            wants_text: Arc::default(),
             room: Notify::new(),
             displaced: Arc::default(),
             finishing: Cell::new(false),

@@ -33,6 +33,7 @@ use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::Request;
 use crate::actors::resources::budget::Share;
 use crate::protocol::limits::MAX_FRAME;
+use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::protocol::wire::frame::FrameReader;
 use crate::web::{message, serve};
@@ -81,7 +82,10 @@ impl Reception {
         let quiet = Request {
             from: id,
             id: None,
-            op: Op::SetLevel(Verbosity::NONE),
+            op: Op::SetLevel {
+                verbosity: Verbosity::NONE,
+                errors: Some(ErrorForm::Text),
+            },
         };
         let _ = self.shared.registry.send(quiet).await;
         let unfinished = Unfinished::new(&self.shared.account);

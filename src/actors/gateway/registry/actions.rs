@@ -1,4 +1,4 @@
-//! Actions: a goal goes to the node that pursues it; the client hears of it under its own id.
+//! Actions: a goal goes to the node or the client that pursues it; who sent it hears of it under its own id.
 //!
 //! **Invariant:** a goal that is refused here is answered by one `action_result`.
 
@@ -8,7 +8,7 @@ use actix::prelude::*;
 use tokio::sync::oneshot;
 
 use super::refusal::Refusal;
-use super::state::Registry;
+use super::state::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Frames, Handled};
 use crate::actors::node::Feedback;
@@ -29,6 +29,13 @@ impl Registry {
         goal: ActionGoal,
         ctx: &mut Context<Self>,
     ) -> Handled {
+        let mut refusal = None;
+        if Action::from_name(&goal.action).is_none() {
+            match self.forward_goal(from, id.clone(), &goal) {
+                Ok(()) => return Handled::at_once(),
+                Err(why) => refusal = Some(why),
+            }
+        }
         let Some(client) = self.clients.get(&from) else {
             return Handled::at_once();
         };
@@ -44,9 +51,10 @@ impl Registry {
             action: Arc::from(goal.action.as_str()),
             id,
             wants_feedback: goal.feedback,
+            gone: Arc::clone(&client.outlets.gone),
             share,
         };
-        let node = match self.pursuer(&goal) {
+        let node = match refusal.map_or_else(|| self.pursuer(&goal), Err) {
             Ok(node) => node,
             Err(why) => {
                 follower.refuse(&why.to_string());
@@ -72,8 +80,10 @@ impl Registry {
     ) -> Handled {
         let node = Action::from_name(action).and_then(|action| self.nodes.actions.get(&action));
         let Some(node) = node else {
-            let why = Refusal::NoAction(action.to_owned()).to_string();
-            self.send_status(from, Level::Error, &why, id.as_ref());
+            let origin = FrameOrigin { from, id };
+            if let Err(why) = self.forward_cancellation(&origin, action) {
+                self.send_status(from, Level::Error, &why.to_string(), origin.id.as_ref());
+            }
             return Handled::at_once();
         };
         let (done, ended) = oneshot::channel();

@@ -56,7 +56,9 @@ impl Registry {
                     node(ServiceCall {
                         service,
                         arguments: call.args,
-                        caller: caller.within(Arc::clone(&client.outlets.account)),
+                        caller: caller
+                            .within(Arc::clone(&client.outlets.account))
+                            .with_errors(client.outlets.error_form()),
                     });
                     return Handled::by_node(ended);
                 }

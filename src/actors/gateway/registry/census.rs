@@ -19,6 +19,7 @@ pub(super) enum Use {
 pub(super) struct Tally {
     topics: BTreeMap<Arc<str>, Users>,
     services: BTreeMap<Arc<str>, Option<Arc<str>>>,
+    actions: BTreeMap<Arc<str>, Option<Arc<str>>>,
 }
 
 /// Who uses a topic.
@@ -82,10 +83,24 @@ impl Tally {
         self.services.remove(service);
     }
 
+    /// A client pursues an action.
+    pub(super) fn pursue(&mut self, action: &str, type_name: Option<&str>) {
+        self.actions
+            .insert(action.into(), type_name.map(Into::into));
+    }
+
+    /// Nobody pursues it any more.
+    pub(super) fn drop_action(&mut self, action: &str) {
+        self.actions.remove(action);
+    }
+
     /// All that there is, up to the limit of what is listed.
     pub(super) fn take(&self) -> Census {
         let topics = self.topics.iter().take(MAX_LISTED);
-        let services = self.services.iter().take(MAX_LISTED);
+        let listed = |(name, type_name): (&Arc<str>, &Option<Arc<str>>)| ListedService {
+            name: Arc::clone(name),
+            type_name: type_name.clone(),
+        };
         Census {
             topics: topics
                 .map(|(name, users)| ListedTopic {
@@ -95,12 +110,8 @@ impl Tally {
                     subscribed: users.subscribers > 0,
                 })
                 .collect(),
-            services: services
-                .map(|(name, type_name)| ListedService {
-                    name: Arc::clone(name),
-                    type_name: type_name.clone(),
-                })
-                .collect(),
+            services: self.services.iter().take(MAX_LISTED).map(listed).collect(),
+            actions: self.actions.iter().take(MAX_LISTED).map(listed).collect(),
         }
     }
 }

@@ -124,7 +124,8 @@ impl Registry {
 /// Whether frames are sent as they are to whoever has asked for `encoding`.
 fn is_sent_plain(encoding: Encoding, plain: &Bytes) -> bool {
     let size = encoding.fragment_size;
-    encoding.compression == Compression::None && size.is_none_or(|size| plain.len() <= size)
+    let is_short = size.is_none_or(|size| plain.len() <= size);
+    encoding.compression == Compression::None && is_short && !encoding.ros1_stamps
 }
 
 fn deliver(subscriber: &Subscriber, topic: &Arc<str>, frames: Frames, underway: Option<Underway>) {

@@ -10,6 +10,8 @@ mod ear;
 mod fan_out;
 mod nodes;
 mod ops;
+mod pursuers;
+mod pursuit;
 mod refusal;
 mod services;
 mod state;

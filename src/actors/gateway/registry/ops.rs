@@ -21,7 +21,8 @@ use crate::protocol::catalog::{Direction, Service, Topic, types};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{Compression, Op, Subscribe};
+use crate::protocol::op::{Compression, Encoding, Op, Subscribe};
+use crate::protocol::ros::stamps::is_ros1_name;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
 
@@ -60,9 +61,11 @@ impl Registry {
                 self.advertise_service(&origin, &service, type_name.as_deref())
             }
             Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
-            Op::SetLevel(verbosity) => {
+            Op::Pursue { action, pursuit } => self.pursue(&origin, &action, pursuit),
+            Op::SetLevel { verbosity, errors } => {
                 if let Some(client) = self.clients.get_mut(&origin.from) {
                     client.verbosity = verbosity;
+                    client.set_error_form(errors);
                 }
                 Ok(())
             }
@@ -198,29 +201,10 @@ impl Registry {
     }
 
     fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {
-        let Some(client) = self.clients.get_mut(&origin.from) else {
-            return Ok(());
-        };
-        let held: usize = client.subscriptions.values().map(Vec::len).sum();
-        let topic = subscribe.topic.as_str();
         let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
-        if id.as_ref().is_some_and(|id| id.len() > MAX_NAME) {
-            return Err(Refusal::LongSubscriptionId(MAX_NAME));
-        }
-        let known = client
-            .subscriptions
-            .get(topic)
-            .is_some_and(|all| all.iter().any(|one| one.id == id));
-        if !known && held >= MAX_SUBSCRIPTIONS {
-            return Err(Refusal::TooManySubscriptions);
-        }
+        self.may_subscribe(origin.from, id.as_deref(), subscribe)?;
+        let topic = subscribe.topic.as_str();
         let absolute = names::absolute(topic);
-        if subscribe.encoding.compression == Compression::CborRaw {
-            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
-            if type_name.and_then(types::find).is_none() {
-                return Err(Refusal::UnknownType);
-            }
-        }
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
         let size = match subscribe.encoding.fragment_size {
@@ -248,7 +232,7 @@ impl Registry {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
-            encoding: subscribe.encoding,
+            encoding: encoding_for(subscribe),
             _size: size,
             _share: share,
         });
@@ -266,6 +250,33 @@ impl Registry {
             self.tell_owner(topic, true);
         } else if new {
             self.deliver_latched(&shared, origin.from);
+        }
+        Ok(())
+    }
+
+    fn may_subscribe(
+        &self,
+        from: ConnectionId,
+        id: Option<&str>,
+        subscribe: &Subscribe,
+    ) -> Result<(), Refusal> {
+        if id.is_some_and(|id| id.len() > MAX_NAME) {
+            return Err(Refusal::LongSubscriptionId(MAX_NAME));
+        }
+        let topic = subscribe.topic.as_str();
+        if let Some(client) = self.clients.get(&from) {
+            let of_topic = client.subscriptions.get(topic).into_iter().flatten();
+            let is_new = !of_topic.into_iter().any(|one| one.id.as_deref() == id);
+            let held = || client.subscriptions.values().map(Vec::len).sum::<usize>();
+            if is_new && held() >= MAX_SUBSCRIPTIONS {
+                return Err(Refusal::TooManySubscriptions);
+            }
+        }
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
+            if type_name.and_then(types::find).is_none() {
+                return Err(Refusal::UnknownType);
+            }
         }
         Ok(())
     }
@@ -309,7 +320,8 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        if client.provided.len() >= MAX_PROVIDED && !client.provided.contains_key(service) {
+        let provided = client.provided.len() + client.pursued.len();
+        if provided >= MAX_PROVIDED && !client.provided.contains_key(service) {
             return Err(Refusal::TooManyProvided);
         }
         let Some(client) = self.clients.get_mut(&origin.from) else {
@@ -354,6 +366,18 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
     match Topic::from_name(topic) {
         Some(own) if !is_listened_to(own) => Err(Refusal::RuntimeTopic(topic.to_owned())),
         _ => Ok(()),
+    }
+}
+
+/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that
+/// is asked for by its type of ROS 1. CDR has no names.
+fn encoding_for(subscribe: &Subscribe) -> Encoding {
+    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
+    let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
+    let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
+    Encoding {
+        ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
+        ..subscribe.encoding
     }
 }
 

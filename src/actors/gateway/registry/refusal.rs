@@ -4,7 +4,7 @@
 
 use crate::actors::gateway::limits::{
     MAX_ADVERTISED, MAX_BACKLOG, MAX_FRAGMENT_SIZES, MAX_PROVIDED, MAX_SUBSCRIPTIONS,
-    MAX_WAITING_CALLS,
+    MAX_WAITING_CALLS, MAX_WAITING_GOALS,
 };
 
 /// An op or a call that changed nothing.
@@ -29,7 +29,7 @@ pub(super) enum Refusal {
     LongSubscriptionId(usize),
     #[error("service: {0} is provided by the runtime itself")]
     RuntimeService(String),
-    #[error("service: a connection provides at most {MAX_PROVIDED} services")]
+    #[error("service: a connection provides at most {MAX_PROVIDED} services and actions")]
     TooManyProvided,
     #[error("service: this connection does not provide {0}")]
     NotProvider(String),
@@ -51,6 +51,16 @@ pub(super) enum Refusal {
     CallerBusy(String),
     #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
     TooManyWaiting,
+    #[error("action: {0} is pursued by the runtime itself")]
+    RuntimeAction(String),
+    #[error("action: this connection does not pursue {0}")]
+    NotPursuer(String),
+    #[error("id: no goal of {0} with this id is pursued by this connection")]
+    StaleGoal(String),
+    #[error("id: no goal of {0} with this id was sent by this connection")]
+    NoGoal(String),
+    #[error("at most {MAX_WAITING_GOALS} goals of a connection are pursued by other clients")]
+    TooManyGoals,
     #[error("action: no action is called {0}")]
     NoAction(String),
     #[error("action_type must be {0}")]

@@ -89,6 +89,15 @@ impl Services {
         format!("{CALL_ID_PREFIX}{number}")
     }
 
+    /// The number of the call that has this id.
+    pub(super) fn number_of(id: &Payload) -> Option<u64> {
+        let id = Some(id).filter(|id| id.get().len() <= LONGEST_CALL_ID)?;
+        let id: String = serde_json::from_str(id.get()).ok()?;
+        let number: u64 = id.strip_prefix(CALL_ID_PREFIX)?.parse().ok()?;
+        // One id a call: `+1` and `01` are numbers too.
+        (id == Self::call_id(number)).then_some(number)
+    }
+
     pub(super) fn remember(&mut self, number: u64, call: Forwarded) {
         *self.waiting.entry(call.caller).or_default() += 1;
         self.outstanding.insert(number, call);
@@ -106,14 +115,8 @@ impl Services {
         service: &str,
         provider: ConnectionId,
     ) -> Option<Forwarded> {
-        let id = id.filter(|id| id.get().len() <= LONGEST_CALL_ID)?;
-        let id: String = serde_json::from_str(id.get()).ok()?;
-        let number: u64 = id.strip_prefix(CALL_ID_PREFIX)?.parse().ok()?;
+        let number = Self::number_of(id?)?;
         let call = self.outstanding.get(&number)?;
-        // One id a call: `+1` and `01` are numbers too.
-        if id != Self::call_id(number) {
-            return None;
-        }
         if Instant::now() > call.deadline {
             return None;
         }

@@ -12,6 +12,7 @@ use tokio::sync::oneshot;
 use super::census::{Tally, Use};
 use super::ear::Ear;
 use super::nodes::Nodes;
+use super::pursuers::Pursuers;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
 use super::topics::{Subscription, Topics};
@@ -22,7 +23,7 @@ use crate::actors::node::Interest;
 use crate::actors::resources::budget::Share;
 use crate::actors::resources::gauges::Gauges;
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::{self as frames, Level};
+use crate::protocol::messages::{self as frames, ErrorForm, Level};
 use crate::protocol::names;
 use crate::protocol::op::Verbosity;
 use crate::protocol::wire::payload::Payload;
@@ -32,6 +33,7 @@ pub struct Registry {
     pub(super) clients: HashMap<ConnectionId, Client>,
     pub(super) topics: Topics,
     pub(super) services: Services,
+    pub(super) pursuers: Pursuers,
     pub(super) nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     pub(super) latched: HashMap<Topic, Bytes>,
@@ -62,6 +64,8 @@ pub(super) struct Client {
     /// In order of their names: the topics' owners hear of its going in that order.
     pub(super) subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
     pub(super) provided: HashMap<Box<str>, Share>,
+    /// Actions.
+    pub(super) pursued: HashMap<Box<str>, Share>,
     /// Which statuses it wants.
     pub(super) verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
@@ -76,6 +80,7 @@ impl Registry {
             clients: HashMap::new(),
             topics: Topics::default(),
             services: Services::default(),
+            pursuers: Pursuers::default(),
             nodes: Nodes::default(),
             latched: HashMap::new(),
             fragmented: Arc::default(),
@@ -107,6 +112,7 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: BTreeMap::new(),
             provided: HashMap::new(),
+            pursued: HashMap::new(),
             verbosity: Verbosity::ALL,
             answered: None,
         }
@@ -125,6 +131,14 @@ impl Client {
     /// The same with one that has been counted already.
     pub(super) fn pass(&self, frame: Bytes, service: Option<Service>) {
         self.outlets.respond.do_send(Response { frame, service });
+    }
+
+    /// From now on the client is told in this form why a call failed, if one is given.
+    pub(super) fn set_error_form(&self, form: Option<ErrorForm>) {
+        if let Some(form) = form {
+            let wants_text = form == ErrorForm::Text;
+            self.outlets.wants_text.store(wants_text, Ordering::Relaxed);
+        }
     }
 
     /// Takes what a registration costs whose names have so many bytes.
@@ -147,6 +161,7 @@ impl Registry {
         let advertised = std::mem::take(&mut client.advertised);
         let subscriptions = std::mem::take(&mut client.subscriptions);
         let provided = std::mem::take(&mut client.provided);
+        let pursued = std::mem::take(&mut client.pursued);
         for topic in advertised.keys() {
             self.tally.remove(topic, Use::Advertised);
         }
@@ -155,6 +170,13 @@ impl Registry {
         }
         for service in provided.keys() {
             self.withdraw_service(service, id);
+        }
+        for action in pursued.keys() {
+            self.withdraw_action(action, id);
+        }
+        for goal in self.pursuers.take_pursued_by(id) {
+            let why = Refusal::ProviderGone(goal.action.to_string());
+            self.abort(&goal, &why);
         }
         for call in self.services.take_provided_by(id) {
             let why = Refusal::ProviderGone(call.service.to_string());
@@ -166,6 +188,7 @@ impl Registry {
     pub(super) fn forget(&mut self, id: ConnectionId) {
         self.withdraw(id);
         self.services.forget_caller(id);
+        self.pursuers.forget_sender(id);
         self.ended.remove(&id);
         if let Some(client) = self.clients.remove(&id) {
             client.outlets.gone.store(true, Ordering::Relaxed);
@@ -269,7 +292,8 @@ impl Registry {
         why: &Refusal,
     ) {
         if let Some(client) = self.clients.get(&to) {
-            let frame = frames::failure(service, id, &why.to_string());
+            let form = client.outlets.error_form();
+            let frame = frames::failure(service, id, &why.to_string(), form);
             client.respond(frame, Service::from_name(service));
         }
     }

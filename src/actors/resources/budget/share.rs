@@ -112,7 +112,7 @@ impl Share {
     /// The share goes with the frame: it is given back when the last copy of that is gone.
     #[must_use]
     pub fn cover(self, frame: Bytes) -> Bytes {
-        Bytes::from_owner(Counted {
+        Bytes::from_owner(CountedFrame {
             frame,
             share: Some(self),
         })
@@ -177,18 +177,18 @@ impl Drop for Freed {
 }
 
 /// A frame and what was taken for it.
-struct Counted {
+struct CountedFrame {
     frame: Bytes,
     share: Option<Share>,
 }
 
-impl AsRef<[u8]> for Counted {
+impl AsRef<[u8]> for CountedFrame {
     fn as_ref(&self) -> &[u8] {
         &self.frame
     }
 }
 
-impl Drop for Counted {
+impl Drop for CountedFrame {
     fn drop(&mut self) {
         if self.frame.len() > LARGE {
             let counted = (std::mem::take(&mut self.frame), self.share.take());

@@ -10,6 +10,7 @@ mod services;
 
 use actix::prelude::*;
 
+pub(super) use self::services::read_change;
 pub use self::services::{
     DeleteParam, GetParam, GetParamNames, GetTime, HasParam, Listing, Look, NotDeleted, NotSet,
     ParamChange, ParameterValue, SetParam, Unknown,
@@ -160,14 +161,7 @@ impl<const N: usize> Handler<Call<SetParam<N>>> for Rosapi<N> {
         };
         let rejected = change_parameter(change, self.arm.clone()).into_actor(self);
         ctx.spawn(rejected.map(|rejected, _, _| {
-            let outcome = rejected.map(|rejected| {
-                if rejected.is_empty() {
-                    Ok(())
-                } else {
-                    Err(NotSet::Rejected(rejected))
-                }
-            });
-            give(reply, outcome);
+            give(reply, rejected.map(NotSet::unless_empty));
         }));
     }
 }
@@ -207,7 +201,7 @@ fn no_arm() -> Unserved {
 }
 
 /// Passes on what has come of a question to the arm.
-fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
+pub(super) fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
     match answer {
         Ok(answer) => reply.answer(answer),
         Err(_) => reply.refuse(no_arm()),
@@ -215,7 +209,7 @@ fn give<T>(mut reply: Reply<T>, answer: Result<T, Unserved>) {
 }
 
 /// The present value of a parameter.
-async fn value<const N: usize>(
+pub(super) async fn value<const N: usize>(
     parameter: Parameter,
     arm: ArmParameters<N>,
 ) -> Result<ParameterValue<N>, Unserved> {
@@ -256,7 +250,7 @@ async fn value<const N: usize>(
 }
 
 /// Has the arm change a parameter; gives what was not taken.
-async fn change_parameter<const N: usize>(
+pub(super) async fn change_parameter<const N: usize>(
     change: ParamChange<N>,
     arm: ArmParameters<N>,
 ) -> Result<Rejections, Unserved> {

@@ -116,12 +116,35 @@ pub enum NotSet {
     /// It has no value of its own.
     #[error("name: robot_description is made from lengths and masses")]
     Derived,
+    /// Its value is of another type.
+    #[error("{name} must be a {expected} (type {number}), got type {found}")]
+    WrongType {
+        /// The parameter's name.
+        name: &'static str,
+        /// The name of its type.
+        expected: &'static str,
+        /// The number of its type.
+        number: u8,
+        /// The number of the type that came.
+        found: u8,
+    },
     /// The value can't be read.
     #[error("value must be JSON text")]
     NotJson,
     /// The arm does not take it.
     #[error("{0}")]
     Rejected(Rejections),
+}
+
+impl NotSet {
+    /// Rejections are why a parameter was not set.
+    pub(in crate::actors::ros) fn unless_empty(rejected: Rejections) -> Result<(), Self> {
+        if rejected.is_empty() {
+            Ok(())
+        } else {
+            Err(Self::Rejected(rejected))
+        }
+    }
 }
 
 /// Whether there is a parameter of that name.
@@ -279,19 +302,27 @@ impl<const N: usize> Callable for SetParam<N> {
         let (name, text) = read_texts(service, arguments)?;
         let change = match Parameter::from_name(&name) {
             None => Err(NotSet::Unknown),
-            Some(parameter) => read_change(parameter, &text),
+            Some(parameter) => read_json(parameter, &text),
         };
         Ok(Self { change })
     }
 }
 
-/// A value in JSON text, as the arm's own service would read it.
-fn read_change<const N: usize>(parameter: Parameter, text: &str) -> Result<ParamChange<N>, NotSet> {
-    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+/// A value in JSON text.
+fn read_json<const N: usize>(parameter: Parameter, text: &str) -> Result<ParamChange<N>, NotSet> {
     // As lenient about numbers as every frame: they are refused by the parameter's name.
     let text = json::accept_literals(text.to_owned());
     let value = RawValue::from_string(text).map_err(|_| NotSet::NotJson)?;
-    let fields = Fields::single(service, field, &value);
+    read_change(parameter, &value)
+}
+
+/// A value, as the arm's own service would read it.
+pub(in crate::actors::ros) fn read_change<const N: usize>(
+    parameter: Parameter,
+    value: &RawValue,
+) -> Result<ParamChange<N>, NotSet> {
+    let (service, field) = parameter.field().ok_or(NotSet::Derived)?;
+    let fields = Fields::single(service, field, value);
     Ok(match service {
         Service::SetParams => ParamChange::Params(SetParams::request(fields)),
         Service::SetGains => ParamChange::Gains(SetGains::request(fields)),

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** a member is looked at only for the operations that have it; of every other its syntax alone counts.
 
+mod actions;
 mod ours;
 
 use std::borrow::Cow;
@@ -10,12 +11,12 @@ use std::time::Duration;
 use serde_json::value::RawValue;
 
 use super::{
-    ActionGoal, CallService, Compression, Encoding, Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE,
-    MAX_TIMEOUT, Op, OpError, Problem, Subscribe, Verbosity,
+    CallService, Compression, Encoding, Incoming, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op,
+    OpError, Problem, Subscribe, Verbosity,
 };
-use crate::protocol::catalog::{Action, Service};
+use crate::protocol::catalog::Service;
 use crate::protocol::limits::MAX_NAME;
-use crate::protocol::messages::Level;
+use crate::protocol::messages::{ErrorForm, Level};
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::{json, text};
@@ -24,7 +25,7 @@ use crate::protocol::wire::{json, text};
 const MAX_COMPLAINT: usize = 160;
 
 /// The members of a frame that mean something to us.
-const KEYS: [&str; 23] = [
+const KEYS: [&str; 24] = [
     "op",
     "id",
     "topic",
@@ -39,6 +40,7 @@ const KEYS: [&str; 23] = [
     "result",
     "status",
     "level",
+    "errors",
     "token",
     "compression",
     "fragment_size",
@@ -51,7 +53,7 @@ const KEYS: [&str; 23] = [
 ];
 
 /// The operations that we know.
-const OPS: [&str; 14] = [
+const OPS: [&str; 18] = [
     "advertise",
     "unadvertise",
     "publish",
@@ -66,6 +68,10 @@ const OPS: [&str; 14] = [
     "fragment",
     "send_action_goal",
     "cancel_action_goal",
+    "advertise_action",
+    "unadvertise_action",
+    "action_feedback",
+    "action_result",
 ];
 
 /// Reads a frame. Members that we do not know are ignored; of a repeated one the last counts.
@@ -156,28 +162,15 @@ impl<'a> OpReader<'a> {
                 action: self.name("action")?,
             },
             "fragment" => Op::Fragment(self.piece()?),
-            "set_level" => Op::SetLevel(self.verbosity()?),
+            "set_level" => Op::SetLevel {
+                verbosity: self.verbosity()?,
+                errors: self.error_form()?,
+            },
             "auth" => Op::Auth {
                 token: self.secret()?,
             },
-            _ => self.response()?,
-        })
-    }
-
-    fn goal(&self) -> Result<ActionGoal, Problem> {
-        if let Some(id) = self.get("id") {
-            self.short("id", id.get())?;
-        }
-        let action = self.name("action")?;
-        let fields = Action::from_name(&action).map(Action::goal_fields);
-        Ok(ActionGoal {
-            type_name: self.optional_text("action_type")?,
-            args: self.args(fields)?,
-            feedback: match self.get("feedback") {
-                Some(_) => self.boolean("feedback")?,
-                None => false,
-            },
-            action,
+            "service_response" => self.response()?,
+            _ => self.pursuit()?,
         })
     }
 
@@ -194,6 +187,7 @@ impl<'a> OpReader<'a> {
             encoding: Encoding::default().merged(Encoding {
                 compression: self.compression()?,
                 fragment_size: self.fragment_size()?,
+                ros1_stamps: false,
             }),
         })
     }
@@ -252,6 +246,20 @@ impl<'a> OpReader<'a> {
                 Err(self.mistyped("level", "info, warning, error or none", raw))
             }
             level => Ok(Verbosity(level)),
+        }
+    }
+
+    fn error_form(&self) -> Result<Option<ErrorForm>, Problem> {
+        let Some(raw) = self.get("errors") else {
+            return Ok(None);
+        };
+        let name = json::text(raw);
+        let form = ErrorForm::ALL
+            .into_iter()
+            .find(|form| name.as_deref() == Some(form.name()));
+        match form {
+            Some(form) => Ok(Some(form)),
+            None => Err(self.mistyped("errors", "object or text", raw)),
         }
     }
 

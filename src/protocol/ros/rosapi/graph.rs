@@ -9,26 +9,28 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use crate::protocol::catalog::rosapi::{PREFIX, PRIVATE_PREFIX};
-use crate::protocol::catalog::{Direction, Node, Rosapi, Service, Topic};
+use crate::protocol::catalog::{Action, Direction, Node, Rosapi, Service, Topic};
 use crate::protocol::names;
 
 /// Topics, and services, of clients in one answer: more than any screen shows. The first by name are listed.
 pub const MAX_LISTED: usize = 4096;
 
-/// The topics and services that clients have registered; at most [`MAX_LISTED`] of each.
+/// The topics, services and actions that clients have registered; at most [`MAX_LISTED`] of each.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Census {
     /// Topics that clients advertise or subscribe to, the runtime's own included, by absolute name.
     pub topics: Vec<ListedTopic>,
     /// Services that clients provide, by absolute name.
     pub services: Vec<ListedService>,
+    /// Actions that clients pursue, by absolute name.
+    pub actions: Vec<ListedService>,
 }
 
 impl Census {
-    /// How many topics and services are listed.
+    /// How many topics, services and actions are listed.
     #[must_use]
     pub fn entries(&self) -> usize {
-        self.topics.len() + self.services.len()
+        self.topics.len() + self.services.len() + self.actions.len()
     }
 }
 
@@ -45,7 +47,7 @@ pub struct ListedTopic {
     pub subscribed: bool,
 }
 
-/// A service that a client provides.
+/// A service that a client provides, or an action that it pursues.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListedService {
     /// Its name.
@@ -169,6 +171,26 @@ impl Graph<'_> {
         let foreign = self.foreign_services_of(type_name).take(1);
         own.chain(foreign.map(|_| node_name(Node::Gateway)))
             .collect()
+    }
+
+    pub(super) fn actions(&self) -> Vec<String> {
+        let own = Action::ALL
+            .into_iter()
+            .map(|action| action.name().to_owned());
+        let foreign = self.census.actions.iter().map(|one| one.name.to_string());
+        own.chain(foreign).collect()
+    }
+
+    /// An action's type; empty where there is no such action, or nobody has said its type.
+    pub(super) fn action_type(&self, name: &str) -> String {
+        if let Some(action) = Action::from_name(name) {
+            return action.type_name().to_owned();
+        }
+        let name = names::absolute(name);
+        let mut foreign = self.census.actions.iter();
+        let found = foreign.find(|action| *action.name == *name);
+        let type_name = found.and_then(|action| action.type_name.as_deref());
+        type_name.unwrap_or_default().to_owned()
     }
 
     /// All lists are empty where there is no such node.

@@ -17,13 +17,13 @@ pub use self::graph::{Census, ListedService, ListedTopic, MAX_LISTED};
 use self::graph::{Graph, node_name};
 pub use self::typedef::TypeDef;
 use self::typedef::{details, interfaces};
-use crate::protocol::catalog::{Action, Node, Rosapi, Service, types};
+use crate::protocol::catalog::{Node, Rosapi, Service, types};
 
 /// The ROS that all this looks like.
 const ROS_VERSION: u8 = 2;
-/// The distribution that the answer names: there is no ROS behind this, and no client should look for its
-/// peculiarities.
-const DISTRO: &str = "pendularm";
+/// The distribution that the answer names: clients refuse one that they have not heard of, and the types and their
+/// definitions here are those of this one.
+const DISTRO: &str = "jazzy";
 
 /// Why a question has no answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -85,10 +85,8 @@ pub fn answer(question: Rosapi, asked: &str, census: &Census) -> Result<Value, A
         | Rosapi::ActionFeedbackDetails => {
             json!({"typedefs": details(question, asked).ok_or_else(unknown)?})
         }
-        Rosapi::ActionServers => json!({"action_servers": Action::ALL.map(Action::name)}),
-        Rosapi::ActionType => {
-            json!({"type": Action::from_name(asked).map_or("", Action::type_name)})
-        }
+        Rosapi::ActionServers => json!({"action_servers": graph.actions()}),
+        Rosapi::ActionType => json!({"type": graph.action_type(asked)}),
         Rosapi::Interfaces => json!({"interfaces": interfaces()}),
         Rosapi::GetRosVersion => json!({"version": ROS_VERSION, "distro": DISTRO}),
         Rosapi::GetParam

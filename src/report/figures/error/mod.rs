@@ -26,7 +26,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let mut section = Section {
         findings: findings(&data),
         verdicts: verdicts(&data),
-        glance: vec![cheapest(&data)],
+        glance: vec![Block::Table(cheapest(&data))],
         ..Section::default()
     };
     section
@@ -44,9 +44,9 @@ fn compute(making: &mut Making<'_>) -> Vec<Data> {
     let halvings = making.choose(15, 9);
     let effort = making.choose(
         Effort {
-            least: 5,
+            least: 3,
             most: 25,
-            seconds: 0.2,
+            seconds: 0.05,
         },
         Effort {
             least: 3,

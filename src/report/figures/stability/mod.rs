@@ -6,13 +6,15 @@ mod line;
 mod map;
 mod period;
 mod radius;
+mod regions;
 mod tables;
 mod words;
 
-use line::{LimitRow, Meter};
+use line::{LimitRow, Meter, stiffened};
 use map::map;
 use period::{growth, period_table, periods};
 use radius::radius_figure;
+use regions::regions_figure;
 use tables::{edges, table};
 use words::{findings, verdicts};
 
@@ -56,12 +58,14 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     let periods = periods(making, &mut meter);
     let (radius, csv) = radius_figure(&lines);
     making.keep("spectral-radius", csv);
+    let (regions, csv) = regions_figure(&stiffened(1.0));
+    making.keep("regions", csv);
     let growth = growth(making, &mut meter);
     making.keep("control-period", growth.csv.clone());
     Section {
         findings: findings(&lines),
         verdicts: verdicts(&lines, &map, &periods, &growth),
-        glance: vec![edges(&lines)],
+        glance: vec![Block::Table(edges(&lines)), Block::Figure(regions)],
         blocks: vec![
             Block::Figure(radius),
             Block::Figure(growth.figure()),

@@ -1,13 +1,15 @@
 //! Many arms side by side, each a lane: the same simulation that steps one arm, as often as there are lanes.
 //!
-//! **Invariant:** no lane knows of another, so that a lane has the bits of a single arm, however many threads share the work.
+//! **Invariant:** no lane knows of another, so that a lane has the bits of a single arm, however many threads share
+//! the work.
 
 use rayon::prelude::*;
 
-use pendularm::math::arm::State;
+use pendularm::math::arm::{Arm, State};
 use pendularm::math::count::in_f64;
 use pendularm::math::dynamics::energy;
 use pendularm::math::kinematics::forward;
+use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
 
 use crate::fields::Rows;
@@ -185,4 +187,12 @@ pub(crate) fn end_effectors<const N: usize>(lanes: &[Simulation<N>]) -> Vec<f64>
         .iter()
         .map(|one| forward(one.arm().lengths(), &one.state().position));
     tips.flat_map(|tip| tip.position.to_array()).collect()
+}
+
+/// Arms in the starting pose, as a fresh runtime has one.
+pub(crate) fn fresh<const N: usize>(arms: usize) -> Vec<Simulation<N>>
+where
+    Gains<N>: Default,
+{
+    vec![Simulation::new(Arm::default(), Gains::default()); arms]
 }

@@ -1,28 +1,31 @@
 //! Many arms at once, with NumPy arrays in and out.
 //!
-//! The arrays that show the arms are made once and written in place; users hold views of them that they cannot write. What is
-//! handed in is read where it lies, if it is doubles side by side.
+//! The arrays that show the arms are made once and written in place; users hold views of them that they cannot write.
+//! What is handed in is read where it lies, if it is doubles side by side.
 //!
 //! **Invariant:** every row of every array shows its lane as it is, whenever no call is under way.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+mod given;
+mod lanes;
+mod pool;
+mod windows;
+
+use std::sync::Mutex;
 use std::thread::available_parallelism;
 
-use numpy::{Element, IntoPyArray, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pendularm::math::arm::{Arm, State};
-use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
-use pyo3::prelude::{
-    Py, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult, Python, pyclass, pymethods,
-};
-use pyo3::sync::MutexExt;
-use pyo3::types::PyDict;
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
-use crate::fields::{self, Bound, Held, Numbers, Object, Rows, refused};
-use crate::lanes::{self, Piece, Shown, Steps};
+use crate::fields::{self, Bound, Held, Numbers, Object, refused};
+use crate::patience::hold;
+use given::{chosen, read, read_methods, read_steps};
+use lanes::{Piece, Steps};
+use pool::pool;
+use windows::{Window, Windows};
 
 /// Lane-steps between two looks for signals: some tens of milliseconds of one core.
 const STEPS_PER_LOOK: u64 = 250_000;
@@ -40,101 +43,13 @@ enum Either {
     Three(Mutex<Vec<Simulation<3>>>),
 }
 
-/// An array that shows the arms, and the view of it that users get.
-#[derive(Debug)]
-struct Window<T, D> {
-    array: Py<PyArray<T, D>>,
-    view: Py<PyAny>,
-}
-
-impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
-    fn onto(array: Held<'_, PyArray<T, D>>) -> PyResult<Self> {
-        let view = array.call_method0("view")?;
-        let flags = PyDict::new(array.py());
-        flags.set_item("write", false)?;
-        view.call_method("setflags", (), Some(&flags))?;
-        Ok(Self {
-            array: array.unbind(),
-            view: view.unbind(),
-        })
-    }
-
-    fn write<'py>(&self, py: Python<'py>) -> PyResult<PyReadwriteArray<'py, T, D>> {
-        let array = self.array.bind(py).try_readwrite();
-        array.map_err(|_| {
-            refused("this batch's own arrays are in use elsewhere: hand in copies of them")
-        })
-    }
-}
-
-/// The arrays that show the arms.
-#[derive(Debug)]
-struct Windows {
-    position: Window<f64, numpy::Ix2>,
-    velocity: Window<f64, numpy::Ix2>,
-    effort: Window<f64, numpy::Ix2>,
-    time: Window<f64, numpy::Ix1>,
-    diverged: Window<bool, numpy::Ix1>,
-}
-
-impl Windows {
-    /// Has them written, with the interpreter's lock released.
-    fn write(&self, py: Python<'_>, write: impl FnOnce(Shown<'_>) + Send) -> PyResult<()> {
-        let mut position = self.position.write(py)?;
-        let mut velocity = self.velocity.write(py)?;
-        let mut effort = self.effort.write(py)?;
-        let mut time = self.time.write(py)?;
-        let mut diverged = self.diverged.write(py)?;
-        let shown = Shown {
-            position: position.as_slice_mut()?,
-            velocity: velocity.as_slice_mut()?,
-            effort: effort.as_slice_mut()?,
-            time: time.as_slice_mut()?,
-            diverged: diverged.as_slice_mut()?,
-        };
-        py.detach(|| write(shown));
-        Ok(())
-    }
-}
-
-/// Threads by how many there are, of this process: a forked child has none of its parent's.
-static POOLS: Mutex<Vec<(u32, usize, Arc<ThreadPool>)>> = Mutex::new(Vec::new());
-
-/// The threads that share the work; none for one alone.
-fn pool(threads: usize) -> PyResult<Option<Arc<ThreadPool>>> {
-    if threads == 1 {
-        return Ok(None);
-    }
-    let process = std::process::id();
-    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
-    if let Some((.., pool)) = pools
-        .iter()
-        .find(|(of, size, _)| (*of, *size) == (process, threads))
-    {
-        return Ok(Some(Arc::clone(pool)));
-    }
-    let pool = Arc::new(
-        ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .map_err(refused)?,
-    );
-    pools.push((process, threads, Arc::clone(&pool)));
-    Ok(Some(pool))
-}
-
-/// Waits for a lock without keeping the interpreter's. What is behind it is whole, also after a panic of another thread.
-fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
-    one.lock_py_attached(py)
-        .unwrap_or_else(PoisonError::into_inner)
-}
-
 /// Many arms, advanced in whole steps; each is a `Simulation`, to the bit, whatever the number of threads.
 ///
-/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and overwritten by
-/// every call that changes the arms: copy what is to be kept. They cannot be written. An array that is handed in has one row per
-/// arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where they lie. `threads` share the work, as many
-/// as there are cores unless given; with 1 the caller does it alone. Calls on one batch from several threads wait for each other.
+/// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and
+/// overwritten by every call that changes the arms: copy what is to be kept. They cannot be written. An array that is
+/// handed in has one row per arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where
+/// they lie. `threads` share the work, as many as there are cores unless given; with 1 the caller does it alone. Calls
+/// on one batch from several threads wait for each other.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {
@@ -161,8 +76,8 @@ impl Batch {
         }
         let links = fields::links(links)?;
         let own = match links {
-            2 => Either::Two(fresh(n_arms)),
-            _ => Either::Three(fresh(n_arms)),
+            2 => Either::Two(Mutex::new(lanes::fresh(n_arms))),
+            _ => Either::Three(Mutex::new(lanes::fresh(n_arms))),
         };
         let joints = || Window::onto(PyArray2::zeros(py, [n_arms, links], false));
         Ok(Self {
@@ -179,9 +94,9 @@ impl Batch {
         })
     }
 
-    /// Takes `steps` steps (1 unless given) with every arm, or so many of each, (`n_arms`,), in whole numbers. An arm that has
-    /// diverged takes no more. `effort` [N m] is added to the controller's for all these steps, as `Simulation.disturb` does.
-    /// The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
+    /// Takes `steps` steps (1 unless given) with every arm, or so many of each, (`n_arms`,), in whole numbers. An arm
+    /// that has diverged takes no more. `effort` [N m] is added to the controller's for all these steps, as
+    /// `Simulation.disturb` does. The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
     #[pyo3(signature = (steps=None, effort=None))]
     fn step(
         &self,
@@ -229,11 +144,11 @@ impl Batch {
         Ok(())
     }
 
-    /// Back to the starting pose at rest, at time 0, as `Simulation.reset` does: all arms, those of a mask (`n_arms`,), or those of
-    /// some indices.
+    /// Back to the starting pose at rest, at time 0, as `Simulation.reset` does: all arms, those of a mask
+    /// (`n_arms`,), or those of some indices.
     #[pyo3(signature = (arms=None))]
     fn reset(&self, py: Python<'_>, arms: Option<&Object<'_>>) -> PyResult<()> {
-        let chosen = self.chosen(arms)?;
+        let chosen = chosen(arms, self.arms)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
             for &lane in &chosen {
@@ -246,8 +161,8 @@ impl Batch {
         })
     }
 
-    /// Puts arms into other states, `position` [rad] and `velocity` [rad/s] (zeros unless given): all arms, or those that `arms`
-    /// names as in `reset`, with one row for each of them or one for all. Clocks and controllers stay.
+    /// Puts arms into other states, `position` [rad] and `velocity` [rad/s] (zeros unless given): all arms, or those
+    /// that `arms` names as in `reset`, with one row for each of them or one for all. Clocks and controllers stay.
     #[pyo3(signature = (position, velocity=None, arms=None))]
     fn set_state(
         &self,
@@ -256,7 +171,7 @@ impl Batch {
         velocity: Option<&Object<'_>>,
         arms: Option<&Object<'_>>,
     ) -> PyResult<()> {
-        let chosen = self.chosen(arms)?;
+        let chosen = chosen(arms, self.arms)?;
         // Owned, since they may be this batch's own arrays, which are written below.
         let owned = |given: Numbers<'_>| {
             Ok::<_, PyErr>(
@@ -331,7 +246,8 @@ impl Batch {
         Ok(())
     }
 
-    /// Changes the parameters that are given: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths` [m].
+    /// Changes the parameters that are given: `gravity` [m/s²], a number or (`n_arms`,), `masses` [kg] and `lengths`
+    /// [m].
     #[pyo3(signature = (gravity=None, masses=None, lengths=None))]
     fn set_params(
         &self,
@@ -476,102 +392,5 @@ impl Batch {
             self.links(),
             self.threads
         )
-    }
-}
-
-impl Batch {
-    /// A row for each arm, or one for all, where something was handed in.
-    fn rows<'a>(&self, given: Option<&'a Numbers<'_>>, bound: Bound) -> PyResult<Option<Rows<'a>>> {
-        given
-            .map(|given| given.rows(self.arms, self.links(), Some(bound)))
-            .transpose()
-    }
-
-    /// A number for each arm, or one for all, where something was handed in.
-    fn column<'a>(
-        &self,
-        given: Option<&'a Numbers<'_>>,
-        bound: Bound,
-    ) -> PyResult<Option<Rows<'a>>> {
-        given
-            .map(|given| given.column(self.arms, bound))
-            .transpose()
-    }
-
-    /// The lanes that `arms` names: all, those that a mask has, or those of these numbers.
-    fn chosen(&self, arms: Option<&Object<'_>>) -> PyResult<Vec<usize>> {
-        let Some(arms) = arms else {
-            return Ok((0..self.arms).collect());
-        };
-        let expected = || {
-            refused(format_args!(
-                "arms must be a mask of {} or indices below that",
-                self.arms
-            ))
-        };
-        let py = arms.py();
-        let array = py
-            .import("numpy")?
-            .call_method1("asarray", (arms,))
-            .map_err(|_| expected())?;
-        if let Ok(mask) = array.cast::<PyArray1<bool>>() {
-            let mask = mask.to_vec()?;
-            if mask.len() != self.arms {
-                return Err(expected());
-            }
-            return Ok((0..self.arms)
-                .filter(|&lane| mask.get(lane) == Some(&true))
-                .collect());
-        }
-        let indices: Vec<usize> = array.extract().map_err(|_| expected())?;
-        if indices.iter().any(|&lane| lane >= self.arms) {
-            return Err(expected());
-        }
-        Ok(indices)
-    }
-}
-
-/// Arms in the starting pose, as a fresh runtime has one.
-fn fresh<const N: usize>(arms: usize) -> Mutex<Vec<Simulation<N>>>
-where
-    Gains<N>: Default,
-{
-    Mutex::new(vec![
-        Simulation::new(Arm::default(), Gains::default());
-        arms
-    ])
-}
-
-/// Numbers, where something was handed in.
-fn read<'py>(field: &str, value: Option<&Object<'py>>) -> PyResult<Option<Numbers<'py>>> {
-    value.map(|value| Numbers::read(field, value)).transpose()
-}
-
-/// One number of steps for all arms, or one for each.
-fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
-    if let Ok(alike) = steps.extract::<u64>() {
-        return Ok(vec![alike]);
-    }
-    match steps.extract::<Vec<u64>>() {
-        Ok(each) if each.len() == arms => Ok(each),
-        _ => Err(refused(format_args!(
-            "steps must be a whole number, or one for each of {arms} arms"
-        ))),
-    }
-}
-
-/// One method for all arms, or one for each.
-fn read_methods(method: &Object<'_>, arms: usize) -> PyResult<Vec<Method>> {
-    if let Ok(alike) = method.extract::<String>() {
-        return Ok(vec![fields::method("method", &alike)?]);
-    }
-    match method.extract::<Vec<String>>() {
-        Ok(each) if each.len() == arms => each
-            .iter()
-            .map(|name| fields::method("method", name))
-            .collect(),
-        _ => Err(refused(format_args!(
-            "method must be a name, or one for each of {arms} arms"
-        ))),
     }
 }

@@ -1,0 +1,71 @@
+//! The arrays that show a batch's arms.
+//!
+//! **Invariant:** they are made once, and whoever is given one cannot write it.
+
+use numpy::{Element, PyArray, PyArrayMethods, PyReadwriteArray};
+use pyo3::prelude::{Py, PyAny, PyAnyMethods, PyDictMethods, PyResult, Python};
+use pyo3::types::PyDict;
+
+use super::lanes::Shown;
+use crate::fields::{Held, refused};
+
+/// An array that shows the arms, and the view of it that users get.
+#[derive(Debug)]
+pub(super) struct Window<T, D> {
+    array: Py<PyArray<T, D>>,
+    pub(super) view: Py<PyAny>,
+}
+
+impl<T: Element, D: numpy::ndarray::Dimension> Window<T, D> {
+    pub(super) fn onto(array: Held<'_, PyArray<T, D>>) -> PyResult<Self> {
+        let view = array.call_method0("view")?;
+        let flags = PyDict::new(array.py());
+        flags.set_item("write", false)?;
+        view.call_method("setflags", (), Some(&flags))?;
+        Ok(Self {
+            array: array.unbind(),
+            view: view.unbind(),
+        })
+    }
+
+    fn write<'py>(&self, py: Python<'py>) -> PyResult<PyReadwriteArray<'py, T, D>> {
+        let array = self.array.bind(py).try_readwrite();
+        array.map_err(|_| {
+            refused("this batch's own arrays are in use elsewhere: hand in copies of them")
+        })
+    }
+}
+
+/// The arrays that show the arms.
+#[derive(Debug)]
+pub(super) struct Windows {
+    pub(super) position: Window<f64, numpy::Ix2>,
+    pub(super) velocity: Window<f64, numpy::Ix2>,
+    pub(super) effort: Window<f64, numpy::Ix2>,
+    pub(super) time: Window<f64, numpy::Ix1>,
+    pub(super) diverged: Window<bool, numpy::Ix1>,
+}
+
+impl Windows {
+    /// Has them written, with the interpreter's lock released.
+    pub(super) fn write(
+        &self,
+        py: Python<'_>,
+        write: impl FnOnce(Shown<'_>) + Send,
+    ) -> PyResult<()> {
+        let mut position = self.position.write(py)?;
+        let mut velocity = self.velocity.write(py)?;
+        let mut effort = self.effort.write(py)?;
+        let mut time = self.time.write(py)?;
+        let mut diverged = self.diverged.write(py)?;
+        let shown = Shown {
+            position: position.as_slice_mut()?,
+            velocity: velocity.as_slice_mut()?,
+            effort: effort.as_slice_mut()?,
+            time: time.as_slice_mut()?,
+            diverged: diverged.as_slice_mut()?,
+        };
+        py.detach(|| write(shown));
+        Ok(())
+    }
+}

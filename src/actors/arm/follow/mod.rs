@@ -1,0 +1,283 @@
+//! Paths: `/joint_trajectory_controller/follow_joint_trajectory`, as the controller of that name has it.
+//!
+//! While a goal is active the node moves the arm's setpoint along the path, in simulation time, and sees how the arm
+//! follows; the rules are `math::trajectory`'s. A goal ends where its setpoint is not the arm's any more: another
+//! trajectory, another goal or a reset has taken its place.
+//!
+//! **Invariant:** at most one goal is active, and each that was accepted has exactly one result.
+
+mod answers;
+mod wire;
+
+use std::time::Duration;
+
+use actix::prelude::*;
+
+use self::answers::{ResultCode, feedback, result};
+use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
+use crate::actors::node::Done;
+use crate::actors::wire::follower::{Canceller, GoalFollower, GoalStatus};
+use crate::math::arm::State;
+use crate::math::goal::Cadence;
+use crate::math::pid::Setpoint;
+use crate::math::trajectory::{Course, JointPath, Standing, Tolerance, Waypoint};
+
+/// Time between two moves of the setpoint, which the arm holds in between: at a radian a second it is some millimetres
+/// behind.
+pub const PERIOD: Duration = Duration::from_millis(5);
+
+/// The error for a client that cancels a goal which it has not sent, or which has ended.
+const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `joint_trajectory_controller` for an arm of `N` links.
+pub struct PathFollower<const N: usize> {
+    arm: PathArm<N>,
+    active: Option<ActivePath<N>>,
+    /// The next move of the setpoint.
+    timer: Option<SpawnHandle>,
+}
+
+/// The arm, as far as paths are concerned.
+#[derive(Clone)]
+pub struct PathArm<const N: usize> {
+    motion: Recipient<ArmMotion<N>>,
+    setpoint: Recipient<MoveSetpoint<N>>,
+}
+
+impl<const N: usize> PathArm<N> {
+    /// The ways to this arm.
+    #[must_use]
+    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
+        Self {
+            motion: arm.clone().recipient(),
+            setpoint: arm.clone().recipient(),
+        }
+    }
+}
+
+/// The goal that is being followed.
+struct ActivePath<const N: usize> {
+    course: Course<N>,
+    follower: GoalFollower,
+    /// Simulation time of its start \[s\], since the reset before it.
+    began: f64,
+    /// Simulation time up to that reset \[s\].
+    before_reset: f64,
+    /// The setpoint as this node knows it.
+    setpoint: Setpoint<N>,
+    feedback: Cadence,
+}
+
+impl<const N: usize> PathFollower<N> {
+    /// A node without a goal.
+    #[must_use]
+    pub const fn new(arm: PathArm<N>) -> Self {
+        Self {
+            arm,
+            active: None,
+            timer: None,
+        }
+    }
+}
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// Follow this path. From clients, by the action.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct FollowPath<const N: usize> {
+    /// The points behind the place where the arm is.
+    pub points: Vec<Waypoint<N>>,
+    /// How far off the joints may be on the way.
+    pub on_the_way: Tolerance<N>,
+    /// How far off they may be at the end.
+    pub at_the_end: Tolerance<N>,
+    /// How long after the end they may take for that \[s\].
+    pub patience: f64,
+    /// Who sent it.
+    pub follower: GoalFollower,
+    /// Dropped when the arm is on its way, or the goal refused.
+    pub done: Done,
+}
+
+/// The end of the path that the same client has sent.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct StopFollowing {
+    /// Who wants it; an error status goes there where no such goal is active.
+    pub from: Canceller,
+    /// Dropped when the goal has ended.
+    pub done: Done,
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for PathFollower<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<FollowPath<N>> for PathFollower<N> {
+    type Result = ();
+
+    fn handle(&mut self, goal: FollowPath<N>, ctx: &mut Context<Self>) {
+        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
+        ctx.wait(motion.map(|motion, node, ctx| match motion {
+            Ok(motion) => node.begin(goal, &motion, ctx),
+            Err(_) => goal.follower.refuse("the arm does not answer"),
+        }));
+    }
+}
+
+impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
+    type Result = ();
+
+    fn handle(&mut self, StopFollowing { from, done }: StopFollowing, ctx: &mut Context<Self>) {
+        let is_meant = |goal: &ActivePath<N>| goal.follower.is_meant_by(&from);
+        let Some(goal) = self.active.take_if(|goal| is_meant(goal)) else {
+            return from.refuse(NOT_ACTIVE);
+        };
+        let halted = self.halt(goal.setpoint).into_actor(self);
+        ctx.wait(halted.map(move |(), _, _| {
+            let values = result(ResultCode::Successful, "cancelled");
+            goal.follower.conclude(&values, GoalStatus::Canceled);
+            drop(done);
+        }));
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> ActivePath<N> {
+    fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
+        self.follower.conclude(&result(code, why), status);
+    }
+}
+
+impl<const N: usize> PathFollower<N> {
+    /// Sets a goal in motion, in place of the one before.
+    fn begin(&mut self, goal: FollowPath<N>, motion: &JointMotion<N>, ctx: &mut Context<Self>) {
+        let start = Waypoint {
+            time: 0.0,
+            position: motion.state.position,
+            velocity: Some(motion.state.velocity),
+        };
+        let path = match JointPath::new(start, goal.points) {
+            Ok(path) => path,
+            Err(why) => return goal.follower.refuse(&format!("trajectory.{why}")),
+        };
+        if let Some(before) = self.active.take() {
+            let why = "another goal has taken its place";
+            before.end(GoalStatus::Aborted, ResultCode::Successful, why);
+        }
+        self.active = Some(ActivePath {
+            course: Course {
+                path,
+                on_the_way: goal.on_the_way,
+                at_the_end: goal.at_the_end,
+                patience: goal.patience,
+            },
+            follower: goal.follower,
+            began: motion.time,
+            before_reset: motion.before_reset,
+            setpoint: motion.setpoint,
+            feedback: Cadence::default(),
+        });
+        self.lead(motion, Some(goal.done), ctx);
+    }
+
+    /// Sees how the arm stands, and moves its setpoint on.
+    fn look(&mut self, ctx: &mut Context<Self>) {
+        self.timer = None;
+        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
+        ctx.wait(motion.map(|motion, node, ctx| match motion {
+            Ok(motion) => node.lead(&motion, None, ctx),
+            Err(_) => node.abort("the arm does not answer"),
+        }));
+    }
+
+    fn lead(&mut self, motion: &JointMotion<N>, done: Option<Done>, ctx: &mut Context<Self>) {
+        let Some(goal) = &mut self.active else {
+            return;
+        };
+        if motion.before_reset.to_bits() != goal.before_reset.to_bits() {
+            return self.abort("the arm was reset");
+        }
+        let time = motion.time - goal.began;
+        let desired = goal.course.path.at(time);
+        let standing = goal.course.judge(time, &motion.state);
+        if goal.follower.wants_feedback && goal.feedback.due(motion.time) {
+            let values = feedback(motion.time, time, &desired, &motion.state);
+            goal.follower.feed_back(&values);
+        }
+        let next = match standing {
+            Standing::Underway | Standing::Arrived => desired,
+            Standing::OffPath(_) | Standing::Late(_) => at_rest(&motion.state),
+        };
+        let moved = MoveSetpoint {
+            from: std::mem::replace(&mut goal.setpoint, next),
+            to: next,
+        };
+        let moved = self.arm.setpoint.send(moved).into_actor(self);
+        ctx.wait(moved.map(move |moved, node, ctx| {
+            node.moved(moved.unwrap_or(false), standing, ctx);
+            drop(done);
+        }));
+    }
+
+    /// The setpoint has been moved, or was somebody else's.
+    fn moved(&mut self, is_ours: bool, standing: Standing, ctx: &mut Context<Self>) {
+        if !is_ours {
+            return self.abort("another setpoint has taken its place");
+        }
+        let (status, code, why) = match standing {
+            Standing::Underway => {
+                if let Some(before) = self.timer.take() {
+                    ctx.cancel_future(before);
+                }
+                self.timer = Some(ctx.run_later(PERIOD, Self::look));
+                return;
+            }
+            Standing::Arrived => (GoalStatus::Succeeded, ResultCode::Successful, String::new()),
+            Standing::OffPath(excess) => {
+                let code = ResultCode::PathToleranceViolated;
+                (GoalStatus::Aborted, code, excess.to_string())
+            }
+            Standing::Late(excess) => {
+                let code = ResultCode::GoalToleranceViolated;
+                (GoalStatus::Aborted, code, excess.to_string())
+            }
+        };
+        if let Some(goal) = self.active.take() {
+            goal.end(status, code, &why);
+        }
+    }
+
+    /// Ends the goal, whose setpoint is gone.
+    fn abort(&mut self, why: &str) {
+        if let Some(goal) = self.active.take() {
+            goal.end(GoalStatus::Aborted, ResultCode::Successful, why);
+        }
+    }
+
+    /// Holds the arm where it is, unless somebody else leads it by now.
+    fn halt(&self, from: Setpoint<N>) -> impl Future<Output = ()> + use<N> {
+        let arm = self.arm.clone();
+        async move {
+            if let Ok(motion) = arm.motion.send(ArmMotion).await {
+                let to = at_rest(&motion.state);
+                let _ = arm.setpoint.send(MoveSetpoint { from, to }).await;
+            }
+        }
+    }
+}
+
+fn at_rest<const N: usize>(state: &State<N>) -> Setpoint<N> {
+    Setpoint {
+        position: state.position,
+        velocity: [0.0; N],
+    }
+}

@@ -1,0 +1,102 @@
+//! Goals of `control_msgs/action/FollowJointTrajectory` in JSON.
+//!
+//! **Invariant:** a long goal is read on another thread, and what its client sends behind it waits.
+
+use actix::prelude::*;
+
+use super::{FollowPath, PathFollower, StopFollowing};
+use crate::actors::arm::sim::joint_names;
+use crate::actors::node::Done;
+use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::wire::follower::{ActionRequest, GoalFollower};
+use crate::actors::wire::{LONG_ARGUMENTS, Nodes, Route};
+use crate::math::trajectory::{Tolerance, Waypoint};
+use crate::protocol::catalog::Action;
+use crate::protocol::op::follow::{FollowGoal, JointTolerance};
+
+/// How far off each joint may be at the end where the goal does not say \[rad\].
+const GOAL_TOLERANCE: f64 = 0.05;
+/// How long after the end it may take for that where the goal does not say \[s\].
+const GOAL_TIME: f64 = 5.0;
+
+impl<const N: usize> PathFollower<N> {
+    /// Enters this node's action into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        let requests = requests(address.clone().recipient(), address.clone().recipient());
+        nodes
+            .actions
+            .insert(Action::FollowJointTrajectory, requests);
+    }
+}
+
+fn requests<const N: usize>(
+    follow: Recipient<FollowPath<N>>,
+    stop: Recipient<StopFollowing>,
+) -> Route<ActionRequest> {
+    Box::new(move |request| match request {
+        ActionRequest::Goal {
+            arguments,
+            follower,
+            done,
+        } => {
+            let follow = follow.clone();
+            let is_long = arguments.payload().get().len() > LONG_ARGUMENTS;
+            let read = move || match FollowGoal::read(&arguments, &joint_names::<N>()) {
+                Ok(goal) => follow.do_send(path(&goal, follower, done)),
+                Err(rejections) => follower.refuse(&rejections.status()),
+            };
+            if is_long {
+                actix_rt::spawn(aside(Errand::Reading, read));
+            } else {
+                read();
+            }
+        }
+        ActionRequest::Cancel { from, done } => stop.do_send(StopFollowing { from, done }),
+    })
+}
+
+/// The goal for an arm of `N` links; the reader has checked how many values there are.
+fn path<const N: usize>(
+    goal: &FollowGoal,
+    mut follower: GoalFollower,
+    done: Done,
+) -> FollowPath<N> {
+    let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
+    let points = goal.points.iter().map(|point| Waypoint {
+        time: point.time,
+        position: array(&point.position),
+        velocity: point.velocity.as_deref().map(array),
+    });
+    let points: Vec<Waypoint<N>> = points.collect();
+    let bytes = follower.share.bytes() + size_of_val(points.as_slice());
+    follower.share.resize(bytes);
+    FollowPath {
+        points,
+        on_the_way: tolerance(None, &goal.path_tolerance),
+        at_the_end: tolerance(Some(GOAL_TOLERANCE), &goal.goal_tolerance),
+        patience: match goal.goal_time_tolerance {
+            0.0 => GOAL_TIME,
+            patience => patience,
+        },
+        follower,
+        done,
+    }
+}
+
+/// `default` for positions where nothing is said, or 0.
+fn tolerance<const N: usize>(default: Option<f64>, given: &[JointTolerance]) -> Tolerance<N> {
+    let mut tolerance = Tolerance::of_positions(default);
+    let of = |value: f64, default: Option<f64>| match value {
+        0.0 => default,
+        value => Some(value).filter(|value| *value > 0.0),
+    };
+    for one in given {
+        if let Some(position) = tolerance.position.get_mut(one.joint) {
+            *position = of(one.position, default);
+        }
+        if let Some(velocity) = tolerance.velocity.get_mut(one.joint) {
+            *velocity = of(one.velocity, None);
+        }
+    }
+    tolerance
+}

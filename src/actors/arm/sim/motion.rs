@@ -1,0 +1,66 @@
+//! The arm's motion for those who lead it along a path, and the setpoint moved on by them alone.
+//!
+//! **Invariant:** a setpoint is moved on only from where its mover has put it: whoever else sets one takes over.
+
+use actix::prelude::*;
+
+use super::node::ArmSim;
+use crate::math::arm::State;
+use crate::math::pid::Setpoint;
+use crate::math::simulation::ArmInput;
+
+/// How the arm moves now. From `joint_trajectory_controller`, while it leads the arm.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "JointMotion<N>")]
+pub struct ArmMotion<const N: usize>;
+
+/// The arm at one instant.
+#[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]
+pub struct JointMotion<const N: usize> {
+    /// Positions and velocities.
+    pub state: State<N>,
+    /// The joint state that is held.
+    pub setpoint: Setpoint<N>,
+    /// Simulation time since the last reset \[s\].
+    pub time: f64,
+    /// Simulation time up to the last reset \[s\]: another one says that there was a reset.
+    pub before_reset: f64,
+}
+
+/// The setpoint is moved on, if it is still the one that is known. The answer is whether it was. From
+/// `joint_trajectory_controller`.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "bool")]
+pub struct MoveSetpoint<const N: usize> {
+    /// The setpoint as the sender knows it.
+    pub from: Setpoint<N>,
+    /// The next one.
+    pub to: Setpoint<N>,
+}
+
+impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
+    type Result = JointMotion<N>;
+
+    fn handle(&mut self, _: ArmMotion<N>, ctx: &mut Context<Self>) -> JointMotion<N> {
+        self.attend(ctx);
+        JointMotion {
+            state: *self.simulation.state(),
+            setpoint: *self.simulation.pid().setpoint(),
+            time: self.simulation.time(),
+            before_reset: self.goals.before_reset,
+        }
+    }
+}
+
+impl<const N: usize> Handler<MoveSetpoint<N>> for ArmSim<N> {
+    type Result = bool;
+
+    fn handle(&mut self, message: MoveSetpoint<N>, ctx: &mut Context<Self>) -> bool {
+        self.attend(ctx);
+        let is_known = *self.simulation.pid().setpoint() == message.from;
+        if is_known {
+            self.change(ArmInput::Setpoint(message.to));
+        }
+        is_known
+    }
+}

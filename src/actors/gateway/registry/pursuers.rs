@@ -1,0 +1,140 @@
+//! Actions that clients pursue: who pursues which, and the goals that are on their way.
+//!
+//! **Invariant:** a forwarded goal ends by its own pursuer's result, or with that client, and only once. Goals outlive
+//! who sent them; then nobody hears of them any more.
+
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
+
+use crate::actors::ConnectionId;
+use crate::actors::gateway::registry::services::{Provider, Services};
+use crate::actors::resources::budget::Share;
+use crate::protocol::names;
+use crate::protocol::wire::payload::Payload;
+
+/// A goal that was forwarded to its pursuer and has not ended yet.
+pub(super) struct ForwardedGoal {
+    /// Who sent it.
+    pub(super) sender: ConnectionId,
+    /// The sender's id for it.
+    pub(super) id: Option<Payload>,
+    pub(super) pursuer: ConnectionId,
+    /// The action's name as the sender spells it.
+    pub(super) action: Arc<str>,
+    /// The same as the pursuer spells it.
+    pub(super) spelling: Box<str>,
+    pub(super) wants_feedback: bool,
+    /// Its share of its sender's account.
+    pub(super) _share: Share,
+}
+
+/// Pursuers and goals on their way.
+#[derive(Default)]
+pub(super) struct Pursuers {
+    /// By absolute name.
+    pursuers: HashMap<Box<str>, Provider>,
+    goals: BTreeMap<u64, ForwardedGoal>,
+    /// Numbers of goals by who sent them, so that neither the limit nor a cancellation costs a search.
+    sent: HashMap<ConnectionId, Vec<u64>>,
+    goals_made: u64,
+}
+
+impl Pursuers {
+    /// Makes `pursuer` the one who pursues the action; the newest registration wins. Gives the one before.
+    pub(super) fn pursue(&mut self, action: &str, pursuer: Provider) -> Option<Provider> {
+        self.pursuers.insert(action.into(), pursuer)
+    }
+
+    pub(super) fn pursuer(&self, action: &str) -> Option<&Provider> {
+        self.pursuers.get(action)
+    }
+
+    /// Withdraws the action if `connection` pursues it; true if it did.
+    pub(super) fn withdraw(&mut self, action: &str, connection: ConnectionId) -> bool {
+        let is_ours = |one: &Provider| one.connection == connection;
+        let pursues = self.pursuer(action).is_some_and(is_ours);
+        if pursues {
+            self.pursuers.remove(action);
+        }
+        pursues
+    }
+
+    /// Goals of `sender` that have not ended.
+    pub(super) fn sent_by(&self, sender: ConnectionId) -> usize {
+        self.sent.get(&sender).map_or(0, Vec::len)
+    }
+
+    /// Takes a goal in; gives the id under which it goes to its pursuer.
+    pub(super) fn remember(&mut self, goal: ForwardedGoal) -> String {
+        self.goals_made += 1;
+        let number = self.goals_made;
+        self.sent.entry(goal.sender).or_default().push(number);
+        self.goals.insert(number, goal);
+        Services::call_id(number)
+    }
+
+    /// The number of the goal that `pursuer` means by `id`, if it is that pursuer's and of that action.
+    pub(super) fn meant_by_pursuer(
+        &self,
+        id: Option<&Payload>,
+        action: &str,
+        pursuer: ConnectionId,
+    ) -> Option<u64> {
+        let number = Services::number_of(id?)?;
+        let goal = self.goals.get(&number)?;
+        let is_its =
+            goal.pursuer == pursuer && names::absolute(&goal.action) == names::absolute(action);
+        is_its.then_some(number)
+    }
+
+    /// The id at its pursuer, and the goal, that `sender` means by `id`.
+    pub(super) fn meant_by_sender(
+        &self,
+        id: Option<&Payload>,
+        action: &str,
+        sender: ConnectionId,
+    ) -> Option<(String, &ForwardedGoal)> {
+        let sent = self.sent.get(&sender)?.iter().rev();
+        let mut goals = sent.filter_map(|number| Some((*number, self.goals.get(number)?)));
+        let action = names::absolute(action);
+        let (number, goal) = goals
+            .find(|(_, goal)| goal.id.as_ref() == id && names::absolute(&goal.action) == action)?;
+        Some((Services::call_id(number), goal))
+    }
+
+    pub(super) fn goal(&self, number: u64) -> Option<&ForwardedGoal> {
+        self.goals.get(&number)
+    }
+
+    /// Takes a goal out, which has ended.
+    pub(super) fn take(&mut self, number: u64) -> Option<ForwardedGoal> {
+        let goal = self.goals.remove(&number)?;
+        if let Some(sent) = self.sent.get_mut(&goal.sender) {
+            sent.retain(|one| *one != number);
+            if sent.is_empty() {
+                self.sent.remove(&goal.sender);
+            }
+        }
+        Some(goal)
+    }
+
+    /// Takes out the goals that `pursuer` has not ended, oldest first.
+    pub(super) fn take_pursued_by(&mut self, pursuer: ConnectionId) -> Vec<ForwardedGoal> {
+        let goals = self
+            .goals
+            .iter()
+            .filter(|(_, goal)| goal.pursuer == pursuer);
+        let numbers: Vec<u64> = goals.map(|(number, _)| *number).collect();
+        numbers
+            .into_iter()
+            .filter_map(|number| self.take(number))
+            .collect()
+    }
+
+    /// Forgets the goals that `sender` has sent.
+    pub(super) fn forget_sender(&mut self, sender: ConnectionId) {
+        for number in self.sent.remove(&sender).unwrap_or_default() {
+            self.goals.remove(&number);
+        }
+    }
+}

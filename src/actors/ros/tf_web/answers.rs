@@ -1,0 +1,49 @@
+//! The frames that somebody has wished for by a topic, under the name of that wish.
+//!
+//! **Invariant:** the fields are those of the catalogue.
+
+use serde::Serialize;
+
+use crate::protocol::messages::scene::TfMessage;
+use crate::protocol::messages::{Header, Stamp};
+
+/// `tf2_web_republisher/TFSubscriptionActionFeedback`.
+#[derive(Serialize)]
+pub(super) struct FramesFeedback<'a> {
+    header: Header<'a>,
+    status: WishStatus<'a>,
+    feedback: &'a TfMessage,
+}
+
+/// `actionlib_msgs/GoalStatus`.
+#[derive(Serialize)]
+struct WishStatus<'a> {
+    goal_id: WishId<'a>,
+    status: u8,
+    text: &'static str,
+}
+
+/// `actionlib_msgs/GoalID`.
+#[derive(Serialize)]
+struct WishId<'a> {
+    stamp: Stamp,
+    id: &'a str,
+}
+
+pub(super) fn feedback<'a>(
+    stamp: Stamp,
+    id: &'a str,
+    feedback: &'a TfMessage,
+) -> FramesFeedback<'a> {
+    let frame_id = "";
+    FramesFeedback {
+        header: Header { stamp, frame_id },
+        status: WishStatus {
+            goal_id: WishId { stamp, id },
+            // As ROS 1 counts: active.
+            status: 1,
+            text: "",
+        },
+        feedback,
+    }
+}

@@ -1,0 +1,260 @@
+//! `tf2_web_republisher`: frames as web viewers want them, which can't put chains of frames together.
+//!
+//! Who asks by the service gets the name of a topic, on which every frame comes as seen from the world. Who sends a
+//! goal, by the action or by the topics of ROS 1's actions (which roslib 1 does), gets the frames that it names as
+//! feedback, seen from the frame that it names, at its rate.
+//!
+//! **Invariant:** nothing is asked of the arm while nobody wants frames; the newest [`MAX_WISHES`] wishes are kept.
+
+mod answers;
+mod wire;
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use actix::prelude::*;
+use tokio::time::Instant;
+
+use crate::actors::arm::sim::{ArmPose, Pose, SimulationTime};
+use crate::actors::node::{Ask, Call, Interest, Publish};
+use crate::actors::wire::follower::{Canceller, GoalFollower, GoalStatus};
+use crate::protocol::catalog::Topic;
+use crate::protocol::messages::republished::{frames, seen_from};
+use crate::protocol::messages::scene::WORLD;
+use crate::protocol::messages::{self, Empty, Stamp};
+
+/// Wishes for frames that are kept; the oldest gives way, for a viewer may go without a word.
+pub const MAX_WISHES: usize = 64;
+/// Frames that one wish may name.
+pub const MAX_FRAMES: usize = 32;
+/// Time between two looks at the arm, and so the shortest between two messages.
+const PERIOD: Duration = Duration::from_micros(16_667);
+/// Time between two messages of the topic.
+const TOPIC_PERIOD: Duration = Duration::from_millis(33);
+
+/// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
+const NOT_ACTIVE: &str = "id must be that of a goal of this connection";
+
+// ---- messages -------------------------------------------------------------------------------------------------------
+
+/// Which topic has the frames. From clients, by `/republish_tfs`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RepublishTfs;
+
+impl Ask for RepublishTfs {
+    type Answer = ();
+}
+
+/// Frames for whoever asks, until cancelled. From clients, by the action or by the topic.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub struct WishFrames {
+    /// The frames.
+    pub sources: Vec<String>,
+    /// The frame that they are seen from.
+    pub target: String,
+    /// Time between two messages.
+    pub period: Duration,
+    /// Who gets them.
+    pub by: Wisher,
+}
+
+/// Who wishes for frames.
+pub enum Wisher {
+    /// A client that has sent a goal of the action.
+    Client(Box<GoalFollower>),
+    /// Somebody who has published a goal of this id.
+    Topic(String),
+}
+
+/// The end of a wish. From clients, in the same ways.
+#[derive(Message)]
+#[rtype(result = "()")]
+pub enum ForgetFrames {
+    /// The goal of the action that the same client has sent; an error status goes there where there is none.
+    Of(Canceller),
+    /// The published goal of that id, or all of them.
+    Published(Option<String>),
+}
+
+// ---- state ----------------------------------------------------------------------------------------------------------
+
+/// The node `tf2_web_republisher` for an arm of `N` links.
+pub struct TfRepublisher<const N: usize> {
+    arm: Recipient<ArmPose<N>>,
+    time: Recipient<SimulationTime>,
+    publish: Recipient<Publish>,
+    /// Oldest first.
+    wishes: VecDeque<(WishFrames, Instant)>,
+    /// When the topic is due next, while somebody subscribes to it.
+    topic: Option<Instant>,
+    timer: Option<SpawnHandle>,
+}
+
+impl<const N: usize> TfRepublisher<N> {
+    /// A node that nobody has asked yet.
+    #[must_use]
+    pub const fn new(
+        arm: Recipient<ArmPose<N>>,
+        time: Recipient<SimulationTime>,
+        publish: Recipient<Publish>,
+    ) -> Self {
+        Self {
+            arm,
+            time,
+            publish,
+            wishes: VecDeque::new(),
+            topic: None,
+            timer: None,
+        }
+    }
+}
+
+// ---- life cycle -----------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Actor for TfRepublisher<N> {
+    type Context = Context<Self>;
+}
+
+// ---- handlers -------------------------------------------------------------------------------------------------------
+
+impl<const N: usize> Handler<Call<RepublishTfs>> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, mut call: Call<RepublishTfs>, _: &mut Context<Self>) {
+        call.reply.answer(());
+    }
+}
+
+impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, wish: WishFrames, ctx: &mut Context<Self>) {
+        if self.wishes.len() >= MAX_WISHES
+            && let Some((oldest, _)) = self.wishes.pop_front()
+        {
+            oldest.end(GoalStatus::Aborted);
+        }
+        self.wishes.push_back((wish, Instant::now()));
+        self.keep_timer(ctx);
+    }
+}
+
+impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, forget: ForgetFrames, ctx: &mut Context<Self>) {
+        match forget {
+            ForgetFrames::Of(who) => {
+                let is_meant = |wish: &WishFrames| match &wish.by {
+                    Wisher::Client(follower) => follower.is_meant_by(&who),
+                    Wisher::Topic(_) => false,
+                };
+                let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
+                match at.and_then(|at| self.wishes.remove(at)) {
+                    Some((wish, _)) => wish.end(GoalStatus::Canceled),
+                    None => who.refuse(NOT_ACTIVE),
+                }
+            }
+            ForgetFrames::Published(id) => self.forget_published(id.as_deref()),
+        }
+        self.keep_timer(ctx);
+    }
+}
+
+impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
+        match (interest.topic, interest.wanted) {
+            (Topic::TfWeb, wanted) => self.topic = wanted.then(Instant::now),
+            // Nobody hears of published goals any more.
+            (_, false) => self.forget_published(None),
+            (_, true) => {}
+        }
+        self.keep_timer(ctx);
+    }
+}
+
+// ---- helpers --------------------------------------------------------------------------------------------------------
+
+impl WishFrames {
+    /// A client that has sent a goal of the action hears of its end.
+    fn end(&self, status: GoalStatus) {
+        if let Wisher::Client(follower) = &self.by {
+            follower.conclude(&Empty {}, status);
+        }
+    }
+
+    fn is_gone(&self) -> bool {
+        matches!(&self.by, Wisher::Client(follower) if follower.is_gone())
+    }
+}
+
+impl<const N: usize> TfRepublisher<N> {
+    fn forget_published(&mut self, id: Option<&str>) {
+        self.wishes.retain(|(wish, _)| match &wish.by {
+            Wisher::Client(_) => true,
+            Wisher::Topic(own) => id.is_some_and(|id| id != own),
+        });
+    }
+
+    /// A timer while anybody wants frames, and none otherwise.
+    fn keep_timer(&mut self, ctx: &mut Context<Self>) {
+        let is_wanted = self.topic.is_some() || !self.wishes.is_empty();
+        match self.timer {
+            None if is_wanted => self.timer = Some(ctx.run_interval(PERIOD, Self::look)),
+            Some(timer) if !is_wanted => {
+                ctx.cancel_future(timer);
+                self.timer = None;
+            }
+            _ => {}
+        }
+    }
+
+    /// Asks the arm where it is, and tells those who are due.
+    fn look(&mut self, ctx: &mut Context<Self>) {
+        self.wishes.retain(|(wish, _)| !wish.is_gone());
+        self.keep_timer(ctx);
+        let (arm, time) = (self.arm.clone(), self.time.clone());
+        let asked = async move {
+            let time = time.send(SimulationTime).await.ok()?;
+            Some((time, arm.send(ArmPose).await.ok()?))
+        };
+        ctx.wait(asked.into_actor(self).map(|known, node, _| {
+            if let Some((time, pose)) = known {
+                node.tell(Stamp::from_seconds(time), &pose);
+            }
+        }));
+    }
+
+    fn tell(&mut self, stamp: Stamp, pose: &Pose<N>) {
+        let now = Instant::now();
+        let seen = |target: &str, sources: &[String]| {
+            let sources = sources.iter().map(String::as_str);
+            seen_from(stamp, target, sources, &pose.lengths, &pose.positions)
+        };
+        if self.topic.is_some_and(|due| due <= now) {
+            self.topic = Some(now + TOPIC_PERIOD);
+            publish(&self.publish, Topic::TfWeb, &seen(WORLD, &frames(N)));
+        }
+        for (wish, due) in self.wishes.iter_mut().filter(|(_, due)| *due <= now) {
+            *due = now + wish.period;
+            let message = seen(&wish.target, &wish.sources);
+            match &wish.by {
+                Wisher::Client(follower) => follower.feed_back(&message),
+                Wisher::Topic(id) => {
+                    let message = answers::feedback(stamp, id, &message);
+                    publish(&self.publish, Topic::TfWebFeedback, &message);
+                }
+            }
+        }
+    }
+}
+
+fn publish(to: &Recipient<Publish>, topic: Topic, message: &impl serde::Serialize) {
+    to.do_send(Publish {
+        topic,
+        frame: messages::publish(topic.name(), message).into(),
+    });
+}

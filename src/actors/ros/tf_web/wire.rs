@@ -1,0 +1,189 @@
+//! Wishes for frames in JSON.
+//!
+//! **Invariant:** a wish names frames that the arm has; others are refused by name.
+
+use std::time::Duration;
+
+use actix::prelude::*;
+use bytes::Bytes;
+use serde_json::json;
+use serde_json::value::RawValue;
+
+use super::{ForgetFrames, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames, Wisher};
+use crate::actors::node::Respond;
+use crate::actors::wire::follower::ActionRequest;
+use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
+use crate::protocol::catalog::{Action, Service, Topic};
+use crate::protocol::messages::republished::is_frame;
+use crate::protocol::messages::scene::WORLD;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
+use crate::protocol::op::{Arguments, MAX_ARGS};
+use crate::protocol::wire::json;
+
+/// Messages a second where a wish does not say.
+const RATE: f64 = 10.0;
+/// Messages a second, at least: what is asked more seldom comes so often.
+const LEAST_RATE: f64 = 0.1;
+
+impl<const N: usize> TfRepublisher<N> {
+    /// Enters this node's service, action and topics into the registry's table.
+    pub fn attach(address: &Addr<Self>, nodes: &mut Nodes) {
+        nodes.serve::<RepublishTfs>(Service::RepublishTfs, address.clone());
+        let node = || address.clone().recipient();
+        nodes.actions.insert(
+            Action::TfSubscription,
+            requests::<N>(node(), address.clone().recipient()),
+        );
+        nodes.listeners.insert(Topic::TfWebGoal, goals::<N>(node()));
+        nodes.listeners.insert(
+            Topic::TfWebCancel,
+            cancellations(address.clone().recipient()),
+        );
+        for topic in [Topic::TfWeb, Topic::TfWebFeedback] {
+            nodes.publishers.insert(topic, address.clone().recipient());
+        }
+    }
+}
+
+// ---- the service ----------------------------------------------------------------------------------------------------
+
+impl Callable for RepublishTfs {
+    fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
+        let mut fields = Fields::read(arguments, service)?;
+        let target = fields.text("target_frame");
+        if let Some(target) = target.filter(|target| target.trim_start_matches('/') != WORLD) {
+            let why = format!("must be {WORLD}, got {target}: others are for the action");
+            fields.refuse("target_frame", &why);
+        }
+        if fields.accepted() {
+            Ok(Self)
+        } else {
+            Err(fields.finish())
+        }
+    }
+}
+
+impl Answered for RepublishTfs {
+    fn write((): (), to: &Address) -> Bytes {
+        to.response(&json!({"topic_name": Topic::TfWeb.name()}), "")
+    }
+}
+
+// ---- the action -----------------------------------------------------------------------------------------------------
+
+fn requests<const N: usize>(
+    wish: Recipient<WishFrames>,
+    forget: Recipient<ForgetFrames>,
+) -> Route<ActionRequest> {
+    Box::new(move |request| match request {
+        ActionRequest::Goal {
+            arguments,
+            follower,
+            ..
+        } => match read_wish(&arguments, N) {
+            Ok(read) => wish.do_send(read.by(Wisher::Client(Box::new(follower)))),
+            Err(rejections) => follower.refuse(&rejections.status()),
+        },
+        ActionRequest::Cancel { from, .. } => forget.do_send(ForgetFrames::Of(from)),
+    })
+}
+
+/// A wish, without who wishes it.
+struct ReadWish {
+    sources: Vec<String>,
+    target: String,
+    period: Duration,
+}
+
+impl ReadWish {
+    fn by(self, by: Wisher) -> WishFrames {
+        WishFrames {
+            sources: self.sources,
+            target: self.target,
+            period: self.period,
+            by,
+        }
+    }
+}
+
+fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections> {
+    let mut fields = Fields::of_goal(arguments, Action::TfSubscription)?;
+    let sources = fields.texts("source_frames", MAX_FRAMES);
+    let target = fields
+        .text("target_frame")
+        .map(std::borrow::Cow::into_owned);
+    let rate = fields.number("rate", Bound::NonNegative);
+    if let Some(target) = target.as_ref().filter(|target| !is_frame(target, links)) {
+        let why = format!("must be a frame of the arm, got {target}");
+        fields.refuse("target_frame", &why);
+    }
+    match (sources, target, fields.accepted()) {
+        (Some(sources), Some(target), true) => {
+            let rate = rate
+                .filter(|rate| *rate > 0.0)
+                .unwrap_or(RATE)
+                .max(LEAST_RATE);
+            Ok(ReadWish {
+                sources,
+                target,
+                period: Duration::from_secs_f64(1.0 / rate),
+            })
+        }
+        _ => Err(fields.finish()),
+    }
+}
+
+// ---- the topics of ROS 1's actions ----------------------------------------------------------------------------------
+
+/// Goals that are published; an error status for what is none.
+fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
+    Box::new(move |message| match read_goal(message.msg.raw(), N) {
+        Ok(goal) => wish.do_send(goal),
+        Err(rejections) => {
+            let msg = format!("{}: {rejections}", Topic::TfWebGoal.name());
+            let frame = messages::status(Level::Error, &msg, message.id.as_ref());
+            message.respond.do_send(Respond {
+                connection: message.connection,
+                frame: frame.into(),
+                service: None,
+                status: Some(Level::Error),
+                done: Some(message.done),
+            });
+        }
+    })
+}
+
+/// `tf2_web_republisher/TFSubscriptionActionGoal`.
+fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
+    let refused = |field: &str, why: &str| Rejections::from(RejectedField::refused(field, &why));
+    if msg.get().len() > MAX_ARGS {
+        return Err(refused(
+            "msg",
+            &format!("must be at most {MAX_ARGS} bytes long"),
+        ));
+    }
+    let members = json::members(msg.get(), &["goal_id", "goal"]);
+    let [id, goal] = members.map_err(|_| refused("msg", "must be an object"))?;
+    let id = id.and_then(|id| id_in(id.get()));
+    let id = id.ok_or_else(|| refused("goal_id.id", "must be a string"))?;
+    let goal = goal.ok_or_else(|| refused("goal", "is required"))?;
+    let read = read_wish(&Arguments::Object(goal.into()), links)?;
+    Ok(read.by(Wisher::Topic(id)))
+}
+
+fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
+    Box::new(move |message| {
+        let msg = message.msg.raw();
+        if msg.get().len() <= MAX_ARGS {
+            let id = id_in(msg.get()).filter(|id| !id.is_empty());
+            forget.do_send(ForgetFrames::Published(id));
+        }
+    })
+}
+
+/// The id in an `actionlib_msgs/GoalID`.
+fn id_in(text: &str) -> Option<String> {
+    let [id] = json::members(text, &["id"]).ok()?;
+    Some(json::text(id?)?.into_owned())
+}

@@ -1,0 +1,240 @@
+//! A path through points with times: where the joints should be at every moment, and whether they are near enough.
+//!
+//! Between two points that both have velocities the path is the cubic that has them (Hermite's), so that velocities are
+//! continuous; between all others it is a straight line. With `s = (t - t₀)/h`, `h = t₁ - t₀`:
+//!
+//! ```text
+//! q(t) = (2s³ - 3s² + 1) q₀ + (s³ - 2s² + s) h v₀ + (3s² - 2s³) q₁ + (s³ - s²) h v₁
+//! ```
+//!
+//! **Invariant:** a path has at least one point, and its times increase; before the first and behind the last point the
+//! joints stand there, at rest.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+)]
+
+use super::arm::State;
+use super::pid::Setpoint;
+
+/// A point of a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Waypoint<const N: usize> {
+    /// When the joints should be there, from the start \[s\].
+    pub time: f64,
+    /// Joint positions \[rad\].
+    pub position: [f64; N],
+    /// Joint velocities \[rad/s\].
+    pub velocity: Option<[f64; N]>,
+}
+
+/// Why points make no path.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum PathError {
+    /// There is none.
+    #[error("points must have at least one entry")]
+    NoPoints,
+    /// A time is not behind the one before it, or the first is before the start.
+    #[error("points[{0}].time_from_start must be greater than that of the point before")]
+    Order(
+        /// The point.
+        usize,
+    ),
+}
+
+/// A path through points.
+#[derive(Debug, Clone, PartialEq)]
+pub struct JointPath<const N: usize> {
+    points: Vec<Waypoint<N>>,
+}
+
+impl<const N: usize> JointPath<N> {
+    /// The path through `points`, which begins at time 0 where the joints are: at `start`.
+    ///
+    /// # Errors
+    /// If there is no point, or the times do not increase.
+    pub fn new(start: Waypoint<N>, mut points: Vec<Waypoint<N>>) -> Result<Self, PathError> {
+        let first = points.first().ok_or(PathError::NoPoints)?;
+        if first.time < 0.0 {
+            return Err(PathError::Order(0));
+        }
+        let pairs = points.iter().zip(points.iter().skip(1));
+        if let Some(at) = pairs
+            .into_iter()
+            .position(|(one, next)| next.time <= one.time)
+        {
+            return Err(PathError::Order(at + 1));
+        }
+        if first.time > 0.0 {
+            let start = Waypoint { time: 0.0, ..start };
+            points.insert(0, start);
+        }
+        Ok(Self { points })
+    }
+
+    /// The time of the last point \[s\].
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.points.last().map_or(0.0, |last| last.time)
+    }
+
+    /// Where the joints should be, and how fast, `time` after the start \[s\].
+    #[must_use]
+    pub fn at(&self, time: f64) -> Setpoint<N> {
+        let behind = self.points.partition_point(|point| point.time <= time);
+        let before = behind.checked_sub(1).and_then(|at| self.points.get(at));
+        match (before, self.points.get(behind)) {
+            (Some(before), Some(next)) => between(before, next, time),
+            (Some(only), None) | (None, Some(only)) => at_rest(only.position),
+            (None, None) => {
+                debug_assert!(false, "a path has points");
+                at_rest([0.0; N])
+            }
+        }
+    }
+}
+
+fn at_rest<const N: usize>(position: [f64; N]) -> Setpoint<N> {
+    Setpoint {
+        position,
+        velocity: [0.0; N],
+    }
+}
+
+fn between<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>, time: f64) -> Setpoint<N> {
+    let h = next.time - before.time;
+    let s = (time - before.time) / h;
+    let (p0, p1) = (&before.position, &next.position);
+    let (Some(v0), Some(v1)) = (&before.velocity, &next.velocity) else {
+        return Setpoint {
+            position: std::array::from_fn(|i| p0[i] + s * (p1[i] - p0[i])),
+            velocity: std::array::from_fn(|i| (p1[i] - p0[i]) / h),
+        };
+    };
+    let (s2, s3) = (s * s, s * s * s);
+    Setpoint {
+        position: std::array::from_fn(|i| {
+            (2.0 * s3 - 3.0 * s2 + 1.0) * p0[i]
+                + (s3 - 2.0 * s2 + s) * h * v0[i]
+                + (3.0 * s2 - 2.0 * s3) * p1[i]
+                + (s3 - s2) * h * v1[i]
+        }),
+        velocity: std::array::from_fn(|i| {
+            6.0 * (s2 - s) * (p0[i] - p1[i]) / h
+                + (3.0 * s2 - 4.0 * s + 1.0) * v0[i]
+                + (3.0 * s2 - 2.0 * s) * v1[i]
+        }),
+    }
+}
+
+/// How far joints may be off; none where any distance will do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tolerance<const N: usize> {
+    /// \[rad\], at least 0.
+    pub position: [Option<f64>; N],
+    /// \[rad/s\], at least 0.
+    pub velocity: [Option<f64>; N],
+}
+
+impl<const N: usize> Tolerance<N> {
+    /// The same for all joints, of positions alone.
+    #[must_use]
+    pub const fn of_positions(position: Option<f64>) -> Self {
+        Self {
+            position: [position; N],
+            velocity: [None; N],
+        }
+    }
+
+    /// The first joint that is farther off than it may be.
+    #[must_use]
+    pub fn exceeded(&self, desired: &Setpoint<N>, actual: &State<N>) -> Option<Excess> {
+        let off = |wanted: &[f64; N], is: &[f64; N], limits: &[Option<f64>; N], quantity| {
+            (0..N).find_map(|joint| {
+                let limit = limits[joint]?;
+                let error = wanted[joint] - is[joint];
+                // An error that is no number is not within anything.
+                let is_within = error.abs() <= limit;
+                (!is_within).then_some(Excess {
+                    joint,
+                    quantity,
+                    error,
+                    limit,
+                })
+            })
+        };
+        off(
+            &desired.position,
+            &actual.position,
+            &self.position,
+            "position",
+        )
+        .or_else(|| {
+            off(
+                &desired.velocity,
+                &actual.velocity,
+                &self.velocity,
+                "velocity",
+            )
+        })
+    }
+}
+
+/// A joint that is farther off than it may be.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("{quantity} of joint{} is off by {error}, more than {limit}", .joint + 1)]
+pub struct Excess {
+    /// Index of the joint.
+    pub joint: usize,
+    /// `position` or `velocity`.
+    pub quantity: &'static str,
+    /// \[rad\] or \[rad/s\].
+    pub error: f64,
+    /// The same.
+    pub limit: f64,
+}
+
+/// A path with what is asked of those who follow it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Course<const N: usize> {
+    /// The path.
+    pub path: JointPath<N>,
+    /// How far off the joints may be on the way.
+    pub on_the_way: Tolerance<N>,
+    /// How far off they may be at its end.
+    pub at_the_end: Tolerance<N>,
+    /// How long after its end they may take for that \[s\].
+    pub patience: f64,
+}
+
+/// How those who follow a course stand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Standing {
+    /// They are on their way.
+    Underway,
+    /// They have arrived.
+    Arrived,
+    /// They have lost the path.
+    OffPath(Excess),
+    /// They have not arrived in time.
+    Late(Excess),
+}
+
+impl<const N: usize> Course<N> {
+    /// How the joints stand that are at `actual`, `time` after the start \[s\].
+    #[must_use]
+    pub fn judge(&self, time: f64, actual: &State<N>) -> Standing {
+        let desired = self.path.at(time);
+        let duration = self.path.duration();
+        if time < duration {
+            let excess = self.on_the_way.exceeded(&desired, actual);
+            return excess.map_or(Standing::Underway, Standing::OffPath);
+        }
+        match self.at_the_end.exceeded(&desired, actual) {
+            None => Standing::Arrived,
+            Some(excess) if time - duration > self.patience => Standing::Late(excess),
+            Some(_) => Standing::Underway,
+        }
+    }
+}

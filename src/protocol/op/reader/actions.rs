@@ -1,0 +1,73 @@
+//! The operations of actions: goals and cancellations from those who send them, the rest from those who pursue them.
+//!
+//! **Invariant:** an end has a status of `action_msgs/msg/GoalStatus`, also where its sender leaves that out.
+
+use serde_json::value::RawValue;
+
+use super::OpReader;
+use crate::protocol::catalog::Action;
+use crate::protocol::op::{ActionGoal, Op, Problem, PursuerOp};
+use crate::protocol::wire::json;
+use crate::protocol::wire::payload::Payload;
+
+/// The greatest status of a goal: aborted.
+const ABORTED: u8 = 6;
+/// The status of a goal that was reached.
+const SUCCEEDED: u8 = 4;
+
+impl OpReader<'_> {
+    pub(super) fn goal(&self) -> Result<ActionGoal, Problem> {
+        if let Some(id) = self.get("id") {
+            self.short("id", id.get())?;
+        }
+        let action = self.name("action")?;
+        let fields = Action::from_name(&action)
+            .filter(|action| !action.takes_long_goals())
+            .map(Action::goal_fields);
+        Ok(ActionGoal {
+            type_name: self.optional_text("action_type")?,
+            args: self.args(fields)?,
+            feedback: match self.get("feedback") {
+                Some(_) => self.boolean("feedback")?,
+                None => false,
+            },
+            action,
+        })
+    }
+
+    /// An operation of a client that pursues goals.
+    pub(super) fn pursuit(&self) -> Result<Op, Problem> {
+        let action = self.name("action")?;
+        let pursuit = match self.op {
+            "advertise_action" => PursuerOp::Advertise {
+                type_name: self.optional_text("type")?,
+            },
+            "unadvertise_action" => PursuerOp::Unadvertise,
+            "action_feedback" => {
+                self.required("id")?;
+                let values = self.required("values")?.into();
+                PursuerOp::Feedback { values }
+            }
+            _ => {
+                self.required("id")?;
+                let is_good = self.boolean("result")?;
+                PursuerOp::End {
+                    values: Payload::from(self.get("values").unwrap_or(RawValue::NULL)),
+                    status: self.goal_status(is_good)?,
+                    result: is_good,
+                }
+            }
+        };
+        Ok(Op::Pursue { action, pursuit })
+    }
+
+    fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
+        let Some(raw) = self.get("status") else {
+            return Ok(if is_good { SUCCEEDED } else { ABORTED });
+        };
+        let status = json::integer(raw).and_then(|status| u8::try_from(status).ok());
+        status
+            .filter(|status| *status <= ABORTED)
+            .ok_or_else(|| self.mistyped("status", "an integer from 0 to 6", raw))
+    }
+}

@@ -1,0 +1,103 @@
+//! Stamps under the names that ROS 1 has for their members too, for clients that know a topic by its type of ROS 1.
+//!
+//! **Invariant:** the members of ROS 2 stay as they are: some clients use ROS 1's name of a type for ROS 2's messages.
+
+use bytes::Bytes;
+
+use crate::protocol::names;
+
+/// How a stamp of ours begins, between its two numbers, and what the two are called in ROS 1.
+const SECONDS: &[u8] = b"\"sec\":";
+const NANOSECONDS: &[u8] = b",\"nanosec\":";
+
+/// Whether `asked` is ROS 1's name of a type of ROS 2: `std_msgs/Header` of `std_msgs/msg/Header`.
+#[must_use]
+pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
+    asked != type_name && asked == names::short_type(type_name)
+}
+
+/// A frame of ours in which every stamp has `secs` and `nsecs` beside `sec` and `nanosec`. A text can't look like a
+/// stamp: its quotes are escaped.
+#[must_use]
+pub fn with_ros1_names(frame: &[u8]) -> Bytes {
+    let mut text = Vec::with_capacity(2 * frame.len());
+    let mut rest = frame;
+    while let Some(stamp) = next_stamp(rest) {
+        let (before, behind) = rest.split_at(stamp.end);
+        text.extend_from_slice(before);
+        text.extend_from_slice(b",\"secs\":");
+        text.extend_from_slice(stamp.seconds);
+        text.extend_from_slice(b",\"nsecs\":");
+        text.extend_from_slice(stamp.nanoseconds);
+        rest = behind;
+    }
+    text.extend_from_slice(rest);
+    text.shrink_to_fit();
+    Bytes::from(text)
+}
+
+/// A stamp in a text.
+struct StampText<'a> {
+    /// Where it ends.
+    end: usize,
+    seconds: &'a [u8],
+    nanoseconds: &'a [u8],
+}
+
+/// The first stamp in `text`.
+fn next_stamp(text: &[u8]) -> Option<StampText<'_>> {
+    let mut from = 0;
+    loop {
+        let found = text.get(from..)?;
+        from += found
+            .windows(SECONDS.len())
+            .position(|one| one == SECONDS)?
+            + SECONDS.len();
+        let (seconds, behind) = number(text.get(from..)?);
+        let Some(behind) = behind.strip_prefix(NANOSECONDS) else {
+            continue;
+        };
+        let (nanoseconds, behind) = number(behind);
+        return Some(StampText {
+            end: text.len() - behind.len(),
+            seconds,
+            nanoseconds,
+        });
+    }
+}
+
+/// The number that a text begins with, and what is behind it.
+fn number(text: &[u8]) -> (&[u8], &[u8]) {
+    let is_part = |byte: &u8| byte.is_ascii_digit() || *byte == b'-';
+    let end = text.iter().position(|byte| !is_part(byte));
+    text.split_at(end.unwrap_or(text.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_stamp_gets_the_names_of_ros_1_beside_its_own() {
+        let stamps = |first: &str, second: &str| {
+            let text = r#""\"sec\":3,\"nanosec\":4""#;
+            format!(r#"{{"a":{{{first}}},"text":{text},"sec":7,"b":{{{second}}}}}"#)
+        };
+        let frame = stamps(r#""sec":-1,"nanosec":5"#, r#""sec":2,"nanosec":30"#);
+        let expected = stamps(
+            r#""sec":-1,"nanosec":5,"secs":-1,"nsecs":5"#,
+            r#""sec":2,"nanosec":30,"secs":2,"nsecs":30"#,
+        );
+        assert_eq!(with_ros1_names(frame.as_bytes()), expected.as_bytes());
+        for none in [&b""[..], b"{}", b"\"sec\":", b"\"sec\":1,\"nano"] {
+            assert_eq!(with_ros1_names(none), none);
+        }
+    }
+
+    #[test]
+    fn the_name_of_ros_1_has_no_middle_part() {
+        assert!(is_ros1_name("std_msgs/Header", "std_msgs/msg/Header"));
+        assert!(!is_ros1_name("std_msgs/msg/Header", "std_msgs/msg/Header"));
+        assert!(!is_ros1_name("std_msgs/String", "std_msgs/msg/Header"));
+    }
+}

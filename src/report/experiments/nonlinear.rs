@@ -1,0 +1,207 @@
+//! Stability beyond small deviations: moves of any amplitude, swings of any speed, and deviations from a periodic
+//! swing.
+//!
+//! A move or a swing is run and judged by what becomes of it. Deviations from a periodic swing are followed by the
+//! method's own derivative, step after step around the swing: the eigenvalues of the product are the method's Floquet
+//! multipliers. Two of the true ones are 1 (along the swing, and to the swing of a little more energy); the other
+//! pair says whether what is beside the swing stays there. Source: Guckenheimer and Holmes, *Nonlinear Oscillations*
+//! (1983), ch. 1.5.
+//!
+//! **Invariant:** no prediction enters a measurement.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "indices run over two joints and the four states of a 2-link arm"
+)]
+
+use std::f64::consts::FRAC_PI_2;
+
+use crate::math::arm::{Arm, State};
+use crate::math::dynamics::{energy, potential_energy};
+use crate::math::integrator::Method;
+use crate::math::pid::{Gains, Setpoint};
+use crate::math::simulation::step_under;
+use crate::study::control_loop::ControlLoop;
+use crate::study::matrix::{Complex, Matrix};
+
+/// Time of a move \[s\].
+const MOVE: f64 = 6.0;
+
+/// How near a joint must be at the end of a move \[rad\].
+const ARRIVED: f64 = 0.02;
+
+/// Time of a swing \[s\].
+const SWING: f64 = 4.0;
+
+/// The move of a 2-link arm from the starting pose, whose first joint turns by `amplitude` \[rad\], under the default
+/// gains.
+#[must_use]
+pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> {
+    let setpoint = Setpoint::at([amplitude, -0.75 * amplitude]);
+    ControlLoop::new(Arm::default(), Gains::default(), setpoint)
+        .with_method(method)
+        .with_timestep(timestep)
+}
+
+/// Whether a move arrives, and is there at its end.
+#[must_use]
+pub fn arrives(control: &ControlLoop<2>) -> bool {
+    let mut live = control.simulation(State::rest());
+    while live.time() < MOVE {
+        if !live.step() {
+            return false;
+        }
+    }
+    let (position, setpoint) = (live.state().position, control.setpoint.position);
+    (0..2).all(|i| (position[i] - setpoint[i]).abs() <= ARRIVED)
+}
+
+/// A free swing of a 2-link arm from the horizontal, turning at `spin` \[rad/s\].
+#[must_use]
+pub fn spun(spin: f64) -> State<2> {
+    State {
+        position: [0.0, 0.5],
+        velocity: [spin, 0.0],
+    }
+}
+
+/// Whether a free swing keeps its energy, above that of the hanging arm, below three times what it had.
+#[must_use]
+pub fn is_carried(start: &State<2>, method: Method, timestep: f64) -> bool {
+    let arm = Arm::<2>::default();
+    let lowest = potential_energy(&arm, &[-FRAC_PI_2, 0.0]);
+    let most = 3.0 * (energy(&arm, start) - lowest);
+    let control = ControlLoop::free(arm).with_method(method);
+    let mut live = control.with_timestep(timestep).simulation(*start);
+    while live.time() < SWING {
+        if !(live.step() && energy(&arm, live.state()) - lowest <= most) {
+            return false;
+        }
+    }
+    true
+}
+
+/// A swing of the free default arm that comes back to where it began: from rest, both links to one side, through the
+/// hanging pose to rest on the other side, and back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PeriodicSwing {
+    /// Where it is at rest.
+    pub start: State<2>,
+    /// Its period \[s\].
+    pub period: f64,
+}
+
+/// Steps to the hanging pose while a swing is looked for.
+const FINE: f64 = 1e-3;
+
+impl PeriodicSwing {
+    /// The swing whose first joint is `amplitude` \[rad\] off the hanging pose at rest; none if none is found near
+    /// the one of small amplitude.
+    #[must_use]
+    pub fn of(amplitude: f64) -> Option<Self> {
+        // Amplitudes of the slow mode of two equal rods: q₂ per q₁.
+        let (mut one, mut other) = (0.43 * amplitude, 0.45 * amplitude);
+        let mut off_one = through_hanging(amplitude, one)?.0;
+        for _ in 0..60 {
+            let (off, time) = through_hanging(amplitude, other)?;
+            if off.abs() < 1e-13 {
+                let position = [amplitude - FRAC_PI_2, other];
+                return Some(Self {
+                    start: State::at_rest(position),
+                    period: 4.0 * time,
+                });
+            }
+            let next = other - off * (other - one) / (off - off_one);
+            (one, off_one) = (other, off);
+            other = if next.is_finite() { next } else { return None };
+            if (other - one).abs() < 1e-15 {
+                other += 1e-14;
+            }
+        }
+        None
+    }
+
+    /// The Floquet multipliers of a method that takes `steps` steps to a period.
+    ///
+    /// The method's derivative is taken along the true swing, which is followed with far smaller steps.
+    #[must_use]
+    pub fn multipliers(&self, method: Method, steps: u32) -> Vec<Complex> {
+        const WITHIN: u32 = 32;
+        let arm = Arm::<2>::default();
+        let h = self.period / f64::from(steps);
+        let mut here = self.start;
+        let mut product = Matrix::from_fn(4, |i, j| f64::from(u8::from(i == j)));
+        for _ in 0..steps {
+            product = derivative(&arm, method, &here, h).product(&product);
+            for _ in 0..WITHIN {
+                let step = step_under(&arm, Method::Rk4, &here, &[0.0; 2], h / f64::from(WITHIN));
+                here = here.plus(&step);
+            }
+        }
+        product.eigenvalues()
+    }
+
+    /// The larger modulus of the pair that is not 1 of the true swing: the two farthest from 1.
+    #[must_use]
+    pub fn transverse(&self, method: Method, steps: u32) -> f64 {
+        let mut multipliers = self.multipliers(method, steps);
+        let from_one = |mu: &Complex| (mu.re - 1.0).hypot(mu.im);
+        multipliers.sort_by(|a, b| from_one(b).total_cmp(&from_one(a)));
+        multipliers
+            .iter()
+            .take(2)
+            .map(|mu| mu.modulus())
+            .fold(0.0, f64::max)
+    }
+}
+
+/// How far the second joint is off when the first comes through the hanging pose \[rad\], and when that is \[s\].
+fn through_hanging(amplitude: f64, second: f64) -> Option<(f64, f64)> {
+    let arm = Arm::<2>::default();
+    let mut state = State::at_rest([amplitude - FRAC_PI_2, second]);
+    let mut time = 0.0;
+    let advance =
+        |state: &State<2>, h: f64| state.plus(&step_under(&arm, Method::Rk4, state, &[0.0; 2], h));
+    while state.position[0] > -FRAC_PI_2 {
+        state = advance(&state, FINE);
+        time += FINE;
+        if time > 10.0 {
+            return None;
+        }
+    }
+    // Back to the instant itself, by Newton's method: each round leaves the square of what was off.
+    for _ in 0..6 {
+        let back = -(state.position[0] + FRAC_PI_2) / state.velocity[0];
+        state = advance(&state, back);
+        time += back;
+    }
+    Some((state.position[1], time))
+}
+
+/// How a step changes a deviation, by central differences.
+fn derivative(arm: &Arm<2>, method: Method, here: &State<2>, h: f64) -> Matrix {
+    const NUDGE: f64 = 1e-5;
+    let mut columns = Vec::new();
+    for column in 0..4 {
+        let nudged = |by: f64| {
+            let mut near = *here;
+            if column < 2 {
+                near.position[column] += by;
+            } else {
+                near.velocity[column - 2] += by;
+            }
+            let next = near.plus(&step_under(arm, method, &near, &[0.0; 2], h));
+            [
+                next.position[0],
+                next.position[1],
+                next.velocity[0],
+                next.velocity[1],
+            ]
+        };
+        let (above, below) = (nudged(NUDGE), nudged(-NUDGE));
+        columns.push(std::array::from_fn::<f64, 4, _>(|i| {
+            (above[i] - below[i]) / (2.0 * NUDGE)
+        }));
+    }
+    Matrix::from_fn(4, |row, column| columns[column][row])
+}

@@ -1,0 +1,141 @@
+//! Paths through points with times: they pass through their points, velocities are what positions do, and whether
+//! somebody follows is told rightly.
+
+use pendularm::math::arm::State;
+use pendularm::math::trajectory::{Course, JointPath, PathError, Standing, Tolerance, Waypoint};
+
+const START: Waypoint<2> = Waypoint {
+    time: 0.0,
+    position: [0.5, -0.5],
+    velocity: Some([0.1, 0.0]),
+};
+
+fn straight(time: f64, position: [f64; 2]) -> Waypoint<2> {
+    Waypoint {
+        time,
+        position,
+        velocity: None,
+    }
+}
+
+fn curved(time: f64, position: [f64; 2], velocity: [f64; 2]) -> Waypoint<2> {
+    Waypoint {
+        velocity: Some(velocity),
+        ..straight(time, position)
+    }
+}
+
+fn near(one: [f64; 2], other: [f64; 2], within: f64) -> bool {
+    one.iter().zip(other).all(|(a, b)| (a - b).abs() <= within)
+}
+
+#[test]
+fn a_path_passes_through_its_points_and_stands_before_and_behind_them() {
+    let points = vec![
+        curved(1.0, [1.0, 0.0], [0.3, -0.2]),
+        curved(1.5, [0.0, 2.0], [0.0, 0.0]),
+        straight(4.0, [3.0, 3.0]),
+    ];
+    let path = JointPath::new(START, points.clone()).unwrap();
+    assert_eq!(path.duration(), 4.0);
+    for point in points.iter().chain([&START]) {
+        let at = path.at(point.time);
+        assert_eq!(at.position, point.position);
+        if let Some(velocity) = point.velocity.filter(|_| point.time < 1.5) {
+            // A few units in the last place of the differences in the formula.
+            assert!(near(at.velocity, velocity, 1e-15), "{at:?}");
+        }
+    }
+    let end = path.at(9.0);
+    assert_eq!((end.position, end.velocity), ([3.0, 3.0], [0.0, 0.0]));
+    // A path that begins with its first point needs no start.
+    let path = JointPath::new(
+        START,
+        vec![straight(0.0, [1.0, 1.0]), straight(1.0, [2.0, 1.0])],
+    )
+    .unwrap();
+    assert_eq!(path.at(0.0).position, [1.0, 1.0]);
+    assert_eq!(path.at(-1.0).velocity, [0.0, 0.0]);
+}
+
+#[test]
+fn velocities_are_what_the_positions_do() {
+    let points = vec![
+        curved(0.7, [1.0, 0.0], [0.3, -0.2]),
+        curved(1.5, [0.0, 2.0], [-1.0, 4.0]),
+        straight(2.0, [3.0, 3.0]),
+    ];
+    let path = JointPath::new(START, points).unwrap();
+    for step in 1..200_u32 {
+        let (time, h) = (f64::from(step) / 100.0 + 0.003, 1e-6);
+        let (before, after) = (path.at(time - h).position, path.at(time + h).position);
+        let slope = [0, 1].map(|joint| (after[joint] - before[joint]) / (2.0 * h));
+        // Central differences of a cubic: h² times its third derivative, some 100, and rounding, 1e-16 / h.
+        let end = if time < 2.0 {
+            path.at(time).velocity
+        } else {
+            [0.0; 2]
+        };
+        assert!(near(slope, end, 2e-9), "{time}: {slope:?} {end:?}");
+    }
+}
+
+#[test]
+fn points_without_order_are_no_path() {
+    let path = |times: &[f64]| {
+        let points = times
+            .iter()
+            .map(|time| straight(*time, [0.0, 0.0]))
+            .collect();
+        JointPath::new(START, points).map(|path| path.duration())
+    };
+    assert_eq!(path(&[]), Err(PathError::NoPoints));
+    assert_eq!(path(&[-1.0]), Err(PathError::Order(0)));
+    assert_eq!(path(&[0.0, 1.0, 1.0]), Err(PathError::Order(2)));
+    assert_eq!(path(&[2.0, 1.0]), Err(PathError::Order(1)));
+    assert_eq!(path(&[0.0]), Ok(0.0));
+}
+
+#[test]
+fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
+    let course = Course {
+        path: JointPath::new(START, vec![straight(1.0, [0.5, 0.5])]).unwrap(),
+        on_the_way: Tolerance {
+            position: [Some(0.1), None],
+            velocity: [None, Some(2.0)],
+        },
+        at_the_end: Tolerance::of_positions(Some(0.01)),
+        patience: 0.5,
+    };
+    let at = |position: [f64; 2], velocity: [f64; 2]| State { position, velocity };
+    let rest = [0.0, 0.0];
+    assert_eq!(
+        course.judge(0.5, &at([0.55, 9.0], rest)),
+        Standing::Underway
+    );
+    let Standing::OffPath(excess) = course.judge(0.5, &at([0.25, 0.0], rest)) else {
+        panic!("joint 1 is off");
+    };
+    assert_eq!((excess.joint, excess.error, excess.limit), (0, 0.25, 0.1));
+    assert_eq!(
+        excess.to_string(),
+        "position of joint1 is off by 0.25, more than 0.1"
+    );
+    let Standing::OffPath(excess) = course.judge(0.5, &at([0.5, 0.0], [0.0, -2.0])) else {
+        panic!("joint 2 is too fast");
+    };
+    assert_eq!((excess.quantity, excess.joint), ("velocity", 1));
+    assert_eq!(
+        course.judge(1.0, &at([0.5, 0.505], [9.0, 9.0])),
+        Standing::Arrived
+    );
+    assert_eq!(course.judge(1.5, &at([0.5, 0.6], rest)), Standing::Underway);
+    assert!(matches!(
+        course.judge(1.6, &at([0.5, 0.6], rest)),
+        Standing::Late(_)
+    ));
+    assert!(matches!(
+        course.judge(0.5, &at([f64::NAN, 0.0], rest)),
+        Standing::OffPath(_)
+    ));
+}
