@@ -197,7 +197,7 @@ impl NodeEnds {
         Ok(())
     }
 
-    /// NodeEnds the record, if there is one, for a bounded time.
+    /// Ends the record, if there is one, for a bounded time.
     async fn finish_record(&self) {
         let _ = timeout(RECORD_TIME, self.end_record.send(EndRecord)).await;
     }

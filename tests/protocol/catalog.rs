@@ -187,86 +187,81 @@ fn the_services_are_those_of_the_contract() {
     assert_eq!(listed, expected);
 }
 
+/// Name, type, and which way it goes.
+const TOPICS: [(&str, &str, Direction); 17] = {
+    use Direction::{Published, Subscribed};
+    [
+        (
+            "/joint_trajectory",
+            "trajectory_msgs/msg/JointTrajectory",
+            Subscribed,
+        ),
+        ("/joint_states", "sensor_msgs/msg/JointState", Published),
+        ("/clock", "rosgraph_msgs/msg/Clock", Published),
+        (
+            "/diagnostics",
+            "diagnostic_msgs/msg/DiagnosticArray",
+            Published,
+        ),
+        (
+            "/ik_action/feedback",
+            "pendularm_interfaces/msg/IkFeedback",
+            Published,
+        ),
+        (
+            "/ik_action/result",
+            "pendularm_interfaces/msg/IkResult",
+            Published,
+        ),
+        (
+            "/ik_trial/status",
+            "pendularm_interfaces/msg/TrialStatus",
+            Published,
+        ),
+        ("/tf", "tf2_msgs/msg/TFMessage", Published),
+        ("/tf_static", "tf2_msgs/msg/TFMessage", Published),
+        (
+            "/tf2_web_republisher/frames",
+            "tf2_web_republisher/msg/TFArray",
+            Published,
+        ),
+        (
+            "/tf2_web_republisher/goal",
+            "tf2_web_republisher/msg/TFSubscriptionActionGoal",
+            Subscribed,
+        ),
+        (
+            "/tf2_web_republisher/cancel",
+            "actionlib_msgs/msg/GoalID",
+            Subscribed,
+        ),
+        (
+            "/tf2_web_republisher/feedback",
+            "tf2_web_republisher/msg/TFSubscriptionActionFeedback",
+            Published,
+        ),
+        ("/robot_description", "std_msgs/msg/String", Published),
+        (
+            "/robot_description_semantic",
+            "std_msgs/msg/String",
+            Published,
+        ),
+        ("/rosout", "rcl_interfaces/msg/Log", Published),
+        (
+            "/arm_sim/error_estimate",
+            "pendularm_interfaces/msg/ErrorEstimate",
+            Published,
+        ),
+    ]
+};
+
 #[test]
 fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
     let listed: Vec<_> = Topic::ALL
         .iter()
         .map(|topic| (topic.name(), topic.type_name(), topic.direction()))
         .collect();
-    assert_eq!(
-        listed,
-        [
-            (
-                "/joint_trajectory",
-                "trajectory_msgs/msg/JointTrajectory",
-                Direction::Subscribed
-            ),
-            (
-                "/joint_states",
-                "sensor_msgs/msg/JointState",
-                Direction::Published
-            ),
-            ("/clock", "rosgraph_msgs/msg/Clock", Direction::Published),
-            (
-                "/diagnostics",
-                "diagnostic_msgs/msg/DiagnosticArray",
-                Direction::Published
-            ),
-            (
-                "/ik_action/feedback",
-                "pendularm_interfaces/msg/IkFeedback",
-                Direction::Published
-            ),
-            (
-                "/ik_action/result",
-                "pendularm_interfaces/msg/IkResult",
-                Direction::Published
-            ),
-            (
-                "/ik_trial/status",
-                "pendularm_interfaces/msg/TrialStatus",
-                Direction::Published
-            ),
-            ("/tf", "tf2_msgs/msg/TFMessage", Direction::Published),
-            ("/tf_static", "tf2_msgs/msg/TFMessage", Direction::Published),
-            (
-                "/tf2_web_republisher/frames",
-                "tf2_web_republisher/msg/TFArray",
-                Direction::Published
-            ),
-            (
-                "/tf2_web_republisher/goal",
-                "tf2_web_republisher/msg/TFSubscriptionActionGoal",
-                Direction::Subscribed
-            ),
-            (
-                "/tf2_web_republisher/cancel",
-                "actionlib_msgs/msg/GoalID",
-                Direction::Subscribed
-            ),
-            (
-                "/tf2_web_republisher/feedback",
-                "tf2_web_republisher/msg/TFSubscriptionActionFeedback",
-                Direction::Published
-            ),
-            (
-                "/robot_description",
-                "std_msgs/msg/String",
-                Direction::Published
-            ),
-            (
-                "/robot_description_semantic",
-                "std_msgs/msg/String",
-                Direction::Published
-            ),
-            ("/rosout", "rcl_interfaces/msg/Log", Direction::Published),
-            (
-                "/arm_sim/error_estimate",
-                "pendularm_interfaces/msg/ErrorEstimate",
-                Direction::Published
-            ),
-        ]
-    );
+    assert_eq!(listed, TOPICS);
 }
 
 #[test]

@@ -29,7 +29,7 @@ FAULTS = [
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));",
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));\n"
      "        let last = self.topics.len() - 1;\n        if last > 1 && R(4) { self.topics.swap(last - 1, last); }"),
-    ("two messages of a client's are swapped before anybody has them, one in 100", f"{REGISTRY}/fan_out.rs",
+    ("two messages of a client's are swapped before anybody has them, one in 20", f"{REGISTRY}/fan_out.rs",
      "            let plain = self.count(encode(spelling));",
      "            let mut plain = encode(spelling);\n"
      "            let first = series::first_message(&plain);\n"

@@ -32,6 +32,7 @@ const LIVENESS: Duration = Duration::from_secs(40);
 const EMPTY: Duration = Duration::from_secs(100);
 /// Bytes in a pipe, and in a write, without which what a flood brings would be on its way for too long.
 const FLOODED_ROOM: usize = 4096;
+const FLOODED_PIECE: usize = 100;
 /// Processor time that everybody's turns after one deed may take, however slow the machine is.
 const STANDSTILL: Duration = Duration::from_secs(2);
 /// How much more than the limit clients hold at most until whoever gives way is gone.
@@ -243,21 +244,25 @@ impl Course {
         self.court.note("burst", format!("{burst:?}").as_bytes());
         let at = self.somebody();
         match burst {
-            // A message every few milliseconds: what a throttle lets through too early is offered to it.
+            // A message in the second half of each interval: what a throttle may let through too early.
             Burst::Stream => {
                 let who = self.honest[at].who;
-                let (count, apart) = (10 + self.court.below(40), 5 + self.court.below(30));
+                let count = 10 + self.court.below(20);
                 for _ in 0..count {
                     if self.honest[at].who != who || !self.honest[at].is_active() {
                         return;
                     }
-                    self.desk(at).stream();
-                    self.pass(Duration::from_millis(apart as u64)).await;
+                    let interval = self.desk(at).stream();
+                    let apart = interval.mul_f64(0.55 + 0.4 * self.court.fraction());
+                    self.pass(apart).await;
                 }
             }
             // More than an outbox holds, while somebody does not read.
             Burst::Flood => {
-                if self.plan.scarce || self.plan.room.min(self.plan.piece) < FLOODED_ROOM {
+                if self.plan.scarce
+                    || self.plan.room < FLOODED_ROOM
+                    || self.plan.piece < FLOODED_PIECE
+                {
                     return;
                 }
                 if let Some(deaf) = self.desk(at).flood() {

@@ -360,14 +360,17 @@ impl Desk<'_> {
         self.me().flush();
     }
 
-    /// One message, on a topic whose messages are throttled for somebody, if there is such.
-    pub fn stream(&mut self) {
+    /// One message, on a topic whose messages are throttled for somebody, if there is such; gives the least time between two.
+    pub fn stream(&mut self) -> Duration {
         let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
-        let throttled = subscriptions.filter(|one| one.throttle.is_some());
-        let topic = throttled.map(|one| one.topic.clone()).min();
-        let topic = topic.unwrap_or_else(|| TOPICS[0].to_owned());
+        let throttled = subscriptions
+            .filter_map(|one| one.throttle.map(|interval| (interval, one.topic.clone())))
+            .max();
+        let (interval, topic) =
+            throttled.unwrap_or_else(|| (Duration::from_millis(20), TOPICS[0].to_owned()));
         self.advertise(&topic);
         self.publish_on(&topic, 1, |desk| desk.payload(0));
+        interval
     }
 
     /// More than an outbox holds, for another client that subscribes to it; gives that one's place.
@@ -388,6 +391,11 @@ impl Desk<'_> {
             (place != self.at && one.is_active()).then(|| (place, plain.topic.clone()))
         };
         let (deaf, topic) = self.all.iter().enumerate().find_map(listens)?;
+        // Nobody takes so much at once: some of it may be dropped for those who read, too, and has to be counted.
+        for one in self.all.iter_mut() {
+            let mut all = one.subscriptions.values();
+            one.is_hampered |= all.any(|one| one.topic == topic);
+        }
         self.advertise(&topic);
         self.court.count("floods");
         let long = format!("\"{}\"", "x".repeat(FLOODING));

@@ -169,7 +169,9 @@ fn a_limit_divides_decay_from_growth<const N: usize>(case: u64, tally: &mut Tall
         }
     };
     let rates = linear.flow().eigenvalues().into_iter();
-    let fastest = rates.map(|rate| rate.modulus()).fold(0.0, f64::max);
+    let fastest = rates
+        .map(pendularm::study::matrix::Complex::modulus)
+        .fold(0.0, f64::max);
     match limit_held(&control) {
         Some(0.0) => judge(0.02 / fastest, true),
         Some(limit) => {

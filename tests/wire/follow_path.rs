@@ -149,10 +149,8 @@ fn a_goal_ends_with_a_cancellation_or_when_its_setpoint_is_gone() {
     assert_eq!(client.status()["level"], "error");
 }
 
-#[test]
-fn a_goal_that_is_none_is_refused_by_its_field() {
-    let runtime = Runtime::start();
-    let mut client = runtime.connect();
+/// Goals that are none, each with how its refusal begins.
+fn unfit_goals() -> Vec<(Value, &'static str)> {
     let good = point([0.1, 0.1], 1.0);
     let many = vec![good.clone(); MAX_POINTS + 1];
     let with = |field: &str, value: Value| {
@@ -165,7 +163,7 @@ fn a_goal_that_is_none_is_refused_by_its_field() {
         args["goal_tolerance"] = json!([one]);
         args
     };
-    for (args, why) in [
+    vec![
         (json!({}), "trajectory is required"),
         (json!({"trajectory": 3}), "trajectory must be an object"),
         (
@@ -216,7 +214,14 @@ fn a_goal_that_is_none_is_refused_by_its_field() {
             tolerance(json!({"name": "joint1", "position": "x"})),
             "goal_tolerance[0].position must be a number",
         ),
-    ] {
+    ]
+}
+
+#[test]
+fn a_goal_that_is_none_is_refused_by_its_field() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for (args, why) in unfit_goals() {
         client.send(&goal("x", &args));
         let end = result(&mut client);
         assert_eq!(
@@ -228,9 +233,12 @@ fn a_goal_that_is_none_is_refused_by_its_field() {
         assert!(text.starts_with(why), "{text}");
     }
     client.send_text(
-        &goal("x", &with("positions", json!(["N", 0])))
-            .to_string()
-            .replace("\"N\"", "1e999"),
+        &goal(
+            "x",
+            &through(&[json!({"positions": ["N", 0], "time_from_start": {"sec": 1}})]),
+        )
+        .to_string()
+        .replace("\"N\"", "1e999"),
     );
     let end = result(&mut client);
     assert_eq!(

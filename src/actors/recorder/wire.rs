@@ -25,7 +25,7 @@ impl<const N: usize> Recorder<N> {
 impl Callable for StartRecording {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
-        let name = fields.text("name").map(|name| name.into_owned());
+        let name = fields.text("name").map(std::borrow::Cow::into_owned);
         if name.as_ref().is_some_and(|name| !is_file_name(name)) {
             let rule = format!(
                 "must be 1 to {MAX_FILE_NAME} letters, digits, `.`, `-` and `_`, the first one not `.`"

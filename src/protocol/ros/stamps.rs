@@ -22,13 +22,13 @@ pub fn is_ros1_name(asked: &str, type_name: &str) -> bool {
 pub fn with_ros1_names(frame: &[u8]) -> Bytes {
     let mut text = Vec::with_capacity(2 * frame.len());
     let mut rest = frame;
-    while let Some((upto, stamp)) = next_stamp(rest) {
+    while let Some((upto, seconds, nanoseconds)) = next_stamp(rest) {
         let (before, behind) = rest.split_at(upto);
         text.extend_from_slice(before);
         text.extend_from_slice(b",\"secs\":");
-        text.extend_from_slice(stamp.0);
+        text.extend_from_slice(seconds);
         text.extend_from_slice(b",\"nsecs\":");
-        text.extend_from_slice(stamp.1);
+        text.extend_from_slice(nanoseconds);
         rest = behind;
     }
     text.extend_from_slice(rest);
@@ -37,7 +37,7 @@ pub fn with_ros1_names(frame: &[u8]) -> Bytes {
 }
 
 /// The end of the first stamp in `text`, and its two numbers.
-fn next_stamp(text: &[u8]) -> Option<(usize, (&[u8], &[u8]))> {
+fn next_stamp(text: &[u8]) -> Option<(usize, &[u8], &[u8])> {
     let mut from = 0;
     loop {
         let found = text.get(from..)?;
@@ -50,7 +50,7 @@ fn next_stamp(text: &[u8]) -> Option<(usize, (&[u8], &[u8]))> {
             continue;
         };
         let (nanoseconds, behind) = number(behind);
-        return Some((text.len() - behind.len(), (seconds, nanoseconds)));
+        return Some((text.len() - behind.len(), seconds, nanoseconds));
     }
 }
 

@@ -42,7 +42,7 @@ fn requests<const N: usize>(
             let follow = follow.clone();
             let is_long = arguments.payload().get().len() > LONG_ARGUMENTS;
             let read = move || match FollowGoal::read(&arguments, &joint_names::<N>()) {
-                Ok(goal) => follow.do_send(path(goal, follower, done)),
+                Ok(goal) => follow.do_send(path(&goal, follower, done)),
                 Err(rejections) => follower.refuse(&rejections.status()),
             };
             if is_long {
@@ -56,7 +56,11 @@ fn requests<const N: usize>(
 }
 
 /// The goal for an arm of `N` links; the reader has checked how many values there are.
-fn path<const N: usize>(goal: FollowGoal, mut follower: GoalFollower, done: Done) -> FollowPath<N> {
+fn path<const N: usize>(
+    goal: &FollowGoal,
+    mut follower: GoalFollower,
+    done: Done,
+) -> FollowPath<N> {
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let points = goal.points.iter().map(|point| Waypoint {
         time: point.time,

@@ -201,29 +201,10 @@ impl Registry {
     }
 
     fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {
-        let Some(client) = self.clients.get_mut(&origin.from) else {
-            return Ok(());
-        };
-        let held: usize = client.subscriptions.values().map(Vec::len).sum();
-        let topic = subscribe.topic.as_str();
         let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
-        if id.as_ref().is_some_and(|id| id.len() > MAX_NAME) {
-            return Err(Refusal::LongSubscriptionId(MAX_NAME));
-        }
-        let known = client
-            .subscriptions
-            .get(topic)
-            .is_some_and(|all| all.iter().any(|one| one.id == id));
-        if !known && held >= MAX_SUBSCRIPTIONS {
-            return Err(Refusal::TooManySubscriptions);
-        }
+        self.may_subscribe(origin.from, id.as_deref(), subscribe)?;
+        let topic = subscribe.topic.as_str();
         let absolute = names::absolute(topic);
-        if subscribe.encoding.compression == Compression::CborRaw {
-            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
-            if type_name.and_then(types::find).is_none() {
-                return Err(Refusal::UnknownType);
-            }
-        }
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
         let size = match subscribe.encoding.fragment_size {
@@ -272,6 +253,33 @@ impl Registry {
             self.tell_owner(topic, true);
         } else if new {
             self.deliver_latched(&shared, origin.from);
+        }
+        Ok(())
+    }
+
+    fn may_subscribe(
+        &self,
+        from: ConnectionId,
+        id: Option<&str>,
+        subscribe: &Subscribe,
+    ) -> Result<(), Refusal> {
+        if id.is_some_and(|id| id.len() > MAX_NAME) {
+            return Err(Refusal::LongSubscriptionId(MAX_NAME));
+        }
+        let topic = subscribe.topic.as_str();
+        if let Some(client) = self.clients.get(&from) {
+            let of_topic = client.subscriptions.get(topic).into_iter().flatten();
+            let is_new = !of_topic.into_iter().any(|one| one.id.as_deref() == id);
+            let held = || client.subscriptions.values().map(Vec::len).sum::<usize>();
+            if is_new && held() >= MAX_SUBSCRIPTIONS {
+                return Err(Refusal::TooManySubscriptions);
+            }
+        }
+        if subscribe.encoding.compression == Compression::CborRaw {
+            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
+            if type_name.and_then(types::find).is_none() {
+                return Err(Refusal::UnknownType);
+            }
         }
         Ok(())
     }
