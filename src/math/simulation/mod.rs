@@ -143,7 +143,7 @@ impl<const N: usize> Simulation<N> {
         if self.divergence.is_some() {
             return 0;
         }
-        // Asked once for all steps: in every one it would cost as much as it saves.
+        // Asked once for all steps.
         if leaves_out_first_angle(&self.arm) {
             self.take_steps::<false>(steps, observe)
         } else {
