@@ -8,9 +8,13 @@ use pendularm::actors::compute::study::Study;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::registry::Attach;
 use pendularm::actors::node::ask;
+#[cfg(feature = "record")]
+use pendularm::actors::recorder::Recorder;
+use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{
     ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, Rosapi, SetParam,
 };
+use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
@@ -80,8 +84,18 @@ fn every_service_that_is_listed_is_served() {
         Study::attach(&study, &mut nodes);
         Integration::attach(&Integration::new(pool).start(), &mut nodes);
         let parameters = ArmParameters::of(&arm);
+        Parameters::attach(&Parameters::new(parameters.clone()).start(), &mut nodes);
         let rosapi = Rosapi::new(gateway.registry.clone().recipient(), parameters).start();
         Rosapi::attach(&rosapi, &mut nodes);
+        let (pose, time) = (arm.clone().recipient(), arm.clone().recipient());
+        let frames = TfRepublisher::new(pose, time, publish()).start();
+        TfRepublisher::attach(&frames, &mut nodes);
+        #[cfg(feature = "record")]
+        {
+            let registry = gateway.registry.clone().recipient();
+            let recorder = Recorder::<2>::new(arm.recipient(), registry, None, 1).start();
+            Recorder::attach(&recorder, &mut nodes);
+        }
         let questions = catalog::Rosapi::ALL.map(Service::Rosapi);
         for service in Service::ALL.into_iter().chain(questions) {
             assert!(nodes.services.contains_key(&service), "{service:?}");

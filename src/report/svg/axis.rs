@@ -220,7 +220,7 @@ pub(crate) fn number(value: f64) -> String {
 
 /// A size that may be anything: `2.3·10⁻⁹`, or plain where that is short.
 pub(crate) fn scientific(value: f64) -> String {
-    if (0.01..1e4).contains(&value.abs()) {
+    if value == 0.0 || (0.01..1e4).contains(&value.abs()) {
         return number(value);
     }
     mantissa_and_power(value)

@@ -173,13 +173,7 @@ fn cancelling_another_goal_or_a_malformed_id_is_rejected_without_side_effects() 
         let old = client.send_goal(elsewhere()).await;
         let active = client.send_goal(elsewhere()).await;
         client.heard.clear();
-        for goal_id in [
-            json!(old),
-            json!(""),
-            json!(7),
-            json!(null),
-            json!([active]),
-        ] {
+        for goal_id in [json!(old), json!(""), json!(7), json!([active])] {
             let response = client.call(CANCEL, json!({"goal_id": goal_id})).await;
             assert_eq!(response["result"], false);
             assert_eq!(response["values"], json!({}));
