@@ -11,8 +11,8 @@
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::gateway::connection::gate::{Admission, Gate};
+use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::op::token::Token;
 use pendularm::web::Door;
 use pendularm::web::access::Access;

@@ -17,9 +17,9 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use arbitrary::Arbitrary;
-use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::gateway::connection::gate::Gate;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
+use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
 use pendularm::web::serve::TAKE_TIME;
 use pendularm_client::websocket;

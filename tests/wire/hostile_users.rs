@@ -263,7 +263,7 @@ fn an_answer_after_the_timeout_or_a_second_one_reaches_nobody() {
 
 /// Ops that a runtime sends are none that a client may send on to others.
 #[test]
-fn what_only_the_runtime_says_is_an_unknown_op_from_a_client() {
+fn what_only_the_runtime_says_of_its_action_is_refused_from_a_client() {
     let runtime = Runtime::start();
     let (mut client, mut stranger) = (runtime.connect(), runtime.connect());
     let args = json!({"x": 0.5, "y": 1.2});
@@ -272,16 +272,17 @@ fn what_only_the_runtime_says_is_an_unknown_op_from_a_client() {
         "action_type": "pendularm_interfaces/action/MoveTo", "args": args}),
     );
     client.settle();
-    for op in [
-        "action_result",
-        "action_feedback",
-        "status",
-        "advertise_action",
-        "cancel_goal",
+    for (op, why) in [
+        ("action_result", "g"),
+        ("action_feedback", "g"),
+        ("status", "op"),
+        ("advertise_action", "/ik_action"),
+        ("cancel_goal", "op"),
     ] {
         stranger.send(&json!({"op": op, "id": "g", "action": "/ik_action", "topic": "/ik_action",
             "type": "x/Y", "level": "error", "msg": "forged", "values": {}, "status": 4, "result": true}));
-        assert!(error(&mut stranger).contains("op"));
+        let refusal = error(&mut stranger);
+        assert!(refusal.contains(why), "{op}: {refusal}");
     }
     // The same id is the stranger's own matter.
     for id in [json!("g"), json!(null), json!(["g"])] {

@@ -120,7 +120,8 @@ fn show(what: &str, phases: &mut [Phase], samples: fn(&mut Phase) -> &mut Vec<f6
 }
 
 fn watch(program: &str, length: Duration, beside: Beside) -> Phase {
-    let runtime = Program::start(program, &["--bind", "127.0.0.1:0", "--log", "off"]).expect("the runtime starts");
+    let runtime = Program::start(program, &["--bind", "127.0.0.1:0", "--log", "off"])
+        .expect("the runtime starts");
     let over = AtomicBool::new(false);
     let computed = AtomicU64::new(0);
     let mut phase = Phase::default();
@@ -141,9 +142,15 @@ fn watch(program: &str, length: Duration, beside: Beside) -> Phase {
         }
         // Past the start, and in the midst of a computation.
         std::thread::sleep(Duration::from_secs(1));
-        let states = connect(&runtime, b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n");
+        let states = connect(
+            &runtime,
+            b"{\"op\":\"subscribe\",\"topic\":\"/joint_states\"}\n",
+        );
         let states = scope.spawn(|| joint_states(states, &over));
-        let health = connect(&runtime, b"{\"op\":\"subscribe\",\"topic\":\"/diagnostics\"}\n");
+        let health = connect(
+            &runtime,
+            b"{\"op\":\"subscribe\",\"topic\":\"/diagnostics\"}\n",
+        );
         let health = scope.spawn(|| diagnostics(health, &over));
         phase.calls = calls(connect(&runtime, b""), length);
         over.store(true, Ordering::Relaxed);
