@@ -33,7 +33,7 @@ pub fn arm<const N: usize>(
     })
 }
 
-/// Topics, calls and answers; none for one that is longer than [`MAX_RECORDED_FRAME`](super::limits::MAX_RECORDED_FRAME).
+/// Topics, calls and answers; none for one that is longer than [`MAX_RECORDED_FRAME`].
 #[must_use]
 pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesdropper {
     Box::new(move |what| {
