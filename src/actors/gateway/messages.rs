@@ -232,13 +232,15 @@ pub enum Frames {
     /// Frames in another form, made when the client has room. Where throttling keeps only so many, the others but the
     /// first need not come.
     Encoded(Arc<Encoded>, Option<usize>),
+    /// Feedback of a goal: it waits for no message that is to be encoded, as the goal's result does not either.
+    Feedback(Bytes),
 }
 
 impl Frames {
     /// How long they are as they came, in bytes.
     pub(super) fn plain_length(&self) -> usize {
         match self {
-            Self::Plain(frame) => frame.len(),
+            Self::Plain(frame) | Self::Feedback(frame) => frame.len(),
             Self::Encoded(encoded, _) => encoded.plain_length(),
         }
     }

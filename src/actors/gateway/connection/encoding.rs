@@ -19,9 +19,10 @@ const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
 
 impl Outgoing {
     /// Takes topic messages for the client: into the outbox if they are ready and nothing waits to be encoded, else
-    /// behind what does.
+    /// behind what does. Feedback of a goal is always ready.
     pub(super) fn accept(self: &Rc<Self>, message: Deliver) {
-        if !self.is_encoding() && self.pass(&message) {
+        let waits = self.is_encoding() && !matches!(message.frames, Frames::Feedback(_));
+        if !waits && self.pass(&message) {
             return;
         }
         let mut unencoded = self.unencoded.borrow_mut();
@@ -39,7 +40,9 @@ impl Outgoing {
     /// Puts messages that are ready into the outbox; returns false if these are not.
     fn pass(&self, message: &Deliver) -> bool {
         match &message.frames {
-            Frames::Plain(frame) => self.push(&message.topic, frame.clone()),
+            Frames::Plain(frame) | Frames::Feedback(frame) => {
+                self.push(&message.topic, frame.clone());
+            }
             Frames::Encoded(encoded, newest) => {
                 let Some(frames) = encoded.at_hand() else {
                     return false;

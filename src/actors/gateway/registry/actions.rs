@@ -120,7 +120,7 @@ impl Handler<Feedback> for Registry {
         if let Some(client) = self.clients.get(&feedback.connection) {
             client.outlets.deliver.do_send(Deliver {
                 topic: feedback.action,
-                frames: Frames::Plain(self.count(feedback.frame)),
+                frames: Frames::Feedback(self.count(feedback.frame)),
                 underway: None,
             });
         }

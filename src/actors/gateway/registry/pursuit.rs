@@ -196,7 +196,7 @@ impl Registry {
             let frame = messages::action_feedback_raw(&goal.action, goal.id.as_ref(), values);
             sender.outlets.deliver.do_send(Deliver {
                 topic: Arc::clone(&goal.action),
-                frames: Frames::Plain(self.count(frame)),
+                frames: Frames::Feedback(self.count(frame)),
                 underway: None,
             });
         }
