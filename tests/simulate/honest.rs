@@ -119,8 +119,6 @@ pub struct Honest {
     pub advertised: BTreeSet<String>,
     /// Messages that it has published: each with the number of its frame.
     pub published: BTreeMap<u64, u64>,
-    /// Goals whose results have come.
-    pub ended_goals: BTreeSet<String>,
     /// Bytes of frames that go out with the next one, in one write.
     together: Vec<u8>,
     /// Frames that it has sent, and up to which they are known to have been handled.
@@ -161,7 +159,6 @@ impl Honest {
             watched: BTreeSet::new(),
             advertised: BTreeSet::new(),
             published: BTreeMap::new(),
-            ended_goals: BTreeSet::new(),
             together: Vec::new(),
             frames: 0,
             handled: 0,
