@@ -65,7 +65,10 @@ impl Ledger {
                 pending.service, response["service"]
             ));
         }
-        let shaped = response["values"].is_object() && response["result"].is_boolean();
+        // Over WebSocket a refusal has its text there.
+        let values = &response["values"];
+        let is_refusal = response["result"] == false && values.is_string();
+        let shaped = (values.is_object() || is_refusal) && response["result"].is_boolean();
         if !shaped || !response["status"].is_string() {
             return Err(format!(
                 "{id} of {}: not the shape of a response",
