@@ -63,15 +63,14 @@ fn read(bytes: &[u8]) -> Option<Head<'_>> {
     let bare = String::from_utf8_lossy(head).replace("\r\n", "");
     let mut is_plain = head.is_ascii() && end <= 8 * 1024 && !bare.contains(['\r', '\n']);
     // A value may hold any byte: what is no text is not what is looked for, but stands there.
-    let split = head.split(|&byte| byte == b'\n').map(|line| {
+    let mut lines = head.split(|&byte| byte == b'\n').map(|line| {
         let line = line.strip_suffix(b"\r").unwrap_or(line);
-        let is_text = std::str::from_utf8(line).is_ok();
-        (String::from_utf8_lossy(line).into_owned(), is_text)
+        match std::str::from_utf8(line) {
+            Ok(line) => (line, true),
+            // Such lines are few and short, and the fuzzer's process is soon over.
+            Err(_) => (&*String::from_utf8_lossy(line).into_owned().leak(), false),
+        }
     });
-    let split: Vec<(String, bool)> = split.collect();
-    let mut lines = split
-        .iter()
-        .map(|(line, is_text)| (line.as_str(), *is_text));
     let first = lines.next()?.0.strip_prefix("GET ")?;
     let (target, version) = first.split_once(' ').unwrap_or((first, ""));
     is_plain &= matches!(version, "HTTP/1.1" | "HTTP/1.0");
