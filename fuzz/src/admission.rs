@@ -89,7 +89,11 @@ fn read(bytes: &[u8]) -> Option<Head<'_>> {
         let value = value.trim_matches([' ', '\t']);
         headers.push((
             name.to_ascii_lowercase(),
-            if is_text { value } else { NO_TEXT },
+            if is_text || name.eq_ignore_ascii_case("cookie") {
+                value
+            } else {
+                NO_TEXT
+            },
         ));
     }
     is_plain &= headers.len() <= 32;
