@@ -95,7 +95,8 @@ fn pending_calls_are_told_that_the_program_is_shutting_down() {
     for _ in 0..5 {
         provider.receive();
     }
-    std::thread::sleep(Duration::from_millis(100));
+    // A connection's calls are taken in order: all have come when a light one is answered.
+    caller.settle();
     ends_on(&mut runtime, "INT");
     let frames = rest(&mut caller);
     let mut ids: Vec<u64> = frames
@@ -136,6 +137,7 @@ fn ends_while(links: usize, clients: usize, state: impl Fn(&mut Client)) {
     for client in &mut kept {
         state(client);
     }
+    // Nothing is answered in some of these states, so there is no event to wait for; the program must end at any time.
     std::thread::sleep(Duration::from_millis(300));
     ends_on(&mut runtime, "TERM");
 }
