@@ -44,7 +44,7 @@ fn evaluations_are_counted_and_not_reckoned() {
     }
 }
 
-/// What is timed (the live arm's stepper) and what is judged (the counted steps) are the same steps: the sum of the last
+/// The steps that are timed (the live arm's stepper) and those that are judged (the counted steps) are the same: the sum of the last
 /// angles says so for every scene, to the last bit.
 #[test]
 fn the_steps_that_are_timed_are_the_steps_that_are_judged() {
