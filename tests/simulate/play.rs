@@ -382,10 +382,10 @@ impl Course {
             Fault::Jump => {
                 // What is under way arrives first: a jump within a frame is a frame that took too long.
                 self.resume();
-                self.world.turns(300).await;
+                self.world.until_quiet().await;
                 self.look();
                 // So do the answers that providers have just given; they give no others until then.
-                self.world.turns(300).await;
+                self.world.until_quiet().await;
                 self.listen(false);
                 let time =
                     Duration::from_millis(self.court.among(&[250, 300, 1000, 9_000, 14_000]));
