@@ -508,7 +508,8 @@ impl Course {
             court.at_most("most turns that a computation waits", taken);
             let clients = (self.honest.len() + self.hostile.len()) as u64;
             // Where nothing is long on its way, what is over in a few turns has them soon, whatever others compute.
-            let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 100;
+            // In small pieces a client's own frames hold up its next one.
+            let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 1 << 16;
             let is_short = matches!(next.expect, Expect::Computed(Computed::Particle { .. }));
             let each = if is_wide && is_short {
                 court.at_most("most turns that a short one waits", taken);
