@@ -710,9 +710,13 @@ impl Course {
 /// Whether the last message that came is the last that somebody sent.
 fn has_newest(one: &crate::honest::Subscription) -> bool {
     let last = one.last.map(|(number, _)| number);
+    // Sent before the subscription, or by a client that is gone: it may be handled behind newer ones of others.
+    let is_from_before = one
+        .last_from
+        .is_some_and(|from| !one.newest.contains_key(&from));
     one.phase != Phase::On
         || one.newest.is_empty()
-        || one.is_last_from_before
+        || is_from_before
         || one.newest.values().any(|newest| Some(*newest) <= last)
 }
 
