@@ -161,7 +161,10 @@ impl<R: Read + Seek> Reel<R> {
             self.duration = self.duration.max(since);
             if self.channels.inputs == Some(header.channel_id) {
                 match cdr_reader::decode(INPUT, &data) {
-                    Ok(input) => noted(self.duration, input["input"].as_str().unwrap_or_default()),
+                    Ok(input) => {
+                        let note = input.get("input").and_then(Value::as_str);
+                        noted(self.duration, note.unwrap_or_default());
+                    }
                     Err(why) => fault = Some(why),
                 }
             } else if let Some((topic, _)) = self.channels.topics.get(&header.channel_id) {

@@ -13,6 +13,7 @@ use std::fs::File;
 use std::time::Duration;
 
 use actix::prelude::*;
+use serde_json::Value;
 use tokio::time::Instant;
 
 use self::settings::{RecordedSettings, SettingsFollower};
@@ -175,9 +176,10 @@ impl<const N: usize> Handler<SimulationTime> for Player<N> {
         let mut time = 0.0;
         self.attempt(|player| {
             if let Some(clock) = player.present(&BTreeSet::from([Topic::Clock]))?.first() {
-                let clock = &clock.message()?["clock"];
-                let part = |name: &str| clock[name].as_f64().unwrap_or_default();
-                time = part("sec") + 1e-9 * part("nanosec");
+                let clock = clock.message()?;
+                let part = |path: &str| clock.pointer(path).and_then(Value::as_f64);
+                let part = |path: &str| part(path).unwrap_or_default();
+                time = part("/clock/sec") + 1e-9 * part("/clock/nanosec");
             }
             Ok(())
         });
