@@ -86,7 +86,7 @@ struct ChunkPlace {
     to: u64,
 }
 
-/// What is known of the file's channels.
+/// The file's channels, as far as their types are known.
 #[derive(Default)]
 struct Channels {
     schemas: HashMap<u16, Option<Type>>,

@@ -4,8 +4,8 @@
 //! **Invariant:** nothing can be changed but the place in the record and the speed.
 
 mod arm;
+mod launch;
 mod settings;
-mod start;
 mod wire;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -16,8 +16,8 @@ use actix::prelude::*;
 use serde_json::Value;
 use tokio::time::Instant;
 
+pub use self::launch::{NotReplayed, start};
 use self::settings::{RecordedSettings, SettingsFollower};
-pub use self::start::{NotReplayed, start};
 pub use self::wire::list_only_what_is_served;
 use crate::actors::arm::sim::SimulationTime;
 use crate::actors::node::{Ask, Call, Interest, Publish};

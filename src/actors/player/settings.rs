@@ -8,7 +8,7 @@ use crate::math::pid::Gains;
 use crate::math::simulation::Simulation;
 use crate::record::{Note, read_note};
 
-/// What can be asked about the arm.
+/// The settings that can be asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RecordedSettings<const N: usize> {
     pub(super) arm: Arm<N>,

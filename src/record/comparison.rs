@@ -13,10 +13,10 @@ use super::reader::{Passage, ReadError, RecordEnding, Recording};
 use super::schema::{INPUTS, STATES};
 use crate::math::simulation::Simulation;
 
-/// Steps between two messages of a record, at most: a tick has a hundredth of that on the fastest machine, so that even
-/// of a file which held up a run for a while nothing is refused.
+/// Steps between two messages of a record, at most: a tick has a tenth of that on the fastest machine, so that a record
+/// whose file was slow for a while is not refused.
 pub const MAX_LEAP: u64 = 10_000_000;
-/// The least time that a step takes, in nanoseconds: no machine has been seen to take one in less than three times that.
+/// The least time that a step takes, in nanoseconds: no machine was seen to take one in less than three times that.
 const SHORTEST_STEP: u64 = 10;
 /// Steps for which a record needs no time, lest a clock that ticks rarely matters.
 pub const AT_ONCE: u64 = 100_000;
@@ -78,7 +78,8 @@ pub enum ReplayError {
     Empty,
     /// More steps than the arm can have taken.
     #[error(
-        "{topic}, message {sequence}: step {step} is {due} steps after the one before, and no arm takes more than {most} there"
+        "{topic}, message {sequence}: step {step} is {due} steps after the one before, \
+         and no arm takes more than {most} there"
     )]
     Leap {
         /// The channel's topic.
