@@ -149,7 +149,6 @@ impl<R: Read + Seek> Reel<R> {
         let mut messages = 0;
         let mut fault = None;
         for record in records(chunk)? {
-            let record = record?;
             self.channels.learn(&record);
             let Record::Message { header, data } = record else {
                 continue;
@@ -299,7 +298,7 @@ impl<R: Read + Seek> Reel<R> {
             let mut moments = Vec::new();
             let mut latest = place.from;
             for record in records(&chunk)? {
-                let Record::Message { header, data } = record? else {
+                let Record::Message { header, data } = record else {
                     continue;
                 };
                 latest = latest.max(header.log_time.saturating_sub(self.began));
@@ -342,17 +341,15 @@ impl Channels {
     }
 }
 
-/// The records in a chunk.
-fn records(
-    chunk: &[u8],
-) -> Result<impl Iterator<Item = Result<Record<'static>, McapError>>, McapError> {
+/// The records in a chunk. Behind a fault the library's reader would tell the same fault for ever: nothing is read there.
+fn records(chunk: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
     let Record::Chunk { header, data } = parse_record(op::CHUNK, chunk)? else {
         return Err(McapError::UnexpectedEof);
     };
-    let records: Vec<_> = ChunkReader::new(header, &data)?
-        .map(|record| record.map(Record::into_owned))
-        .collect();
-    Ok(records.into_iter())
+    let records = ChunkReader::new(header, &data)?;
+    records
+        .map(|record| Ok(record?.into_owned()))
+        .collect::<Result<_, _>>()
 }
 
 /// Reads as much as there is at once; 0 at the end.

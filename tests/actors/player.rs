@@ -116,11 +116,13 @@ fn topics_are_published_as_they_were_recorded() {
             "/joint_trajectory",
             "/diagnostics",
         ] {
-            let heard: Vec<Value> = client.heard[before..]
+            let mut heard: Vec<Value> = client.heard[before..]
                 .iter()
                 .filter(|frame| frame["topic"] == topic)
                 .map(|frame| frame["msg"].clone())
                 .collect();
+            // While it stood, the one that was present came again.
+            heard.dedup();
             let all = recorded(&entries, topic);
             assert!(
                 heard.len() >= all.len() - 1,
@@ -128,7 +130,7 @@ fn topics_are_published_as_they_were_recorded() {
                 heard.len(),
                 all.len()
             );
-            // At the end the present messages come again. The first may have come before.
+            // The first may have come before.
             let first = all.iter().position(|one| *one == heard[0]).unwrap();
             assert!(first <= 1, "{topic} begins with message {first}");
             let length = all.len() - first;
@@ -185,8 +187,15 @@ fn a_paused_record_shows_where_it_stands() {
             drive(&mut client, "is_paused", json!({})).await,
             json!({"paused": true})
         );
-        seek(&mut client, 1, 500_000_000).await;
+        seek(&mut client, 0, 0).await;
         client.subscribe("/joint_states").await;
+        client.settle().await;
+        let state = client.messages("/joint_states").pop().unwrap();
+        assert!(
+            time_of(&state) < 0.02,
+            "at its beginning the first one: {state}"
+        );
+        seek(&mut client, 1, 500_000_000).await;
         client.settle().await;
         let state = client.messages("/joint_states").pop().unwrap();
         assert!((time_of(&state) - 1.5).abs() < 0.05, "{state}");
@@ -464,12 +473,12 @@ fn a_record_that_was_cut_is_played_up_to_there_and_no_record_is_refused() {
         let refused = begin("empty", &file(&[])).unwrap_err().to_string();
         assert!(refused.contains("no states of an arm"), "{refused}");
         // A bit of an index is not missed; any other is.
-        let places = (100..whole.len()).step_by(whole.len() / 40);
+        let places = (100..whole.len()).step_by(whole.len() / 100);
         let refused = places.filter(|at| {
             let mut damaged = whole.clone();
             damaged[*at] ^= 1;
             begin("damaged", &damaged).is_err()
         });
-        assert!(refused.count() > 20);
+        assert!(refused.count() > 50);
     });
 }

@@ -36,6 +36,8 @@ const CATCH_UP: Duration = Duration::from_millis(250);
 const REPEAT: Duration = Duration::from_secs(1);
 /// A message is present for so long: the slowest topic has one a second.
 const PRESENT: Duration = Duration::from_millis(1500);
+/// At the record's beginning a topic's first message is present already, if it comes so soon.
+const SOON: Duration = Duration::from_millis(100);
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
@@ -323,6 +325,18 @@ impl<const N: usize> Player<N> {
             }
         }
         self.tape.reel.come_back(place);
+        let soon = u64::try_from(SOON.as_nanos()).unwrap_or(u64::MAX);
+        if self.position < soon {
+            for _ in 0..MAX_AT_ONCE {
+                let Some(moment) = self.tape.reel.forward(soon)? else {
+                    break;
+                };
+                if missing.remove(&moment.topic) {
+                    found.insert(0, moment);
+                }
+            }
+            self.tape.reel.come_back(place);
+        }
         Ok(found)
     }
 
