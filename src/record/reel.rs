@@ -341,7 +341,7 @@ impl Channels {
     }
 }
 
-/// The records in a chunk. Behind a fault the library's reader would tell the same fault for ever: nothing is read there.
+/// The records in a chunk. Nothing is read behind a fault: the library would tell of it for ever.
 fn records(chunk: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
     let Record::Chunk { header, data } = parse_record(op::CHUNK, chunk)? else {
         return Err(McapError::UnexpectedEof);
