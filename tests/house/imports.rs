@@ -15,7 +15,7 @@ use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use crate::standing;
 
 /// What a floor may name, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 12] = [
+const FLOORS: [(&str, &[&str]); 13] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -23,7 +23,11 @@ const FLOORS: [(&str, &[&str]); 12] = [
     ("record", &["math", "protocol"]),
     ("web", &["protocol"]),
     ("report", &["math", "study"]),
-    ("options", &["protocol", "web", "report"]),
+    ("command", &["protocol"]),
+    (
+        "options",
+        &["protocol", "web", "report", "command", "logging"],
+    ),
     ("plan", &["math", "study", "options"]),
     (
         "actors",
@@ -34,7 +38,9 @@ const FLOORS: [(&str, &[&str]); 12] = [
     ("lib", &[]),
     (
         "main",
-        &["logging", "record", "report", "options", "plan", "actors"],
+        &[
+            "command", "logging", "record", "report", "options", "plan", "actors",
+        ],
     ),
 ];
 
