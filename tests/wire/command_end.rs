@@ -126,7 +126,6 @@ fn a_token_is_shown_from_the_option_or_the_variable() {
     );
 }
 
-/// Nothing listens on port 1: what is wrong is noticed before anything is sent.
 #[test]
 fn bad_usage_gives_status_2_and_a_line_that_names_it() {
     for (arguments, words) in [
@@ -150,9 +149,27 @@ fn bad_usage_gives_status_2_and_a_line_that_names_it() {
             "must be a whole number from 1",
         ),
         (&["topic", "pub", "/a", "{}", "-r", "x"], "got \"x\""),
-        (&["topic", "pub", "/a", "{}", "-1", "-t", "3"], "--once"),
         (
-            &["topic", "pub", "/a", "{a: ["],
+            &["topic", "pub", "/a", "{}", "-1", "-t", "3"],
+            "--once does not go with --times <N>",
+        ),
+        (
+            &["completions", "tcsh"],
+            "must be one of bash, elvish, fish, powershell, zsh",
+        ),
+        (&["--links", "3", "topic", "list"], "--links"),
+    ] {
+        let said = complaint(&output(arguments), 2);
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
+
+/// Nobody listens on port 1: what is wrong is noticed before anything is sent.
+#[test]
+fn a_value_that_cannot_be_read_gives_status_2_before_anything_is_sent() {
+    for (arguments, words) in [
+        (
+            &["topic", "pub", "/a", "{a: ["][..],
             "MESSAGE cannot be read as JSON or YAML",
         ),
         (
@@ -172,18 +189,9 @@ fn bad_usage_gives_status_2_and_a_line_that_names_it() {
             &["param", "set", "/arm_sim", "gravity", "'"],
             "VALUE cannot be read",
         ),
-        (
-            &["completions", "tcsh"],
-            "must be one of bash, elvish, fish, powershell, zsh",
-        ),
-        (&["--links", "3", "topic", "list"], "--links"),
     ] {
-        let is_leaf = arguments.len() > 1 && arguments[0] != "--links" && arguments[1] != "fly";
-        let nowhere = ["--connect", "127.0.0.1:1"];
-        let has_address =
-            !is_leaf || arguments.contains(&"--connect") || arguments[0] == "completions";
-        let nowhere = if has_address { &[][..] } else { &nowhere[..] };
-        let said = complaint(&output(&[arguments, nowhere].concat()), 2);
+        let said = output(&[arguments, &["--connect", "127.0.0.1:1"]].concat());
+        let said = complaint(&said, 2);
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
 }
