@@ -8,15 +8,14 @@ use clap::ArgMatches;
 use serde_json::Value;
 use serde_json::value::RawValue;
 
-use super::error::CommandError;
+use super::error::{CommandError, plain};
 use super::output::print;
 use super::session::Session;
 use super::yaml;
 use crate::protocol::op::token::Token;
-use crate::protocol::wire::text::plain;
 
 /// The name of the option that shows a token; its value is read where the environment is.
-pub const TOKEN: &str = "token";
+pub(super) const TOKEN: &str = "token";
 
 /// A command, and what was given to it.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -6,10 +6,9 @@ use clap::Command;
 use serde_json::Value;
 
 use super::asked::Asked;
-use super::error::CommandError;
+use super::error::{CommandError, plain};
 use super::output::print;
 use super::verbs::verb;
-use crate::protocol::wire::text::plain;
 
 /// The topic that tells.
 const TOPIC: &str = "/diagnostics";
@@ -31,20 +30,28 @@ pub(super) fn show(asked: &Asked) -> Result<(), CommandError> {
     session.subscribe(TOPIC, None)?;
     let msg = session.message(TOPIC)?;
     let array: Value = serde_json::from_str(msg.get()).unwrap_or_default();
-    let parts = array["status"].as_array().map_or(&[][..], Vec::as_slice);
+    let parts = list(&array, "status");
     if asked.has("json") {
         asked.show(&msg)?;
     } else {
         print(&parts.iter().map(page).collect::<String>())?;
     }
-    match parts.iter().find(|part| part["level"] != 0) {
+    match parts
+        .iter()
+        .find(|part| part.get("level") != Some(&Value::from(0)))
+    {
         None => Ok(()),
         Some(part) => Err(CommandError::refused(&title(part))),
     }
 }
 
+fn list<'a>(of: &'a Value, name: &str) -> &'a [Value] {
+    let list = of.get(name).and_then(Value::as_array);
+    list.map_or(&[], Vec::as_slice)
+}
+
 fn text<'a>(of: &'a Value, name: &str) -> &'a str {
-    of[name].as_str().unwrap_or_default()
+    of.get(name).and_then(Value::as_str).unwrap_or_default()
 }
 
 fn title(part: &Value) -> String {
@@ -52,13 +59,12 @@ fn title(part: &Value) -> String {
 }
 
 fn page(part: &Value) -> String {
-    let level = part["level"]
-        .as_u64()
-        .and_then(|level| usize::try_from(level).ok());
+    let level = part.get("level").and_then(Value::as_u64);
+    let level = level.and_then(|level| usize::try_from(level).ok());
     let level = level
         .and_then(|level| LEVELS.get(level))
         .unwrap_or(&"STALE");
-    let details = part["values"].as_array().map_or(&[][..], Vec::as_slice);
+    let details = list(part, "values");
     let widths = details.iter().map(|one| text(one, "key").len());
     let width = widths.max().unwrap_or(0);
     let mut page = plain(&format!("{level} {}", title(part))) + "\n";

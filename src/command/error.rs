@@ -5,7 +5,7 @@
 use std::io;
 use std::time::Duration;
 
-use crate::protocol::wire::text::plain;
+use crate::protocol::wire::text::push_plain;
 
 /// A command that was not done.
 #[derive(Debug, thiserror::Error)]
@@ -64,4 +64,11 @@ impl CommandError {
             Self::NoConnection { .. } | Self::Lost(_) | Self::Late(_) => 3,
         }
     }
+}
+
+/// Text as one line on which nothing acts.
+pub(super) fn plain(text: &str) -> String {
+    let mut plain = String::with_capacity(text.len());
+    text.chars().for_each(|one| push_plain(&mut plain, one));
+    plain
 }

@@ -4,8 +4,7 @@
 
 use std::io::{self, ErrorKind, Write};
 
-use super::error::CommandError;
-use crate::protocol::wire::text::plain;
+use super::error::{CommandError, plain};
 
 /// Prints to standard output, at once.
 ///

@@ -3,14 +3,14 @@
 //! **Invariant:** a value that is printed can be set again as it was printed.
 
 use clap::Command;
+use serde::Deserialize;
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
 
 use super::asked::Asked;
-use super::error::CommandError;
+use super::error::{CommandError, plain};
 use super::output::print;
 use super::verbs::{required, subject, verb};
-use crate::protocol::wire::text::plain;
 
 pub(super) fn command() -> Command {
     let node = || required("node", "NODE", "Whose parameter it is: /arm_sim");
@@ -72,11 +72,10 @@ pub(super) fn get(asked: &Asked) -> Result<(), CommandError> {
         &json!({"name": full_name(asked)}),
     )?;
     // JSON within JSON.
-    let value = values["value"].as_str().unwrap_or_default();
-    match serde_json::from_str::<Value>(value) {
+    match serde_json::from_str::<Value>(&values.value) {
         Ok(Value::String(text)) if !asked.has("json") => print(&format!("{text}\n")),
         _ => {
-            let value = RawValue::from_string(value.to_owned());
+            let value = RawValue::from_string(values.value);
             asked.show(&value.map_err(|error| CommandError::Lost(error.to_string()))?)
         }
     }
@@ -88,13 +87,22 @@ pub(super) fn set(asked: &Asked) -> Result<(), CommandError> {
     call(asked, "/rosapi/set_param", &args).map(drop)
 }
 
-/// Calls a service that says in its values whether it has done it.
-fn call(asked: &Asked, service: &str, args: &Value) -> Result<Value, CommandError> {
+/// Values that say themselves whether it was done.
+#[derive(Deserialize)]
+struct ParameterAnswer {
+    successful: bool,
+    reason: String,
+    #[serde(default)]
+    value: String,
+}
+
+fn call(asked: &Asked, service: &str, args: &Value) -> Result<ParameterAnswer, CommandError> {
     let values = asked.open()?.call(service, args)?;
-    let values: Value = serde_json::from_str(values.get()).unwrap_or_default();
-    if values["successful"] == true {
-        return Ok(values);
+    let answer: ParameterAnswer = serde_json::from_str(values.get())
+        .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))?;
+    if answer.successful {
+        Ok(answer)
+    } else {
+        Err(CommandError::refused(&answer.reason))
     }
-    let why = values["reason"].as_str().unwrap_or_default();
-    Err(CommandError::refused(why))
 }

@@ -136,7 +136,7 @@ impl Session {
                 CommandError::Lost(format!("{what}: {error}"))
             }),
             Err(error) => Err(match (error.kind(), self.patience) {
-                (ErrorKind::WouldYamlWriter | ErrorKind::TimedOut, Some(patience)) => {
+                (ErrorKind::WouldBlock | ErrorKind::TimedOut, Some(patience)) => {
                     CommandError::Late(patience)
                 }
                 _ => CommandError::Lost(error.to_string()),

@@ -43,7 +43,6 @@ pub(super) fn command() -> Command {
          Each message is a YAML document that ends with ---, or with --json a line. SIGINT, and a reader that goes away, \
          end it\nwith status 0.",
     );
-    let once = |help| flag("once", help);
     let hz = verb(
         "hz",
         "Measure how often messages come",
@@ -52,19 +51,13 @@ pub(super) fn command() -> Command {
          [s].",
     );
     let window = Arg::new("window").long("window").short('w');
-    let publish = verb(
-        "pub",
-        "Publish a message, once or again and again",
-        "Examples:\n  pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'\n  \
-         pendularm topic pub -r 10 /chatter std_msgs/msg/String 'data: hello'\n\n\
-         Without --once or --times it publishes until SIGINT, and ends with status 0. MESSAGE is JSON or YAML; without one \
-         it is {}.",
-    );
-    let rate = Arg::new("rate").long("rate").short('r');
-    let times = Arg::new("times").long("times").short('t');
     subject("topic", "Watch topics of a running pendularm, and publish").subcommands([
         list.arg(show_types()),
-        echo.args([topic(), type_name(), once("Print one message and end")]),
+        echo.args([
+            topic(),
+            type_name(),
+            flag("once", "Print one message and end"),
+        ]),
         hz.args([
             topic(),
             type_name(),
@@ -74,22 +67,28 @@ pub(super) fn command() -> Command {
                 .default_value("10000")
                 .help("How many of the last messages count"),
         ]),
-        publish
+        publisher()
             .arg(topic())
-            .args(typed_value("MESSAGE", "The message"))
-            .args([
-                once("Publish one message and end")
-                    .short('1')
-                    .conflicts_with("times"),
-                times
-                    .value_name("N")
-                    .value_parser(read_count)
-                    .help("Publish so many messages and end"),
-                rate.value_name("HZ")
-                    .value_parser(read_positive)
-                    .default_value("1")
-                    .help("How many a second"),
-            ]),
+            .args(typed_value("MESSAGE", "The message")),
+    ])
+}
+
+fn publisher() -> Command {
+    let notes = "Examples:\n  pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'\n  \
+        pendularm topic pub -r 10 /chatter std_msgs/msg/String 'data: hello'\n\n\
+        Without --once or --times it publishes until SIGINT, and ends with status 0. MESSAGE is JSON or YAML; without one \
+        it is {}.";
+    let once = flag("once", "Publish one message and end").short('1');
+    let times = Arg::new("times").long("times").short('t').value_name("N");
+    let rate = Arg::new("rate").long("rate").short('r').value_name("HZ");
+    verb("pub", "Publish a message, once or again and again", notes).args([
+        once.conflicts_with("times"),
+        times
+            .value_parser(read_count)
+            .help("Publish so many messages and end"),
+        rate.value_parser(read_positive)
+            .default_value("1")
+            .help("How many a second"),
     ])
 }
 

@@ -33,8 +33,7 @@ pub(super) fn verb(name: &'static str, about: &'static str, notes: &str) -> Comm
     let token = option(
         TOKEN,
         "TOKEN",
-        "The token that it asks for; who may list this machine's processes sees it, so better use the variable \
-         [env: ARM_SIM_TOKEN]",
+        "The token that it asks for; other users may see it, but not the variable [env: ARM_SIM_TOKEN]",
     )
     .value_parser(OsStringValueParser::new());
     let timeout = option(

@@ -256,7 +256,7 @@ fn every_page_of_help_has_an_example_and_the_exit_statuses() {
         assert!(page.contains(&format!("\n  {name}")), "no example:\n{page}");
         assert!(page.contains("Exit status: 0 if") && page.contains("--connect <HOST:PORT>"));
         let widest = page.lines().map(|line| line.chars().count()).max();
-        assert!(widest <= Some(130), "{page}");
+        assert!(widest <= Some(125), "{page}");
     }
 }
 

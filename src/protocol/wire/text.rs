@@ -49,14 +49,7 @@ pub(crate) fn push_plain(text: &mut String, character: char) {
     }
 }
 
-/// Text as one line on which nothing acts.
-pub(crate) fn plain(text: &str) -> String {
-    let mut plain = String::with_capacity(text.len());
-    text.chars().for_each(|one| push_plain(&mut plain, one));
-    plain
-}
-
-/// A character within the quotation marks of JSON, which YAML reads too.
+/// The same within the quotation marks of JSON, which YAML reads too.
 pub(crate) fn push_quoted(text: &mut String, character: char) {
     match character {
         '"' | '\\' => text.extend(['\\', character]),
