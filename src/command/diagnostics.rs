@@ -20,8 +20,8 @@ pub(super) fn command() -> Command {
         "diagnostics",
         "Say how a running pendularm is: state, warnings, energy, timestep and its limits",
         "Example:\n  pendularm diagnostics || echo 'all is not well'\n\n\
-         It waits for one message of /diagnostics, a second at most while the arm runs. Status 1 also means that some part is \
-         not OK;\nwith --json the message is one line.",
+         It waits for one message of /diagnostics, a second at most while the arm runs. Status 1 also means that some \
+         part is not OK;\nwith --json the message is one line.",
     )
 }
 

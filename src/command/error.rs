@@ -43,7 +43,7 @@ pub enum CommandError {
         /// The system's word.
         why: io::Error,
     },
-    /// Whoever read standard output has seen what it wanted.
+    /// The reader of standard output is gone: it has seen what it wanted.
     #[error("standard output is closed")]
     Closed,
 }

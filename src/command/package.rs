@@ -1,4 +1,4 @@
-//! What a package has beside the program: completions for shells, and pages of the manual. Both are made from the
+//! Completions for shells and pages of the manual, which a package has beside the program. Both are made from the
 //! command line as it is read.
 //!
 //! **Invariant:** they have every command and option of this build, and no others.

@@ -23,7 +23,8 @@ pub(super) fn command() -> Command {
     let get = verb(
         "get",
         "Print a parameter's value",
-        "Examples:\n  pendularm param get /arm_sim gravity\n  pendularm param get /arm_sim robot_description > arm.urdf\n\n\
+        "Examples:\n  pendularm param get /arm_sim gravity\n  \
+         pendularm param get /arm_sim robot_description > arm.urdf\n\n\
          A text is printed as it is, with --json as JSON.",
     );
     let set = verb(

@@ -37,7 +37,7 @@ pub(super) struct Session {
     patience: Option<Duration>,
 }
 
-/// What the runtime has said, as far as a command needs it.
+/// A frame of the runtime's, as far as a command needs it.
 #[derive(Debug, Deserialize)]
 pub(super) struct Received {
     pub(super) op: String,

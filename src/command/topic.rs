@@ -40,15 +40,15 @@ pub(super) fn command() -> Command {
         "echo",
         "Print the messages of a topic as they come",
         "Examples:\n  pendularm topic echo /joint_states --once\n  pendularm topic echo --json /clock | head -n 3\n\n\
-         Each message is a YAML document that ends with ---, or with --json a line. SIGINT, and a reader that goes away, \
-         end it\nwith status 0.",
+         Each message is a YAML document that ends with ---, or with --json a line. \
+         SIGINT, and a reader that goes away, end it\nwith status 0.",
     );
     let hz = verb(
         "hz",
         "Measure how often messages come",
         "Example:\n  pendularm topic hz /joint_states\n\n\
-         Once a second it prints the rate [1/s], and least, largest and standard deviation of the time between two messages \
-         [s].",
+         Once a second it prints the rate [1/s], and least, largest and standard deviation of the time between \
+         two\nmessages [s].",
     );
     let window = Arg::new("window").long("window").short('w');
     subject("topic", "Watch topics of a running pendularm, and publish").subcommands([
@@ -76,8 +76,8 @@ pub(super) fn command() -> Command {
 fn publisher() -> Command {
     let notes = "Examples:\n  pendularm topic pub -1 /joint_trajectory '{points: [{positions: [0.3, -0.5]}]}'\n  \
         pendularm topic pub -r 10 /chatter std_msgs/msg/String 'data: hello'\n\n\
-        Without --once or --times it publishes until SIGINT, and ends with status 0. MESSAGE is JSON or YAML; without one \
-        it is {}.";
+        Without --once or --times it publishes until SIGINT, and ends with status 0. MESSAGE is JSON or YAML; without \
+        one it is {}.";
     let once = flag("once", "Publish one message and end").short('1');
     let times = Arg::new("times").long("times").short('t').value_name("N");
     let rate = Arg::new("rate").long("rate").short('r').value_name("HZ");
@@ -121,7 +121,7 @@ pub(super) fn hz(asked: &Asked) -> Result<(), CommandError> {
     let mut spans = VecDeque::new();
     session.message(topic)?;
     let mut last = Instant::now();
-    let mut told = last;
+    let mut reported = last;
     loop {
         session.message(topic)?;
         let now = Instant::now();
@@ -130,14 +130,14 @@ pub(super) fn hz(asked: &Asked) -> Result<(), CommandError> {
         }
         spans.push_back((now - last).as_secs_f64());
         last = now;
-        if now - told >= REPORT {
-            told = now;
+        if now - reported >= REPORT {
+            reported = now;
             print(&rhythm(&spans, asked.has("json")))?;
         }
     }
 }
 
-/// What the times between messages come to, in the words of `ros2`.
+/// Rate and spread of the times between messages, in the words of `ros2`.
 fn rhythm(spans: &VecDeque<f64>, is_json: bool) -> String {
     #[expect(clippy::cast_precision_loss, reason = "there are at most a million")]
     let count = spans.len() as f64;

@@ -107,7 +107,7 @@ enum Slot {
 /// Writes a value of JSON as YAML while it is read.
 struct YamlWriter<'a> {
     out: &'a mut String,
-    /// Of the name or the dash before it, in spaces.
+    /// Spaces before the name or the dash that it stands behind.
     indent: usize,
     place: Slot,
 }

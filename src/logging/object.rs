@@ -1,7 +1,7 @@
 //! Log lines as JSON objects, for programs that read them.
 //!
-//! **Invariant:** a line is one object with `timestamp`, `level`, `target` and `message`, of bounded length, and nothing on
-//! it acts on a terminal, whatever the event's text.
+//! **Invariant:** a line is one object with `timestamp`, `level`, `target` and `message`, of bounded length, and nothing
+//! on it acts on a terminal, whatever the event's text.
 
 use std::fmt::{self, Write as _};
 
@@ -51,7 +51,7 @@ impl LogObject {
 
     /// Begins a member, if there is room.
     fn name(&mut self, name: &str) -> bool {
-        // Whatever came before it, an event has its message.
+        // An event has its message, however long the members before it are.
         let has_room = self.text.len() < self.limit || name == "message";
         if has_room {
             if self.text.len() > 1 {

@@ -1,4 +1,4 @@
-//! What `clap` reports, in words of ours.
+//! Reports of `clap`, in words of ours.
 //!
 //! **Invariant:** a text that was asked for is not a refusal, and every refusal is one line.
 

@@ -10,10 +10,13 @@ use crate::common::{self, Client, Runtime};
 /// A command with the address of a runtime, ready to be started.
 fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
     let mut command = common::program();
+    // Behind `--` there are no options any more.
+    let (verb, rest) = arguments.split_at(arguments.len().min(2));
     command
-        .args(arguments)
+        .args(verb)
         .args(["--connect", &runtime.address.to_string()])
         .args(["--timeout", &common::PATIENCE.as_secs().to_string()])
+        .args(rest)
         .stdin(Stdio::null());
     command
 }
