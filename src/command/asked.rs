@@ -98,24 +98,23 @@ impl Asked {
 
     /// Prints an answer.
     pub(super) fn show(&self, raw: &RawValue) -> Result<(), CommandError> {
-        print(&self.spelled(raw))
+        print(&self.spelled(raw)?)
     }
 
     /// Prints one of several answers, each a document of its own in YAML.
     pub(super) fn show_next(&self, raw: &RawValue) -> Result<(), CommandError> {
-        let mut text = self.spelled(raw);
+        let mut text = self.spelled(raw)?;
         if !self.has("json") {
             text.push_str("---\n");
         }
         print(&text)
     }
 
-    fn spelled(&self, raw: &RawValue) -> String {
+    fn spelled(&self, raw: &RawValue) -> Result<String, CommandError> {
         if self.has("json") {
-            yaml::json_line(raw)
-        } else {
-            yaml::lines(raw)
+            return Ok(yaml::json_line(raw));
         }
+        yaml::lines(raw).map_err(|error| CommandError::Lost(format!("no frame came: {error}")))
     }
 
     /// Prints names, and their types if they are to be shown.

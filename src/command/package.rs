@@ -3,11 +3,13 @@
 //!
 //! **Invariant:** they have every command and option of this build, and no others.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use clap::builder::PathBufValueParser;
 use clap::{Arg, ArgMatches, Command, value_parser};
 use clap_complete::Shell;
+use clap_mangen::Man;
 
 use super::error::CommandError;
 
@@ -68,9 +70,18 @@ pub fn complete(shell: Shell, mut command: Command) -> String {
 ///
 /// # Errors
 /// [`CommandError::System`] with the system's word.
-pub fn pages(command: Command, folder: &Path) -> Result<(), CommandError> {
-    clap_mangen::generate_to(command, folder).map_err(|why| CommandError::System {
+pub fn pages(mut command: Command, folder: &Path) -> Result<(), CommandError> {
+    command.build();
+    write(command, folder).map_err(|why| CommandError::System {
         what: "the manual's folder",
         why,
     })
+}
+
+fn write(command: Command, folder: &Path) -> io::Result<()> {
+    for one in command.get_subcommands() {
+        write(one.clone(), folder)?;
+    }
+    let page = Man::new(command).source(concat!("pendularm ", env!("CARGO_PKG_VERSION")));
+    page.generate_to(folder).map(drop)
 }

@@ -8,8 +8,10 @@ use serde::Deserializer;
 use serde::de::{DeserializeSeed, Error, MapAccess, SeqAccess, Visitor};
 use serde_json::value::RawValue;
 use serde_json::{Map, Value};
+use yaml_rust2::parser::{Event, Parser};
 use yaml_rust2::{Yaml, YamlLoader};
 
+use crate::protocol::limits::MAX_NESTING;
 use crate::protocol::wire::text::{acts, push_quoted};
 
 /// Texts that a reader of YAML would take for something else, in lower case.
@@ -26,11 +28,30 @@ pub(super) fn read(text: &str) -> Result<Value, String> {
     if let Ok(value) = serde_json::from_str(text) {
         return Ok(value);
     }
+    refuse_depth(text)?;
     let mut documents = YamlLoader::load_from_str(text).map_err(|error| error.to_string())?;
     match (documents.pop(), documents.is_empty()) {
         (None, _) => Ok(Value::Null),
         (Some(document), true) => value(document),
         _ => Err("it is more than one document".to_owned()),
+    }
+}
+
+/// Refuses what would be deep: nested as such, or by names that stand for other parts.
+fn refuse_depth(text: &str) -> Result<(), String> {
+    let mut parser = Parser::new_from_str(text);
+    let mut depth = 0_usize;
+    loop {
+        match parser.next_token().map_err(|error| error.to_string())?.0 {
+            Event::SequenceStart(..) | Event::MappingStart(..) => depth += 1,
+            Event::SequenceEnd | Event::MappingEnd => depth = depth.saturating_sub(1),
+            Event::Alias(_) => return Err("an alias (*name) is not taken".to_owned()),
+            Event::StreamEnd => return Ok(()),
+            _ => {}
+        }
+        if depth > MAX_NESTING {
+            return Err(format!("it is nested more than {MAX_NESTING} deep"));
+        }
     }
 }
 
@@ -82,16 +103,18 @@ pub(super) fn json_line(raw: &RawValue) -> String {
 }
 
 /// The value as lines of YAML.
-pub(super) fn lines(raw: &RawValue) -> String {
+///
+/// # Errors
+/// If it is nested deeper than the runtime takes.
+pub(super) fn lines(raw: &RawValue) -> Result<String, serde_json::Error> {
     let mut out = String::new();
-    let block = YamlWriter {
+    let writer = YamlWriter {
         out: &mut out,
         indent: 0,
         place: Slot::Top,
     };
-    // It has been read as JSON before.
-    let _ = block.deserialize(&mut serde_json::Deserializer::from_str(raw.get()));
-    out
+    writer.deserialize(&mut serde_json::Deserializer::from_str(raw.get()))?;
+    Ok(out)
 }
 
 /// Where a value stands.
@@ -304,7 +327,7 @@ mod tests {
         #[test]
         fn what_is_written_as_yaml_is_read_as_the_same_value(value in values()) {
             let raw = to_raw_value(&value).unwrap();
-            let text = lines(&raw);
+            let text = lines(&raw).unwrap();
             prop_assert!(!text.contains(|one| one != '\n' && acts(one)), "{text:?}");
             // With a comment it is no JSON.
             prop_assert_eq!(read(&format!("# YAML\n{text}")), Ok(value), "{}", text);
@@ -336,8 +359,8 @@ mod tests {
                 json!({"a": "\u{1f600}", "b": u64::MAX}),
             ),
             (
-                "a: &x [0x10, 1e3, ~]\nb: *x",
-                json!({"a": [16, 1000.0, null], "b": [16, 1000.0, null]}),
+                "a: [0x10, 1e3, ~]\nb: !t &x [16, .5]",
+                json!({"a": [16, 1000.0, null], "b": [16, 0.5]}),
             ),
             ("1: one", json!({"1": "one"})),
         ] {

@@ -1,7 +1,7 @@
 //! Log lines as JSON objects, for programs that read them.
 //!
-//! **Invariant:** a line is one object with `timestamp`, `level`, `target` and `message`, of bounded length, and nothing
-//! on it acts on a terminal, whatever the event's text.
+//! **Invariant:** a line is one object with `timestamp`, `level`, `target` and `message`, of bounded length, and
+//! nothing on it acts on a terminal, whatever the event's text.
 
 use std::fmt::{self, Write as _};
 

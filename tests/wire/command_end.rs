@@ -167,6 +167,7 @@ fn bad_usage_gives_status_2_and_a_line_that_names_it() {
 /// Nobody listens on port 1: what is wrong is noticed before anything is sent.
 #[test]
 fn a_value_that_cannot_be_read_gives_status_2_before_anything_is_sent() {
+    let (list, block) = ("[".repeat(60_000), "- ".repeat(60_000));
     for (arguments, words) in [
         (
             &["topic", "pub", "/a", "{a: ["][..],
@@ -189,8 +190,12 @@ fn a_value_that_cannot_be_read_gives_status_2_before_anything_is_sent() {
             &["param", "set", "/arm_sim", "gravity", "'"],
             "VALUE cannot be read",
         ),
+        (&["topic", "pub", "/a", &list], "recursion limit"),
+        (&["topic", "pub", "/a", &block], "nested more than 128 deep"),
+        (&["topic", "pub", "/a", "{a: &a [1], b: *a}"], "an alias"),
     ] {
-        let said = output(&[arguments, &["--connect", "127.0.0.1:1"]].concat());
+        let connect = ["--connect", "127.0.0.1:1"];
+        let said = output(&[&arguments[..2], &connect, &["--"], &arguments[2..]].concat());
         let said = complaint(&said, 2);
         assert!(said.contains(words), "{arguments:?}: {said}");
     }
