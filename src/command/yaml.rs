@@ -1,5 +1,7 @@
 //! JSON and YAML: arguments in either are read as JSON, and what the runtime says in JSON is written as either.
 //!
+//! YAML is written here: the library's writer keeps an escape character in a text as it is, and a terminal obeys it.
+//!
 //! **Invariant:** members keep their order, numbers their value, and nothing in a text acts on a terminal.
 
 use std::fmt;
