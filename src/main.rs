@@ -13,7 +13,7 @@ use std::process::ExitCode;
 use pendularm::actors::{panics, runtime};
 #[cfg(feature = "cli")]
 use pendularm::command::{self, CommandError};
-use pendularm::logging;
+use pendularm::logging::{self, LogFormat};
 #[cfg(feature = "cli")]
 use pendularm::options;
 #[cfg(feature = "record")]
@@ -126,11 +126,16 @@ fn serve(options: &Options) -> ExitCode {
         lines.finish();
         std::process::exit(0);
     });
+    if let (Err(error), LogFormat::Json) = (&outcome, options.log_format) {
+        log.say(&error.to_string());
+    }
     log.finish();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            complain(&error);
+            if options.log_format == LogFormat::Text {
+                complain(&error);
+            }
             ExitCode::FAILURE
         }
     }

@@ -241,6 +241,7 @@ fn dial(address: &str, patience: Option<Duration>) -> io::Result<TcpStream> {
             Ok(stream) => {
                 stream.set_nodelay(true)?;
                 stream.set_read_timeout(patience)?;
+                stream.set_write_timeout(patience)?;
                 return Ok(stream);
             }
             Err(error) => why = error,

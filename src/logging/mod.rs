@@ -111,9 +111,9 @@ impl Log {
         Ok(log)
     }
 
-    /// Puts a line into the log, whatever its level is.
+    /// Puts a line into the log, whatever the log's level is: an error.
     pub fn say(&self, line: &str) {
-        self.put(own(line, self.format));
+        self.put(own(Level::ERROR, line, self.format));
     }
 
     /// A line that does not fit is lost, and counted.
@@ -163,11 +163,11 @@ fn plain(line: &[u8]) -> Vec<u8> {
 }
 
 /// A line of the log's own.
-fn own(line: &str, format: LogFormat) -> Vec<u8> {
+fn own(level: Level, line: &str, format: LogFormat) -> Vec<u8> {
     match format {
         LogFormat::Text => plain(line.as_bytes()),
         LogFormat::Json => {
-            let mut object = LogObject::new(Level::WARN, "pendularm::logging", LINE_BYTES);
+            let mut object = LogObject::new(level, "pendularm::logging", LINE_BYTES);
             object.member("message", line);
             object.line()
         }
@@ -189,7 +189,7 @@ fn write(queue: &Receiver<Entry>, dropped: &AtomicU64, format: LogFormat, mut si
         let lost = dropped.swap(0, Ordering::Relaxed);
         if lost > 0 {
             let line = format!("{lost} log lines were dropped: nobody read them fast enough");
-            let _ = sink.write_all(&own(&line, format));
+            let _ = sink.write_all(&own(Level::WARN, &line, format));
         }
     }
 }
@@ -275,6 +275,30 @@ mod tests {
         assert_eq!(
             text.lines().filter(|line| *line == "line").count(),
             QUEUE_LINES + 10 - lost
+        );
+    }
+
+    #[test]
+    fn as_json_lines_of_the_log_itself_are_objects_too() {
+        let (gate, seen) = Gate::new(false);
+        let log = Log::to(gate.clone(), LogFormat::Json).unwrap();
+        for _ in 0..QUEUE_LINES + 10 {
+            log.say("a \"line\"\n");
+        }
+        gate.open();
+        drop((log, gate));
+        let text: String = seen.iter().collect();
+        let objects = text
+            .lines()
+            .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+        let messages: Vec<String> = objects
+            .map(|object| object["message"].as_str().unwrap().to_owned())
+            .collect();
+        assert_eq!(messages[0], "a \"line\"\n");
+        assert!(
+            messages
+                .iter()
+                .any(|one| one.contains("log lines were dropped"))
         );
     }
 

@@ -494,6 +494,30 @@ fn bad_usage_ends_the_program_with_one_line_and_status_2() {
     );
 }
 
+/// The address is taken: by a listener of this test's own.
+#[test]
+fn as_json_the_reason_for_not_starting_is_an_object_too() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let output = program(&["--bind", &address, "--log-format", "json"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let log = String::from_utf8(output.stderr).unwrap();
+    let last: serde_json::Value = serde_json::from_str(log.lines().last().unwrap()).unwrap();
+    assert_eq!(last["level"], "ERROR");
+    assert!(
+        last["message"].as_str().unwrap().contains(&address),
+        "{log}"
+    );
+    let output = program(&["--bind", &address]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.lines().last().unwrap().starts_with("pendularm: "),
+        "{said}"
+    );
+}
+
 #[test]
 fn help_and_version_go_to_standard_output_with_status_0() {
     for (argument, text) in [("--help", "ARM_SIM_LINKS"), ("--version", "pendularm ")] {
