@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -14,6 +14,10 @@ help: ## Show this list
 build: ## Build the program (release); needs no network once the dependencies are there
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
 	$(CARGO) build --release --locked
+
+install: build ## Install program, completions and manual below PREFIX=/usr/local; DESTDIR stands before it
+	@echo "make install: $(DESTDIR)$(or $(PREFIX),/usr/local)"
+	@bash scripts/install.sh "$(TARGET_DIR)/release/pendularm" "$(DESTDIR)$(or $(PREFIX),/usr/local)"
 
 run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARGS="--links 3". Without cargo a program that is there runs
 	@if command -v "$(firstword $(CARGO))" > /dev/null; then $(MAKE) --no-print-directory build; \

@@ -19,9 +19,10 @@ README = ROOT / "README.md"
 MARKS = re.compile(r"(<!-- scripts/features.py -->\n).*?(<!-- end -->)", re.DOTALL)
 BUILDS = (
     ("default", "", "program"),
-    ("without the report", "--no-default-features --features web,record", "program"),
-    ("without the record", "--no-default-features --features web,report", "program"),
-    ("without the web", "--no-default-features --features report", "program"),
+    ("without the report", "--no-default-features --features web,record,cli", "program"),
+    ("without the record", "--no-default-features --features web,report,cli", "program"),
+    ("without the web", "--no-default-features --features report,cli", "program"),
+    ("without the commands", "--no-default-features --features web,report,record", "program"),
     ("`runtime` alone", "--no-default-features --features runtime", "program"),
     ("no features: the library", "--no-default-features --lib", "library"),
 )

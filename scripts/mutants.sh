@@ -55,7 +55,7 @@ lay_out_below() { # folder
         section features; section dependencies
     } >"$1/below/Cargo.toml"
     cp -R "$root/page" "$1/"
-    cp -R "$root/src/web" "$root/src/options" "$root/src/logging.rs" "$1/src/"
+    cp -R "$root/src/web" "$root/src/options" "$root/src/command" "$root/src/logging" "$1/src/"
     printf 'examine_globs = ["src/actors/**", "src/web/**"]\n' >"$1/.cargo/mutants.toml"
 }
 
@@ -86,7 +86,7 @@ lay_out() { # layer, folder
         echo 'extern crate self as pendularm;'
         if [ "$1" = actors ]; then
             echo 'pub use below::{math, protocol, report, study};'
-            echo 'pub mod logging; pub mod options; pub mod web;'
+            echo 'pub mod command; pub mod logging; pub mod options; pub mod web;'
         fi
         echo "pub mod $1;"
         echo '#[cfg(test)] mod first_failure;'

@@ -17,9 +17,8 @@ if [ "$(.venv/bin/maturin --version 2>/dev/null)" != "maturin $maturin" ]; then
 fi
 
 rm -rf target/wheel-data target/wheels
-mkdir -p target/wheel-data/scripts
-cp "$program" target/wheel-data/scripts/pendularm
-chmod 755 target/wheel-data/scripts/pendularm
+bash ../scripts/install.sh "$program" target/wheel-data/data
+mv target/wheel-data/data/bin target/wheel-data/scripts
 
 # On Linux the wheel says which C library it needs at least, and maturin looks at what it builds itself only.
 compatibility=()

@@ -12,6 +12,7 @@
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: runs on record, read back and replayed |
+//! | `cli` | yes | `command`: commands that ask a running one, completions and manual |
 //!
 //! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs
 //! no more, and compiles `glam` and `thiserror` beside it.
@@ -30,6 +31,8 @@
 
 #[cfg(feature = "runtime")]
 pub mod actors;
+#[cfg(feature = "cli")]
+pub mod command;
 #[cfg(feature = "runtime")]
 pub mod logging;
 pub mod math;

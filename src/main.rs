@@ -11,7 +11,11 @@ use std::io::{self, Write};
 use std::process::ExitCode;
 
 use pendularm::actors::{panics, runtime};
-use pendularm::logging;
+#[cfg(feature = "cli")]
+use pendularm::command::{self, CommandError};
+use pendularm::logging::{self, LogFormat};
+#[cfg(feature = "cli")]
+use pendularm::options;
 #[cfg(feature = "record")]
 use pendularm::options::ReplayOptions;
 use pendularm::options::{Options, Parsed};
@@ -52,6 +56,10 @@ fn main() -> ExitCode {
         },
         #[cfg(feature = "record")]
         Ok(Parsed::Replay(options)) => replay(&options),
+        #[cfg(feature = "cli")]
+        Ok(Parsed::Ask(asked)) => end(command::run(&asked)),
+        #[cfg(feature = "cli")]
+        Ok(Parsed::WriteManual(folder)) => end(command::pages(options::command_line(), &folder)),
         Ok(Parsed::Show(text)) => show(&text),
         Err(error) => {
             complain(&error);
@@ -65,6 +73,18 @@ fn show(text: &str) -> ExitCode {
     // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
     let _ = io::stdout().write_all(text.as_bytes());
     ExitCode::SUCCESS
+}
+
+/// How a command that asks a running one ends.
+#[cfg(feature = "cli")]
+fn end(outcome: Result<(), CommandError>) -> ExitCode {
+    let Err(error) = outcome else {
+        return ExitCode::SUCCESS;
+    };
+    if !matches!(error, CommandError::Closed) {
+        complain(&error);
+    }
+    ExitCode::from(error.status())
 }
 
 /// Says whether the recorded steps can be taken again.
@@ -87,7 +107,7 @@ fn replay(options: &ReplayOptions) -> ExitCode {
 }
 
 fn serve(options: &Options) -> ExitCode {
-    let log = match logging::start(options.log) {
+    let log = match logging::start(options.log, options.log_format) {
         Ok(log) => log,
         Err(error) => {
             complain(&format_args!("cannot log to standard error: {error}"));
@@ -106,11 +126,16 @@ fn serve(options: &Options) -> ExitCode {
         lines.finish();
         std::process::exit(0);
     });
+    if let (Err(error), LogFormat::Json) = (&outcome, options.log_format) {
+        log.say(&error.to_string());
+    }
     log.finish();
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            complain(&error);
+            if options.log_format == LogFormat::Text {
+                complain(&error);
+            }
             ExitCode::FAILURE
         }
     }

@@ -29,6 +29,12 @@ def test_bad_arguments_come_back_as_exit_status_2(way):
     assert "--links" in run.stderr
 
 
+def test_it_comes_with_completions_and_a_manual():
+    share = Path(sysconfig.get_path("data")) / "share"
+    assert "pendularm\\-topic(1)" in (share / "man/man1/pendularm.1").read_text()
+    assert (share / "bash-completion/completions/pendularm").is_file()
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
 def test_it_serves_the_page_until_a_signal(way, number):

@@ -7,6 +7,7 @@
 //!
 //! **Invariant:** every refusal is one line that names the option or the variable, and shows the value.
 
+mod explained;
 mod links;
 mod plan;
 #[cfg(feature = "record")]
@@ -20,14 +21,14 @@ mod web;
 
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
+#[cfg(feature = "cli")]
+use std::path::PathBuf;
 
-#[cfg(feature = "record")]
-use clap::ArgMatches;
 use clap::builder::{OsStringValueParser, StyledStr};
-use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command};
 use tracing::level_filters::LevelFilter;
 
+use self::explained::explained;
 pub use self::links::Links;
 pub use self::plan::PlanOptions;
 #[cfg(feature = "record")]
@@ -36,6 +37,9 @@ use self::setting::{Given, LaunchOption, given};
 pub use self::usage::{Origin, UsageError};
 #[cfg(feature = "web")]
 pub use self::web::WebOptions;
+#[cfg(feature = "cli")]
+use crate::command::{self, Asked};
+use crate::logging::LogFormat;
 use crate::protocol::op::token::Token;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
@@ -109,6 +113,15 @@ const LOG: LaunchOption = LaunchOption {
     is_switch: false,
 };
 
+const LOG_FORMAT: LaunchOption = LaunchOption {
+    option: "log-format",
+    variable: "ARM_SIM_LOG_FORMAT",
+    value: "FORMAT",
+    about: "How it is logged: text, or json for one object a line",
+    default: "text",
+    is_switch: false,
+};
+
 const TOKEN: LaunchOption = LaunchOption {
     option: "token",
     variable: "ARM_SIM_TOKEN",
@@ -125,6 +138,7 @@ const SETTINGS: &[&LaunchOption] = &[
     &BIND,
     &SEED,
     &LOG,
+    &LOG_FORMAT,
     &TOKEN,
     #[cfg(feature = "record")]
     &record::RECORD,
@@ -153,6 +167,8 @@ pub struct Options {
     pub seed: Option<u64>,
     /// The log level.
     pub log: LevelFilter,
+    /// How each line of the log is written.
+    pub log_format: LogFormat,
     /// The token that every client has to show, if there is one.
     pub token: Option<Token>,
     /// About runs on record.
@@ -171,6 +187,7 @@ impl Default for Options {
             is_default_bind: true,
             seed: None,
             log: LevelFilter::INFO,
+            log_format: LogFormat::default(),
             token: None,
             #[cfg(feature = "record")]
             record: RecordOptions::default(),
@@ -190,6 +207,12 @@ pub enum Parsed {
     /// To replay a record.
     #[cfg(feature = "record")]
     Replay(ReplayOptions),
+    /// To ask a running one.
+    #[cfg(feature = "cli")]
+    Ask(Asked),
+    /// To write the pages of the manual into this folder.
+    #[cfg(feature = "cli")]
+    WriteManual(PathBuf),
     /// To make the study's report.
     #[cfg(feature = "report")]
     Report(ReportOptions),
@@ -208,9 +231,9 @@ impl Options {
         T: Into<OsString> + Clone,
         E: Fn(&str) -> Option<OsString>,
     {
-        let matches = match command().try_get_matches_from(arguments) {
+        let matches = match command_line().try_get_matches_from(arguments) {
             Ok(matches) => matches,
-            Err(error) => return explained(&error),
+            Err(error) => return explained(&error).map(Parsed::Show),
         };
         if let Some((name, subcommand)) = matches.subcommand() {
             // An option of serving means nothing to a subcommand.
@@ -224,36 +247,29 @@ impl Options {
                 report::NAME => Ok(Parsed::Report(report::read(subcommand))),
                 #[cfg(feature = "record")]
                 record::REPLAY => Self::of_replay(subcommand, environment),
-                _ => plan::read(subcommand).map(Parsed::Plan),
+                plan::NAME => plan::read(subcommand).map(Parsed::Plan),
+                #[cfg(feature = "cli")]
+                command::COMPLETIONS => {
+                    let script = command::complete(command::shell(subcommand), command_line());
+                    Ok(Parsed::Show(script))
+                }
+                #[cfg(feature = "cli")]
+                command::MAN => Ok(Parsed::WriteManual(command::folder(subcommand))),
+                #[cfg(feature = "cli")]
+                subject => {
+                    let leaf = subcommand.subcommand().map_or(subcommand, |(_, leaf)| leaf);
+                    let token = setting::given(&TOKEN, leaf, &environment);
+                    let token = token.map(read_token).transpose()?;
+                    Ok(Parsed::Ask(Asked::new(subject, subcommand, token)))
+                }
+                #[cfg(not(feature = "cli"))]
+                _ => Err(UsageError::UnknownArgument {
+                    argument: name.to_owned(),
+                }),
             };
         }
         let given = |setting: &LaunchOption| given(setting, &matches, &environment);
         Self::read(given).map(Parsed::Serve)
-    }
-
-    /// A record to be replayed, or to be served in the arm's place.
-    #[cfg(feature = "record")]
-    fn of_replay(
-        matches: &ArgMatches,
-        environment: impl Fn(&str) -> Option<OsString>,
-    ) -> Result<Parsed, UsageError> {
-        let replay = record::read(matches);
-        let mut of_serving = SETTINGS.iter().filter(|one| record::is_of_replay(one));
-        if matches.get_flag(record::SERVE) {
-            let given = |setting: &LaunchOption| {
-                let is_ours = record::is_of_replay(setting);
-                is_ours.then(|| given(setting, matches, &environment))?
-            };
-            let mut options = Self::read(given)?;
-            options.record.replay = Some(replay.file);
-            return Ok(Parsed::Serve(options));
-        }
-        match of_serving.find(|one| matches.contains_id(one.option)) {
-            Some(stray) => Err(UsageError::UnknownArgument {
-                argument: format!("--{} without --{}", stray.option, record::SERVE),
-            }),
-            None => Ok(Parsed::Replay(replay)),
-        }
     }
 
     fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Result<Self, UsageError> {
@@ -274,6 +290,10 @@ impl Options {
                 .map(read_log)
                 .transpose()?
                 .unwrap_or(LevelFilter::INFO),
+            log_format: given(&LOG_FORMAT)
+                .map(read_log_format)
+                .transpose()?
+                .unwrap_or_default(),
             token,
             #[cfg(feature = "record")]
             record: RecordOptions::read(&given),
@@ -284,7 +304,8 @@ impl Options {
 }
 
 /// The command line as `clap` is to read it. The values stay unread, and the variables unknown to it.
-fn command() -> Command {
+#[must_use]
+pub fn command_line() -> Command {
     let command = Command::new(env!("CARGO_PKG_NAME"))
         .version(BUILD)
         .about(env!("CARGO_PKG_DESCRIPTION"))
@@ -296,6 +317,10 @@ fn command() -> Command {
     let command = command.subcommand(report::command());
     #[cfg(feature = "record")]
     let command = command.subcommand(record::command(arguments(record::is_of_replay)));
+    #[cfg(feature = "cli")]
+    let command = command
+        .subcommands(command::subjects())
+        .subcommands(command::tools());
     command
 }
 
@@ -325,34 +350,6 @@ fn arguments(chosen: fn(&LaunchOption) -> bool) -> impl Iterator<Item = Arg> {
         } else {
             arg
         }
-    })
-}
-
-/// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
-fn explained(error: &clap::Error) -> Result<Parsed, UsageError> {
-    let context = |kind| match error.get(kind) {
-        Some(ContextValue::String(text)) => text.clone(),
-        _ => String::new(),
-    };
-    // The argument as the user gave it, and the option as the help shows it, share this place.
-    let argument = match error.kind() {
-        ErrorKind::InvalidSubcommand => context(ContextKind::InvalidSubcommand),
-        _ => context(ContextKind::InvalidArg),
-    };
-    Err(match error.kind() {
-        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
-            return Ok(Parsed::Show(error.to_string()));
-        }
-        ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand => {
-            UsageError::UnknownArgument { argument }
-        }
-        ErrorKind::InvalidValue => UsageError::MissingValue { option: argument },
-        ErrorKind::ArgumentConflict => UsageError::Repeated { option: argument },
-        ErrorKind::TooManyValues => UsageError::UnexpectedValue {
-            option: argument,
-            value: context(ContextKind::InvalidValue),
-        },
-        kind => UsageError::Arguments { kind },
     })
 }
 
@@ -388,4 +385,12 @@ fn read_log(Given { origin, value }: Given) -> Result<LevelFilter, UsageError> {
     known
         .map(|(_, level)| *level)
         .ok_or(UsageError::Log { origin, value })
+}
+
+fn read_log_format(Given { origin, value }: Given) -> Result<LogFormat, UsageError> {
+    match value.as_str() {
+        "text" => Ok(LogFormat::Text),
+        "json" => Ok(LogFormat::Json),
+        _ => Err(UsageError::LogFormat { origin, value }),
+    }
 }

@@ -55,6 +55,38 @@ pub enum UsageError {
         /// The value given to it.
         value: String,
     },
+    /// A subject without one of its commands.
+    #[error("{before} needs one of {known}; --help shows them")]
+    MissingCommand {
+        /// The words before it.
+        before: String,
+        /// The commands that there are.
+        known: String,
+    },
+    /// An argument that has to be there.
+    #[error("{arguments} has to be given; --help shows what for")]
+    MissingArgument {
+        /// The arguments as the help shows them.
+        arguments: String,
+    },
+    /// Two that do not go together.
+    #[error("{argument} does not go with {other}")]
+    Conflict {
+        /// The one.
+        argument: String,
+        /// The other.
+        other: String,
+    },
+    /// A value that an argument does not take.
+    #[error("{argument} {needs}, got {value:?}")]
+    Value {
+        /// The argument as the help shows it.
+        argument: String,
+        /// The values that it takes.
+        needs: String,
+        /// The value.
+        value: String,
+    },
     /// Anything else that is wrong with the arguments' form.
     #[error("the arguments cannot be read ({kind:?}); --help shows them")]
     Arguments {
@@ -112,6 +144,14 @@ pub enum UsageError {
     /// No log level.
     #[error("{origin} must be one of off, error, warn, info, debug, trace, got {value:?}")]
     Log {
+        /// Whose value it is.
+        origin: Origin,
+        /// The value.
+        value: String,
+    },
+    /// No format of the log.
+    #[error("{origin} must be text or json, got {value:?}")]
+    LogFormat {
         /// Whose value it is.
         origin: Origin,
         /// The value.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 /// Floors that a floor may name, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 12] = [
+const FLOORS: [(&str, &[&str]); 13] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
@@ -21,7 +21,11 @@ const FLOORS: [(&str, &[&str]); 12] = [
     ("record", &["math", "protocol"]),
     ("web", &["protocol"]),
     ("report", &["math", "study"]),
-    ("options", &["protocol", "web", "report"]),
+    ("command", &["protocol"]),
+    (
+        "options",
+        &["protocol", "web", "report", "command", "logging"],
+    ),
     ("plan", &["math", "study", "options"]),
     (
         "actors",
@@ -32,7 +36,9 @@ const FLOORS: [(&str, &[&str]); 12] = [
     ("lib", &[]),
     (
         "main",
-        &["logging", "record", "report", "options", "plan", "actors"],
+        &[
+            "command", "logging", "record", "report", "options", "plan", "actors",
+        ],
     ),
 ];
 

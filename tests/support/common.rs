@@ -13,11 +13,12 @@ pub const SET_GRAVITY: &str =
     "{\"op\":\"call_service\",\"service\":\"/arm_sim/set_params\",\"args\":{\"gravity\":1}}\n";
 
 /// The variables of the environment that the program reads.
-pub const VARIABLES: [&str; 11] = [
+pub const VARIABLES: [&str; 12] = [
     "ARM_SIM_LINKS",
     "ARM_SIM_BIND",
     "ARM_SIM_SEED",
     "ARM_SIM_LOG",
+    "ARM_SIM_LOG_FORMAT",
     "ARM_SIM_TOKEN",
     "ARM_SIM_RECORD",
     "ARM_SIM_RECORD_DIR",

@@ -45,11 +45,23 @@ struct Talkative {
 
 impl Talkative {
     fn start(name: &str) -> Self {
+        Self::with(name, "text")
+    }
+
+    /// The same, with another format of the log.
+    fn with(name: &str, format: &str) -> Self {
         let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
         let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).unwrap();
         let mut child = Command::new(env!("CARGO_BIN_EXE_pendularm"))
-            .args(["--bind", "127.0.0.1:0", "--log", "trace"])
+            .args([
+                "--bind",
+                "127.0.0.1:0",
+                "--log",
+                "trace",
+                "--log-format",
+                format,
+            ])
             .current_dir(&folder)
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -94,6 +106,12 @@ impl Drop for Talkative {
     }
 }
 
+/// Whether a character does something on a terminal.
+fn acts(one: char) -> bool {
+    one.is_control()
+        || matches!(one, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+}
+
 /// Each line is a record: a time, a level, a module of ours, and characters that show themselves only.
 fn assert_records(log: &str) {
     assert!(log.ends_with('\n') && log.lines().count() > 3, "{log:?}");
@@ -119,10 +137,26 @@ fn assert_records(log: &str) {
             target.starts_with("pendularm") && target.ends_with(':'),
             "{line:?}"
         );
-        let acts = |one: char| {
-            one.is_control()
-                || matches!(one, '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}')
+        assert!(!line.contains(acts), "{line:?}");
+        assert!(line.len() <= LONGEST_LINE, "{} bytes: {line:?}", line.len());
+    }
+}
+
+/// Each line is one JSON object with what every record has.
+fn assert_objects(log: &str) {
+    assert!(log.ends_with('\n') && log.lines().count() > 3, "{log:?}");
+    for line in log.split_terminator('\n') {
+        let object: Value =
+            serde_json::from_str(line).unwrap_or_else(|why| panic!("{why}: {line:?}"));
+        let text = |name: &str| {
+            object[name]
+                .as_str()
+                .unwrap_or_else(|| panic!("{name}: {line}"))
         };
+        assert!(text("timestamp").ends_with('Z'), "{line}");
+        assert!(["ERROR", "WARN", "INFO", "DEBUG", "TRACE"].contains(&text("level")));
+        assert!(text("target").starts_with("pendularm"), "{line}");
+        assert!(!text("message").is_empty(), "{line}");
         assert!(!line.contains(acts), "{line:?}");
         assert!(line.len() <= LONGEST_LINE, "{} bytes: {line:?}", line.len());
     }
@@ -275,4 +309,26 @@ fn what_the_runtime_publishes_of_itself_is_json_whatever_clients_sent() {
         assert!(!frame.to_string().contains("forged"), "{frame}");
     }
     assert_records(&runtime.end());
+}
+
+#[test]
+fn as_json_each_line_of_the_log_is_one_object_whatever_is_sent() {
+    let runtime = Talkative::with("hostile_log_json", "json");
+    for text in HOSTILE {
+        let mut client = Client::to(runtime.address);
+        for op in ops(text) {
+            client.send(&op);
+        }
+        client.settle();
+    }
+    let long = "\u{202e}".repeat(LONGEST_LINE);
+    let mut client = Client::to(runtime.address);
+    client.send(&json!({"op": long, "topic": long}));
+    client.settle();
+    let log = runtime.end();
+    assert_objects(&log);
+    assert!(
+        log.contains("\"level\":\"DEBUG\"") && log.contains("\"connection\":"),
+        "{log}"
+    );
 }

@@ -26,6 +26,10 @@ mod cbor;
 mod client_actions;
 mod clock_diagnostics;
 mod closing;
+#[cfg(feature = "cli")]
+mod command;
+#[cfg(feature = "cli")]
+mod command_end;
 #[path = "../support/common.rs"]
 mod common;
 mod divergence;

@@ -6,6 +6,7 @@ use std::ffi::OsString;
 use std::process::{Command, Output, Stdio};
 
 use crate::common;
+use pendularm::logging::LogFormat;
 use pendularm::options::{DEFAULT_BIND, Links, Options, Parsed, UsageError};
 use proptest::prelude::*;
 use tracing::level_filters::LevelFilter;
@@ -58,6 +59,7 @@ fn an_empty_variable_counts_as_unset() {
         ("ARM_SIM_BIND", ""),
         ("ARM_SIM_SEED", ""),
         ("ARM_SIM_LOG", ""),
+        ("ARM_SIM_LOG_FORMAT", ""),
         ("ARM_SIM_TOKEN", ""),
         ("ARM_SIM_RECORD", ""),
         ("ARM_SIM_RECORD_DIR", ""),
@@ -201,6 +203,21 @@ fn every_log_level_has_a_name_and_other_names_are_refused() {
 }
 
 #[test]
+fn the_log_is_text_or_json() {
+    assert_eq!(options(&[], &[]).log_format, LogFormat::Text);
+    assert_eq!(
+        options(&["--log-format=json"], &[]).log_format,
+        LogFormat::Json
+    );
+    let variable = [("ARM_SIM_LOG_FORMAT", "json")];
+    assert_eq!(options(&[], &variable).log_format, LogFormat::Json);
+    assert_eq!(
+        refusal(&["--log-format", "xml"], &variable),
+        "--log-format must be text or json, got \"xml\""
+    );
+}
+
+#[test]
 fn arguments_that_do_not_exist_are_refused_by_name() {
     for argument in ["--speed", "-x", "fly", "--link"] {
         let expected = format!("unknown argument {argument:?}; --help shows all of them");
@@ -258,6 +275,7 @@ fn the_help_shows_every_option_with_its_variable_and_default() {
         ("--bind <ADDRESS>", "ARM_SIM_BIND", "127.0.0.1:9095"),
         ("--seed <N>", "ARM_SIM_SEED", "a new seed at every start"),
         ("--log <LEVEL>", "ARM_SIM_LOG", "info"),
+        ("--log-format <FORMAT>", "ARM_SIM_LOG_FORMAT", "text"),
         ("--token <TOKEN>", "ARM_SIM_TOKEN", "none"),
         #[cfg(feature = "record")]
         ("--record <FILE>", "ARM_SIM_RECORD", "none"),
@@ -499,6 +517,30 @@ fn bad_usage_ends_the_program_with_one_line_and_status_2() {
     is_bad_usage(
         &program(&["--bind", "0.0.0.0:0"]).output().unwrap(),
         "loopback",
+    );
+}
+
+/// The address is taken: by a listener of this test's own.
+#[test]
+fn as_json_the_reason_for_not_starting_is_an_object_too() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let output = program(&["--bind", &address, "--log-format", "json"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let log = String::from_utf8(output.stderr).unwrap();
+    let last: serde_json::Value = serde_json::from_str(log.lines().last().unwrap()).unwrap();
+    assert_eq!(last["level"], "ERROR");
+    assert!(
+        last["message"].as_str().unwrap().contains(&address),
+        "{log}"
+    );
+    let output = program(&["--bind", &address]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.lines().last().unwrap().starts_with("pendularm: "),
+        "{said}"
     );
 }
 

@@ -29,18 +29,35 @@ pub(crate) fn shortened(text: &str, limit: usize) -> String {
     short
 }
 
-/// Appends a character, escaped where it does something on a terminal other than to show itself: control characters,
-/// and those that end a line or turn the direction of writing.
-pub(crate) fn push_plain(text: &mut String, character: char) {
-    let acts = matches!(
+/// Whether a character does something on a terminal other than to show itself: control characters, and those that end a
+/// line or turn the direction of writing. Each has at most four hexadecimal digits.
+pub(crate) fn acts(character: char) -> bool {
+    let turns = matches!(
         character,
         '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{feff}'
     );
-    if acts || character.is_control() {
+    turns || character.is_control()
+}
+
+/// Appends a character, escaped where it [acts].
+pub(crate) fn push_plain(text: &mut String, character: char) {
+    if acts(character) {
         // A `String` takes whatever is written to it.
         let _ = write!(text, "{}", character.escape_default());
     } else {
         text.push(character);
+    }
+}
+
+/// The same within the quotation marks of JSON, which YAML reads too.
+pub(crate) fn push_quoted(text: &mut String, character: char) {
+    match character {
+        '"' | '\\' => text.extend(['\\', character]),
+        '\n' => text.push_str("\\n"),
+        _ if acts(character) => {
+            let _ = write!(text, "\\u{:04x}", u32::from(character));
+        }
+        _ => text.push(character),
     }
 }
 

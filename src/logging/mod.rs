@@ -6,21 +6,24 @@
 //! **Invariant:** logging never blocks, a broken standard error never fails anything, and an event is one line,
 //! whatever its text.
 
-use std::fmt::{self, Write as _};
+mod object;
+mod warnings;
+
 use std::io::{self, Write};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-use tokio::sync::mpsc::Sender;
-use tracing::field::{Field, Visit};
 use tracing::level_filters::LevelFilter;
 use tracing::{Event, Level, Subscriber};
 use tracing_subscriber::Layer;
 use tracing_subscriber::layer::{Context, SubscriberExt};
 
+use self::object::LogObject;
+use self::warnings::Warnings;
+pub use self::warnings::{Warning, hear_warnings};
 use crate::protocol::wire::text::push_plain;
 
 /// Lines that may wait for the writer: more than any burst of connections logs at the default level.
@@ -38,9 +41,20 @@ enum Entry {
     Written(SyncSender<()>),
 }
 
+/// How each line of the log is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum LogFormat {
+    /// For people.
+    #[default]
+    Text,
+    /// One JSON object, for programs.
+    Json,
+}
+
 /// The way into the log.
 #[derive(Clone)]
 pub struct Log {
+    format: LogFormat,
     entries: SyncSender<Entry>,
     dropped: Arc<AtomicU64>,
 }
@@ -49,118 +63,64 @@ pub struct Log {
 ///
 /// # Errors
 /// If the thread that writes cannot be started, or a log has been started already.
-pub fn start(level: LevelFilter) -> io::Result<Log> {
-    let log = Log::to(io::stderr())?;
+pub fn start(level: LevelFilter, format: LogFormat) -> io::Result<Log> {
+    let log = Log::to(io::stderr(), format)?;
     let lines = log.clone();
-    let printed = tracing_subscriber::fmt::layer()
-        .with_writer(move || lines.clone())
-        .with_filter(level);
-    let subscriber = tracing_subscriber::registry().with(printed).with(Warnings);
-    tracing::subscriber::set_global_default(subscriber).map_err(io::Error::other)?;
+    let events = tracing_subscriber::registry();
+    match format {
+        LogFormat::Text => {
+            let printed = tracing_subscriber::fmt::layer().with_writer(move || lines.clone());
+            let events = events.with(printed.with_filter(level)).with(Warnings);
+            tracing::subscriber::set_global_default(events)
+        }
+        LogFormat::Json => {
+            let events = events
+                .with(Objects(lines).with_filter(level))
+                .with(Warnings);
+            tracing::subscriber::set_global_default(events)
+        }
+    }
+    .map_err(io::Error::other)?;
     Ok(log)
 }
 
-/// A warning or an error, for whoever listens in the program itself.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Warning {
-    /// As ROS has it: 30 is a warning, 40 an error.
-    pub level: u8,
-    /// The node that it comes from.
-    pub node: &'static str,
-    /// The event, in words.
-    pub text: String,
-    /// The source file.
-    pub file: &'static str,
-    /// The line in it.
-    pub line: u32,
-}
+/// Puts events into the log as objects.
+struct Objects(Log);
 
-/// Who listens to warnings.
-static LISTENER: Mutex<Option<Sender<Warning>>> = Mutex::new(None);
-
-/// Warnings and errors go to `listener` too from now on, whatever the log's level; `None`: to nobody. What does not fit
-/// into the channel is not waited for.
-pub fn hear_warnings(listener: Option<Sender<Warning>>) {
-    *LISTENER.lock().unwrap_or_else(PoisonError::into_inner) = listener;
-}
-
-/// Hands warnings to the listener.
-struct Warnings;
-
-impl<S: Subscriber> Layer<S> for Warnings {
-    fn max_level_hint(&self) -> Option<LevelFilter> {
-        Some(LevelFilter::WARN)
-    }
-
+impl<S: Subscriber> Layer<S> for Objects {
     fn on_event(&self, event: &Event<'_>, _: Context<'_, S>) {
         let metadata = event.metadata();
-        let level = match *metadata.level() {
-            Level::ERROR => 40,
-            Level::WARN => 30,
-            _ => return,
-        };
-        let listener = LISTENER.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(listener) = &*listener {
-            let mut text = Text::default();
-            event.record(&mut text);
-            let _ = listener.try_send(Warning {
-                level,
-                node: node_of(metadata.target()),
-                text: text.0,
-                file: metadata.file().unwrap_or_default(),
-                line: metadata.line().unwrap_or_default(),
-            });
-        }
-    }
-}
-
-/// The actor in whose module something was reported: `registry` of `pendularm::actors::gateway::registry::ops`.
-fn node_of(target: &'static str) -> &'static str {
-    let modules = target.split("::").skip_while(|part| *part != "actors");
-    let modules: Vec<&'static str> = modules.skip(1).take(2).collect();
-    match modules[..] {
-        ["arm", "sim"] => "arm_sim",
-        // Folders, in which the actors stand.
-        ["arm" | "compute" | "gateway" | "resources" | "ros", actor] | [actor, ..] => actor,
-        [] => "pendularm",
-    }
-}
-
-/// An event as one line: the message, then the fields.
-#[derive(Default)]
-struct Text(String);
-
-impl Visit for Text {
-    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        // A `String` takes whatever is written to it.
-        let _ = if field.name() == "message" {
-            let fields = std::mem::take(&mut self.0);
-            write!(self.0, "{value:?}{fields}")
-        } else {
-            write!(self.0, " {}={value:?}", field.name())
-        };
+        let mut object = LogObject::new(*metadata.level(), metadata.target(), LINE_BYTES);
+        event.record(&mut object);
+        self.0.put(object.line());
     }
 }
 
 impl Log {
-    fn to(sink: impl Write + Send + 'static) -> io::Result<Self> {
+    fn to(sink: impl Write + Send + 'static, format: LogFormat) -> io::Result<Self> {
         let (entries, queue) = sync_channel(QUEUE_LINES);
         let log = Self {
+            format,
             entries,
             dropped: Arc::default(),
         };
         let dropped = Arc::clone(&log.dropped);
         thread::Builder::new()
             .name("log".into())
-            .spawn(move || write(&queue, &dropped, sink))?;
+            .spawn(move || write(&queue, &dropped, format, sink))?;
         Ok(log)
     }
 
-    /// Puts a line into the log, whatever its level is.
+    /// Puts a line into the log, whatever the log's level is: an error.
     pub fn say(&self, line: &str) {
-        let line = format!("{line}\n");
-        // A line that does not fit is lost, as any line.
-        let _ = self.clone().write_all(line.as_bytes());
+        self.put(own(Level::ERROR, line, self.format));
+    }
+
+    /// A line that does not fit is lost, and counted.
+    fn put(&self, line: Vec<u8>) {
+        if self.entries.try_send(Entry::Line(line)).is_err() {
+            self.dropped.fetch_add(1, Ordering::Relaxed);
+        }
     }
 
     /// Waits until what was logged so far is written, for a moment at most.
@@ -176,9 +136,7 @@ impl Log {
 /// Takes one line at a time: `tracing-subscriber` formats an event first, then writes it whole.
 impl Write for Log {
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
-        if self.entries.try_send(Entry::Line(plain(line))).is_err() {
-            self.dropped.fetch_add(1, Ordering::Relaxed);
-        }
+        self.put(plain(line));
         Ok(line.len())
     }
 
@@ -204,8 +162,20 @@ fn plain(line: &[u8]) -> Vec<u8> {
     kept.into_bytes()
 }
 
+/// A line of the log's own.
+fn own(level: Level, line: &str, format: LogFormat) -> Vec<u8> {
+    match format {
+        LogFormat::Text => plain(line.as_bytes()),
+        LogFormat::Json => {
+            let mut object = LogObject::new(level, "pendularm::logging", LINE_BYTES);
+            object.member("message", line);
+            object.line()
+        }
+    }
+}
+
 /// Writes line after line until the last [`Log`] is gone. An error of the sink has nowhere to be told.
-fn write(queue: &Receiver<Entry>, dropped: &AtomicU64, mut sink: impl Write) {
+fn write(queue: &Receiver<Entry>, dropped: &AtomicU64, format: LogFormat, mut sink: impl Write) {
     for entry in queue {
         match entry {
             Entry::Line(line) => {
@@ -218,10 +188,8 @@ fn write(queue: &Receiver<Entry>, dropped: &AtomicU64, mut sink: impl Write) {
         }
         let lost = dropped.swap(0, Ordering::Relaxed);
         if lost > 0 {
-            let _ = writeln!(
-                sink,
-                "{lost} log lines were dropped: nobody read them fast enough"
-            );
+            let line = format!("{lost} log lines were dropped: nobody read them fast enough");
+            let _ = sink.write_all(&own(Level::WARN, &line, format));
         }
     }
 }
@@ -232,21 +200,6 @@ mod tests {
     use std::sync::{Condvar, Mutex};
 
     use super::*;
-
-    #[test]
-    fn a_warning_names_the_actor_and_not_the_folder_in_which_it_stands() {
-        for (target, node) in [
-            ("pendularm::actors::arm::sim::telemetry", "arm_sim"),
-            ("pendularm::actors::arm::ik_action", "ik_action"),
-            ("pendularm::actors::gateway::registry::ops", "registry"),
-            ("pendularm::actors::gateway::connection", "connection"),
-            ("pendularm::actors::compute::workers", "workers"),
-            ("pendularm::actors::runtime", "runtime"),
-            ("pendularm::logging", "pendularm"),
-        ] {
-            assert_eq!(node_of(target), node, "{target}");
-        }
-    }
 
     /// A sink that can be held shut, and tells each write.
     #[derive(Clone)]
@@ -294,7 +247,7 @@ mod tests {
     #[test]
     fn finishing_waits_for_what_was_logged() {
         let (gate, seen) = Gate::new(true);
-        let mut log = Log::to(gate).unwrap();
+        let mut log = Log::to(gate, LogFormat::Text).unwrap();
         log.write_all(b"first\n").unwrap();
         log.write_all(b"second\n").unwrap();
         log.finish();
@@ -304,7 +257,7 @@ mod tests {
     #[test]
     fn a_sink_that_takes_nothing_blocks_nobody_and_the_loss_is_reported() {
         let (gate, seen) = Gate::new(false);
-        let mut log = Log::to(gate.clone()).unwrap();
+        let mut log = Log::to(gate.clone(), LogFormat::Text).unwrap();
         // The writer holds one line at the gate, or none yet; the queue holds the rest.
         for _ in 0..QUEUE_LINES + 10 {
             log.write_all(b"line\n").unwrap();
@@ -325,13 +278,37 @@ mod tests {
         );
     }
 
+    #[test]
+    fn as_json_lines_of_the_log_itself_are_objects_too() {
+        let (gate, seen) = Gate::new(false);
+        let log = Log::to(gate.clone(), LogFormat::Json).unwrap();
+        for _ in 0..QUEUE_LINES + 10 {
+            log.say("a \"line\"\n");
+        }
+        gate.open();
+        drop((log, gate));
+        let text: String = seen.iter().collect();
+        let objects = text
+            .lines()
+            .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+        let messages: Vec<String> = objects
+            .map(|object| object["message"].as_str().unwrap().to_owned())
+            .collect();
+        assert_eq!(messages[0], "a \"line\"\n");
+        assert!(
+            messages
+                .iter()
+                .any(|one| one.contains("log lines were dropped"))
+        );
+    }
+
     /// A client's text may be in an event: neither a line of its own nor a sequence that a terminal obeys comes of it.
     #[test]
     fn an_event_is_one_line_and_nothing_on_it_acts() {
         let hostile =
             "a\r\nERROR forged\u{1b}[2J\u{7}\0\u{202e}\u{2028}\u{9b}31m\u{feff} %s{} \u{e9}";
         let (gate, seen) = Gate::new(true);
-        let mut log = Log::to(gate).unwrap();
+        let mut log = Log::to(gate, LogFormat::Text).unwrap();
         log.write_all(format!("{hostile}\n").as_bytes()).unwrap();
         log.write_all(b"not UTF-8: \xff\xfe\n").unwrap();
         log.finish();
@@ -354,7 +331,7 @@ mod tests {
     #[test]
     fn a_line_is_cut_at_its_limit() {
         let (gate, seen) = Gate::new(true);
-        let mut log = Log::to(gate).unwrap();
+        let mut log = Log::to(gate, LogFormat::Text).unwrap();
         log.write_all(&[b'x'; 3 * LINE_BYTES]).unwrap();
         log.finish();
         assert_eq!(

@@ -1,0 +1,384 @@
+//! How the commands end where there is nobody to ask, nobody to read, or nothing to be understood; their pages, and what a
+//! package has beside the program.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{SocketAddr, TcpListener};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+use std::thread;
+
+use crate::common::{self, Runtime};
+
+/// Every command that asks a running one, with what it needs.
+const COMMANDS: [&[&str]; 12] = [
+    &["topic", "list"],
+    &["topic", "echo", "/clock"],
+    &["topic", "hz", "/clock"],
+    &["topic", "pub", "/chatter", "{}"],
+    &["service", "list"],
+    &["service", "call", "/arm_sim/reset"],
+    &["action", "list"],
+    &["action", "send_goal", "/ik_action", "{}"],
+    &["param", "list"],
+    &["param", "get", "/arm_sim", "gravity"],
+    &["param", "set", "/arm_sim", "gravity", "1"],
+    &["diagnostics"],
+];
+
+fn output(arguments: &[&str]) -> Output {
+    let mut command = common::program();
+    command.args(arguments).stdin(Stdio::null());
+    command.output().unwrap()
+}
+
+/// The one line with which a command ends that was not done.
+#[track_caller]
+fn complaint(output: &Output, status: i32) -> String {
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(status), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.starts_with("pendularm: "), "{said}");
+    assert!(output.stdout.is_empty());
+    said
+}
+
+#[test]
+fn without_a_runtime_the_status_is_3() {
+    let free = TcpListener::bind("127.0.0.1:0")
+        .unwrap()
+        .local_addr()
+        .unwrap();
+    for command in COMMANDS {
+        let address = free.to_string();
+        let said = output(&[command, &["--connect", &address]].concat());
+        let said = complaint(&said, 3);
+        assert!(
+            said.contains(&format!("cannot connect to {address}: ")),
+            "{said}"
+        );
+    }
+}
+
+/// A server that says these bytes to whoever comes, and then closes or says nothing more.
+fn server(says: &'static [u8], closes: bool) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        let mut kept = Vec::new();
+        for stream in listener.incoming() {
+            let mut stream = stream.unwrap();
+            let _ = stream.write_all(says);
+            if closes {
+                // Reads what was sent, so that the end is no reset.
+                let _ = BufReader::new(&stream).read_line(&mut String::new());
+            } else {
+                kept.push(stream);
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn a_server_that_is_none_or_does_not_answer_gives_status_3() {
+    for (says, closes, word) in [
+        (&b""[..], true, "closed"),
+        (b"HTTP/1.1 400 Bad Request\r\n", false, "no frame came"),
+        (b"{\"op\":", true, "within a frame"),
+        (b"[1, 2]\n", false, "no frame came"),
+        (b"", false, "nothing came within 0.2 s"),
+        (
+            b"{\"op\":\"service_response\",\"id\":7}\n",
+            false,
+            "nothing came",
+        ),
+    ] {
+        let address = server(says, closes).to_string();
+        let is_silent = word.starts_with("nothing");
+        let patience = if is_silent {
+            "0.2".to_owned()
+        } else {
+            common::PATIENCE.as_secs().to_string()
+        };
+        for command in [COMMANDS[0], COMMANDS[5], COMMANDS[11]] {
+            let said =
+                output(&[command, &["--connect", &address, "--timeout", &patience]].concat());
+            let said = complaint(&said, 3);
+            assert!(said.contains(word), "{command:?}: {said}");
+        }
+    }
+}
+
+/// More than the runtime lets wait for one client, and no end of a line.
+#[test]
+fn a_line_without_end_is_not_read_without_end() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let server = thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let chunk = vec![b' '; 1 << 20];
+        (0..1024)
+            .take_while(|_| stream.write_all(&chunk).is_ok())
+            .count()
+    });
+    let said = output(&["topic", "list", "--connect", &address]);
+    assert!(complaint(&said, 3).contains("within a frame"));
+    assert!(server.join().unwrap() < 200, "MiB");
+}
+
+#[test]
+fn a_token_is_shown_from_the_option_or_the_variable() {
+    let token = "open-sesame-once-more";
+    let runtime = Runtime::with(&["--token", token]);
+    let address = runtime.address.to_string();
+    let list = ["topic", "list", "--connect", &address];
+    let said = complaint(&output(&list), 1);
+    assert!(said.contains("token"), "{said}");
+    let wrong = [&list[..], &["--token", "open-sesame-once-less"]].concat();
+    complaint(&output(&wrong), 1);
+    let right = [&list[..], &["--token", token]].concat();
+    assert_eq!(output(&right).status.code(), Some(0));
+    let mut command = common::program();
+    command.args(list).env("ARM_SIM_TOKEN", token);
+    assert_eq!(command.output().unwrap().status.code(), Some(0));
+    command.env("ARM_SIM_TOKEN", "short");
+    let said = complaint(&command.output().unwrap(), 2);
+    assert!(
+        said.starts_with("pendularm: ARM_SIM_TOKEN must be at least"),
+        "{said}"
+    );
+}
+
+#[test]
+fn bad_usage_gives_status_2_and_a_line_that_names_it() {
+    for (arguments, words) in [
+        (
+            &["topic"][..],
+            "pendularm topic needs one of list, echo, hz, pub",
+        ),
+        (&["topic", "fly"], "\"fly\""),
+        (&["topic", "echo"], "<TOPIC> has to be given"),
+        (&["topic", "echo", "/a", "b/msg/C", "d"], "\"d\""),
+        (
+            &["topic", "list", "--connect", "nowhere"],
+            "must be a host with a port",
+        ),
+        (
+            &["topic", "list", "--timeout", "0"],
+            "--timeout <SECONDS> must be a number",
+        ),
+        (
+            &["topic", "hz", "/a", "-w", "0"],
+            "must be a whole number from 1",
+        ),
+        (&["topic", "pub", "/a", "{}", "-r", "x"], "got \"x\""),
+        (
+            &["topic", "pub", "/a", "{}", "-1", "-t", "3"],
+            "--once does not go with --times <N>",
+        ),
+        (
+            &["completions", "tcsh"],
+            "must be one of bash, elvish, fish, powershell, zsh",
+        ),
+        (&["--links", "3", "topic", "list"], "--links"),
+    ] {
+        let said = complaint(&output(arguments), 2);
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
+
+/// Nobody listens on port 1: what is wrong is noticed before anything is sent.
+#[test]
+fn a_value_that_cannot_be_read_gives_status_2_before_anything_is_sent() {
+    let (list, block) = ("[".repeat(60_000), "- ".repeat(60_000));
+    for (arguments, words) in [
+        (
+            &["topic", "pub", "/a", "{a: ["][..],
+            "MESSAGE cannot be read as JSON or YAML",
+        ),
+        (
+            &["topic", "pub", "/a", "{a: .nan}"],
+            ".nan is no number of JSON",
+        ),
+        (
+            &["topic", "pub", "/a", "a: 1\n---\nb: 2"],
+            "more than one document",
+        ),
+        (
+            &["service", "call", "/a", "x/srv/Y", "}"],
+            "ARGS cannot be read",
+        ),
+        (&["action", "send", "/a", "[}"], "GOAL cannot be read"),
+        (
+            &["param", "set", "/arm_sim", "gravity", "'"],
+            "VALUE cannot be read",
+        ),
+        (&["topic", "pub", "/a", &list], "recursion limit"),
+        (&["topic", "pub", "/a", &block], "nested more than 128 deep"),
+        (&["topic", "pub", "/a", "{a: &a [1], b: *a}"], "an alias"),
+    ] {
+        let connect = ["--connect", "127.0.0.1:1"];
+        let said = output(&[&arguments[..2], &connect, &["--"], &arguments[2..]].concat());
+        let said = complaint(&said, 2);
+        assert!(said.contains(words), "{arguments:?}: {said}");
+    }
+}
+
+/// As in `pendularm topic echo /clock | head -n 1`.
+#[test]
+fn a_reader_that_goes_away_ends_a_command_quietly() {
+    let runtime = Runtime::start();
+    let address = runtime.address.to_string();
+    for command in [
+        COMMANDS[1],
+        COMMANDS[2],
+        &["topic", "pub", "/chatter", "{}", "-r", "100"],
+    ] {
+        let mut child = common::program()
+            .args(command)
+            .args(["--connect", &address])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        assert!(!line.is_empty());
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(0), "{command:?}");
+        assert!(
+            output.stderr.is_empty(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+    }
+}
+
+/// Every write to `/dev/full` fails.
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_cannot_be_written_is_no_success() {
+    let runtime = Runtime::start();
+    let full = fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = common::program()
+        .args(["topic", "list", "--connect", &runtime.address.to_string()])
+        .stdout(full)
+        .output()
+        .unwrap();
+    assert!(complaint(&output, 1).contains("standard output: "));
+}
+
+#[test]
+fn every_page_of_help_has_an_example_and_the_exit_statuses() {
+    for command in COMMANDS {
+        let verb = &command[..command
+            .len()
+            .min(if command[0] == "diagnostics" { 1 } else { 2 })];
+        let output = output(&[verb, &["--help"]].concat());
+        let page = String::from_utf8(output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        let name = format!("pendularm {}", verb.join(" "));
+        assert!(page.contains(&format!("Usage: {name}")), "{page}");
+        assert!(page.contains(&format!("\n  {name}")), "no example:\n{page}");
+        assert!(page.contains("Exit status: 0 if") && page.contains("--connect <HOST:PORT>"));
+        let widest = page.lines().map(|line| line.chars().count()).max();
+        assert!(widest <= Some(125), "{page}");
+    }
+}
+
+#[test]
+fn completions_know_every_command_and_a_shell_can_read_them() {
+    for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
+        let script = output(&["completions", shell]);
+        assert_eq!(script.status.code(), Some(0));
+        let script = String::from_utf8(script.stdout).unwrap();
+        for word in ["send_goal", "diagnostics", "log-format", "connect"] {
+            assert!(script.contains(word), "{shell}: no {word}");
+        }
+        if shell == "bash" {
+            let mut bash = Command::new("bash")
+                .args(["-n"])
+                .stdin(Stdio::piped())
+                .spawn()
+                .unwrap();
+            bash.stdin
+                .take()
+                .unwrap()
+                .write_all(script.as_bytes())
+                .unwrap();
+            assert!(bash.wait().unwrap().success());
+        }
+    }
+}
+
+#[test]
+fn the_manual_has_a_page_for_every_command() {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("manual");
+    let _ = fs::remove_dir_all(&folder);
+    let path = folder.to_str().unwrap();
+    let missing = complaint(&output(&["man", path]), 1);
+    assert!(missing.contains("the manual's folder"), "{missing}");
+    fs::create_dir_all(&folder).unwrap();
+    assert_eq!(output(&["man", path]).status.code(), Some(0));
+    let page = |name: &str| fs::read_to_string(folder.join(format!("{name}.1"))).unwrap();
+    for command in COMMANDS {
+        let words = &command[..command
+            .len()
+            .min(if command[0] == "diagnostics" { 1 } else { 2 })];
+        let name = format!("pendularm-{}", words.join("-"));
+        assert!(page(&name).contains("Exit status"), "{name}");
+    }
+    let first = page("pendularm");
+    for subject in ["topic", "service", "action", "param", "diagnostics", "plan"] {
+        assert!(
+            first.contains(&format!("pendularm\\-{subject}(1)")),
+            "{first}"
+        );
+    }
+}
+
+/// As packagers and the Python wheel do it.
+#[test]
+fn an_installation_has_program_completions_and_manual() {
+    let prefix = Path::new(env!("CARGO_TARGET_TMPDIR")).join("install");
+    let _ = fs::remove_dir_all(&prefix);
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/install.sh");
+    let mut install = Command::new("bash");
+    install
+        .arg(script)
+        .arg(env!("CARGO_BIN_EXE_pendularm"))
+        .arg(&prefix);
+    assert!(install.status().unwrap().success());
+    for file in [
+        "bin/pendularm",
+        "share/man/man1/pendularm.1",
+        "share/man/man1/pendularm-topic-echo.1",
+        "share/bash-completion/completions/pendularm",
+        "share/fish/vendor_completions.d/pendularm.fish",
+        "share/zsh/site-functions/_pendularm",
+    ] {
+        assert!(
+            fs::metadata(prefix.join(file)).unwrap().len() > 100,
+            "{file}"
+        );
+    }
+}
+
+/// The table of docs/command-line.md has the commands that there are.
+#[test]
+fn the_paper_lists_every_command() {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/command-line.md");
+    let paper = fs::read_to_string(paper).unwrap();
+    for command in COMMANDS {
+        let words = command[..command.len().min(2)].join(" ");
+        let words = if command[0] == "diagnostics" {
+            "diagnostics"
+        } else {
+            &words
+        };
+        assert!(paper.contains(&format!("| `pendularm {words}")), "{words}");
+    }
+}
