@@ -10,6 +10,7 @@ mod actions;
 mod entry;
 mod node;
 mod parameter_types;
+mod ros2_types;
 pub mod rosapi;
 mod services;
 mod table;
