@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The page, tried in headless Chromium (Debian's `chromium`), which is installed if it is missing and this may be done.
-# Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's `browser/`.
+# PENDULARM names a program that is there; without it one is built. Arguments go to the tests: `scripts/test-browser.sh -k trial`. Screenshots are left in the build folder's `browser/`.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
@@ -14,7 +14,10 @@ fi
 
 # What it is judged by: axe, of the same version everywhere.
 [ -f node_modules/axe-core/axe.min.js ] || npm ci --silent --no-audit --no-fund
-"${CARGO:-cargo}" build --locked
 target=${CARGO_TARGET_DIR:-target}
-PENDULARM="$target/debug/pendularm" ARTEFACTS="$target/browser" PYTHONDONTWRITEBYTECODE=1 python3 tests/browser/run.py "$@"
+if [ -z "${PENDULARM:-}" ]; then
+    "${CARGO:-cargo}" build --locked
+    export PENDULARM="$target/debug/pendularm"
+fi
+ARTEFACTS="$target/browser" PYTHONDONTWRITEBYTECODE=1 python3 tests/browser/run.py "$@"
 echo "test-browser: screenshots are in $target/browser/"

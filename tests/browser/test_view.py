@@ -114,8 +114,11 @@ class TwoLinks(View, Sums, PageTest):
             self.page.until(f"window.saved?.[0] === 'pendularm.{kind}'")
             self.assertTrue(self.page.run("window.saved[1].startsWith('blob:')"))
 
-
     def test_an_hour_would_take_no_more_than_ten_megabytes(self):
+        def heap():
+            self.page.run("gc()")
+            return self.page.run("performance.memory.usedJSHeapSize")
+
         # What is compiled and cached once is no growth, and comes when the browser likes: so the growth that lasts is sought, in one
         # of four spans of half a minute. At 10 MB an hour, each would grow by 83 kB.
         self.page.run("new Promise((done) => setTimeout(done, 15000))")

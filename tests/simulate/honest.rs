@@ -98,8 +98,8 @@ pub struct Subscription {
     pub pending: BTreeMap<u64, VecDeque<(u64, bool)>>,
     /// The last message that came, and when.
     pub last: Option<(u64, Instant)>,
-    /// Its publisher had sent it before the subscription: it may be handled behind newer ones of others.
-    pub is_last_from_before: bool,
+    /// The publisher of the last message that came.
+    pub last_from: Option<u64>,
     /// The last message of each publisher that was sent while it was on.
     pub newest: BTreeMap<u64, u64>,
 }

@@ -284,7 +284,7 @@ impl Model {
             ));
         }
         subscription.last = Some((number, Instant::now()));
-        subscription.is_last_from_before = !subscription.newest.contains_key(&from);
+        subscription.last_from = Some(from);
         court.count("messages heard");
         if skipped > 0 {
             self.miss(

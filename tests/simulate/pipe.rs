@@ -26,6 +26,8 @@ pub enum Fate {
 pub struct Pipe {
     pub stream: DuplexStream,
     pub fate: Rc<Cell<Fate>>,
+    /// Bytes that all pipes of the world have moved so far.
+    pub moved: Rc<Cell<u64>>,
 }
 
 impl Pipe {
@@ -49,8 +51,10 @@ impl AsyncRead for Pipe {
     ) -> Poll<Result<()>> {
         let before = buffer.filled().len();
         let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
-        if buffer.filled().len() > before {
+        let read = buffer.filled().len() - before;
+        if read > 0 {
             self.meet()?;
+            self.moved.set(self.moved.get() + read as u64);
         }
         polled
     }
@@ -63,7 +67,11 @@ impl AsyncWrite for Pipe {
         bytes: &[u8],
     ) -> Poll<Result<usize>> {
         self.meet()?;
-        Pin::new(&mut self.stream).poll_write(cx, bytes)
+        let polled = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        if let Poll::Ready(Ok(written)) = &polled {
+            self.moved.set(self.moved.get() + *written as u64);
+        }
+        polled
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<Result<()>> {

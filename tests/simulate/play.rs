@@ -382,10 +382,10 @@ impl Course {
             Fault::Jump => {
                 // What is under way arrives first: a jump within a frame is a frame that took too long.
                 self.resume();
-                self.world.turns(300).await;
+                self.world.until_quiet().await;
                 self.look();
                 // So do the answers that providers have just given; they give no others until then.
-                self.world.turns(300).await;
+                self.world.until_quiet().await;
                 self.listen(false);
                 let time =
                     Duration::from_millis(self.court.among(&[250, 300, 1000, 9_000, 14_000]));
@@ -508,7 +508,8 @@ impl Course {
             court.at_most("most turns that a computation waits", taken);
             let clients = (self.honest.len() + self.hostile.len()) as u64;
             // Where nothing is long on its way, what is over in a few turns has them soon, whatever others compute.
-            let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 100;
+            // In small pieces a client's own frames hold up its next one.
+            let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 1 << 16;
             let is_short = matches!(next.expect, Expect::Computed(Computed::Particle { .. }));
             let each = if is_wide && is_short {
                 court.at_most("most turns that a short one waits", taken);
@@ -709,9 +710,13 @@ impl Course {
 /// Whether the last message that came is the last that somebody sent.
 fn has_newest(one: &crate::honest::Subscription) -> bool {
     let last = one.last.map(|(number, _)| number);
+    // Sent before the subscription, or by a client that is gone: it may be handled behind newer ones of others.
+    let is_from_before = one
+        .last_from
+        .is_some_and(|from| !one.newest.contains_key(&from));
     one.phase != Phase::On
         || one.newest.is_empty()
-        || one.is_last_from_before
+        || is_from_before
         || one.newest.values().any(|newest| Some(*newest) <= last)
 }
 

@@ -446,7 +446,7 @@ impl Desk<'_> {
             is_in_pieces: feature == Feature::Pieces,
             pending,
             last: None,
-            is_last_from_before: false,
+            last_from: None,
             newest: Default::default(),
         };
         self.me().subscriptions.insert(spelling, subscription);

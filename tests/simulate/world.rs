@@ -62,6 +62,8 @@ pub struct World {
     pub pool: WorkerPool,
     tap: Recipient<Compare>,
     court: Rc<Court>,
+    /// Bytes that all pipes have moved so far.
+    moved: Rc<Cell<u64>>,
 }
 
 impl World {
@@ -89,6 +91,7 @@ impl World {
             pool,
             tap,
             court: Rc::clone(court),
+            moved: Rc::default(),
         }
     }
 
@@ -99,6 +102,7 @@ impl World {
         let pipe = Pipe {
             stream,
             fate: Rc::clone(&fate),
+            moved: Rc::clone(&self.moved),
         };
         let local = SocketAddr::from(LOCAL);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
@@ -112,6 +116,18 @@ impl World {
             let _ = self.pool.turn();
             tokio::task::yield_now().await;
             self.court.turns.set(self.court.turns.get() + 1);
+        }
+    }
+
+    /// Turns until nothing has moved in any pipe for a while: all that was sent has been read and answered.
+    pub async fn until_quiet(&self) {
+        // A flood of a megabyte a client takes some dozens of these.
+        for _ in 0..200 {
+            let before = self.moved.get();
+            self.turns(300).await;
+            if self.moved.get() == before {
+                return;
+            }
         }
     }
 

@@ -329,12 +329,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
     }
 
     async fn tend(&mut self) -> Option<()> {
-        if !self.link.ping_is_due.take() {
-            return Some(());
+        // Another may be due by the time that one has gone out.
+        while self.link.ping_is_due.take() {
+            self.link.flush().await?;
+            self.link.put(Message::Ping(Bytes::new()))?;
+            self.link.flush().await?;
         }
-        self.link.flush().await?;
-        self.link.put(Message::Ping(Bytes::new()))?;
-        self.link.flush().await
+        Some(())
     }
 
     async fn end(&mut self) -> io::Result<()> {
