@@ -386,6 +386,95 @@ def test_a_goal_is_sent_as_an_action(peer, session):
     return len(mine)
 
 
+def test_a_path_is_sent_as_an_action(peer, session, states):
+    """By the definition that ROS 2 has, with all that is for other robots left empty."""
+    import numpy
+
+    name = "control_msgs/action/FollowJointTrajectory"
+    place = "/joint_trajectory_controller/follow_joint_trajectory/_action/"
+    hashes = {token[9]: token[11] for token in tokens(session, "SS")}
+
+    def own(kind):
+        return JAZZY.generate_msgdef(kind, ros_version=2)[0].split("=" * 80)[0].strip()
+
+    inside = {
+        "unique_identifier_msgs__UUID": "uint8[16] uuid",
+        "control_msgs__FollowGoal": "trajectory_msgs/JointTrajectory trajectory\n"
+        "trajectory_msgs/MultiDOFJointTrajectory multi_dof_trajectory\n"
+        "control_msgs/JointTolerance[] path_tolerance\n"
+        "control_msgs/JointComponentTolerance[] component_path_tolerance\n"
+        "control_msgs/JointTolerance[] goal_tolerance\n"
+        "control_msgs/JointComponentTolerance[] component_goal_tolerance\n"
+        "builtin_interfaces/Duration goal_time_tolerance",
+        "control_msgs__JointTolerance": "string name\nfloat64 position\nfloat64 velocity\nfloat64 acceleration",
+        "control_msgs__JointComponentTolerance": "string joint_name\nuint16 component\nfloat64 position\n"
+        "float64 velocity\nfloat64 acceleration",
+    }
+    for kind in [
+        "trajectory_msgs/msg/JointTrajectory",
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        "trajectory_msgs/msg/MultiDOFJointTrajectory",
+        "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",
+        "geometry_msgs/msg/Transform",
+        "geometry_msgs/msg/Twist",
+        "geometry_msgs/msg/Vector3",
+        "geometry_msgs/msg/Quaternion",
+        "std_msgs/msg/Header",
+        TIME,
+        "builtin_interfaces/msg/Duration",
+    ]:
+        inside[kind.replace("/msg/", "__")] = own(kind)
+
+    def service(part, kind, request, response):
+        hashed = hashes[f"{place}{part}".replace("/", "%")]
+        return peer.service(f"{place}{part}", f"{name}_{kind}", request, response, hashed)
+
+    uuid, stamp = {"unique_identifier_msgs__UUID": "uint8[16] uuid"}, {"builtin_interfaces__Time": own(TIME)}
+    send = service(
+        "send_goal",
+        "SendGoal",
+        definition("unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowGoal goal", **inside),
+        definition("bool accepted\nbuiltin_interfaces/Time stamp", **stamp),
+    )
+    wait = service(
+        "get_result",
+        "GetResult",
+        definition("unique_identifier_msgs/UUID goal_id", **uuid),
+        definition(
+            "int8 status\ncontrol_msgs/FollowResult result",
+            control_msgs__FollowResult="int32 error_code\nstring error_string",
+        ),
+    )
+    of = send.session_mgr.store.types
+    duration = of["builtin_interfaces/msg/Duration"]
+    header = of["std_msgs/msg/Header"](stamp=of[TIME](sec=0, nanosec=0), frame_id="")
+    nothing = numpy.array([], dtype=numpy.float64)
+    goal = [0.2, 0.3]
+    point = of["trajectory_msgs/msg/JointTrajectoryPoint"](
+        positions=numpy.array(goal),
+        velocities=nothing,
+        accelerations=nothing,
+        effort=nothing,
+        time_from_start=duration(sec=1, nanosec=0),
+    )
+    of_one, of_many = of["trajectory_msgs/msg/JointTrajectory"], of["trajectory_msgs/msg/MultiDOFJointTrajectory"]
+    path = of["control_msgs/msg/FollowGoal"](
+        trajectory=of_one(header=header, joint_names=["joint1", "joint2"], points=[point]),
+        multi_dof_trajectory=of_many(header=header, joint_names=[], points=[]),
+        path_tolerance=[],
+        component_path_tolerance=[],
+        goal_tolerance=[],
+        component_goal_tolerance=[],
+        goal_time_tolerance=duration(sec=0, nanosec=0),
+    )
+    mine = of[UUID](uuid=numpy.full(16, 9, dtype=numpy.uint8))
+    assert send.call(goal_id=mine, goal=path).accepted
+    ended = wait.call(goal_id=mine)
+    assert (ended.status, ended.result.error_code) == (4, 0), ended
+    # 0.05 rad: the tolerance at the end of a path.
+    assert all(abs(a - b) < 0.05 for a, b in zip(states[-1].position, goal)), states[-1]
+
+
 def test_the_router_comes_back(port, bridge, router, states):
     router.end()
     bridge.said("has gone; looking for it")
@@ -444,6 +533,7 @@ def main():
     say(f"the arm has gone to {test_a_trajectory_moves_the_arm(peer, states)}")
     test_services_answer_and_say_what_is_wrong(peer)
     say(f"a goal with {test_a_goal_is_sent_as_an_action(peer, session)} messages of feedback")
+    test_a_path_is_sent_as_an_action(peer, session, states)
     router, session = test_the_router_comes_back(port, bridge, router, states)
     arm, address = test_the_arm_comes_back(arm_port, bridge, arm, session)
     test_another_arm_has_its_namespace(address, port, session)
