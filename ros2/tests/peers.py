@@ -85,8 +85,8 @@ def start_router(port):
     return router
 
 
-def start_arm(port):
-    arm = Process(ARM, "--bind", f"127.0.0.1:{port}", "--log", "off", stream="stdout")
+def start_arm(port, *more):
+    arm = Process(ARM, "--bind", f"127.0.0.1:{port}", "--log", "off", *more, stream="stdout")
     return arm, arm.said("listening on ").removeprefix("listening on ")
 
 
@@ -513,6 +513,17 @@ def test_another_arm_has_its_namespace(address, port, session):
     left.end()
 
 
+def test_an_arm_with_a_token_wants_to_see_it(port):
+    token = "sixteen-or-more-characters"
+    arm, address = start_arm(0, "--token", token)
+    without = start_bridge(address, port, "--namespace", "/right")
+    say(without.said("no arm at"))
+    with_it = start_bridge(address, port, "--namespace", "/right", "--token", token)
+    with_it.said("is in domain")
+    for one in [without, with_it, arm]:
+        one.end()
+
+
 def main():
     logging.disable(logging.INFO)
     began = time.monotonic()
@@ -537,6 +548,7 @@ def main():
     router, session = test_the_router_comes_back(port, bridge, router, states)
     arm, address = test_the_arm_comes_back(arm_port, bridge, arm, session)
     test_another_arm_has_its_namespace(address, port, session)
+    test_an_arm_with_a_token_wants_to_see_it(port)
     for one in [bridge, arm, router]:
         one.end()
     say(f"all is well after {time.monotonic() - began:.0f} s")
