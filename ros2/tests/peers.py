@@ -513,6 +513,19 @@ def test_another_arm_has_its_namespace(address, port, session):
     left.end()
 
 
+def test_the_bridge_listens_nowhere(bridge):
+    """By what Linux tells of its sockets: two connections, to the arm and to the router, and nothing that waits."""
+    folder = Path(f"/proc/{bridge.process.pid}")
+    if not folder.exists():
+        return
+    open_files = {os.readlink(one) for one in (folder / "fd").iterdir()}
+    states = []
+    for table in ["tcp", "tcp6", "udp", "udp6"]:
+        rows = [line.split() for line in (folder / "net" / table).read_text().splitlines()[1:]]
+        states += [(table, row[3]) for row in rows if f"socket:[{row[9]}]" in open_files]
+    assert states == [("tcp", "01")] * 2, states
+
+
 def test_an_arm_with_a_token_wants_to_see_it(port):
     token = "sixteen-or-more-characters"
     arm, address = start_arm(0, "--token", token)
@@ -539,6 +552,7 @@ def main():
     peer = Peer(port)
     say(test_topics_are_listed_with_their_types(port))
     say(f"hashes of {test_hashes_of_standard_types_are_those_of_jazzy(session)}")
+    test_the_bridge_listens_nowhere(bridge)
     states = test_joint_states_are_decoded_and_numbered(peer, session)
     test_who_comes_late_gets_the_last_description(peer)
     say(f"the arm has gone to {test_a_trajectory_moves_the_arm(peer, states)}")

@@ -41,6 +41,8 @@ pub struct Graph {
     is_arm_here: bool,
     nodes: Vec<LivelinessToken>,
     bridges: Vec<Recipient<Leave>>,
+    /// The last number that an endpoint has had. None is used again: the one before may still be going.
+    last_seat: usize,
     complaint: Repeated,
 }
 
@@ -78,6 +80,8 @@ impl Graph {
             is_arm_here: false,
             nodes: Vec::new(),
             bridges: Vec::new(),
+            // Behind the numbers of the nodes.
+            last_seat: Node::ALL.len(),
             complaint: Repeated::default(),
         }
     }
@@ -133,8 +137,7 @@ impl Graph {
         };
         let mut seats = Seats {
             place,
-            // Behind those of the nodes: each number is there once.
-            last: Node::ALL.len(),
+            last: self.last_seat,
         };
         for node in Node::ALL {
             let token = seats.place.node_token(graph_node(node));
@@ -174,6 +177,7 @@ impl Graph {
                 ActionBridge::join(session, *action, interface, &mut seats, gateway.clone())?;
             self.bridges.push(bridge.recipient());
         }
+        self.last_seat = seats.last;
         self.say_joined();
         Ok(())
     }
