@@ -188,7 +188,7 @@ mod tests {
 
     use super::*;
 
-    /// From rmw_zenoh's design document.
+    /// From `rmw_zenoh`'s design document.
     #[test]
     fn a_service_has_the_hash_that_ros_2_has() {
         let two = [field("a", "int64"), field("b", "int64")];

@@ -78,7 +78,7 @@ impl ActionBridge {
             let seat = seats.service(owner, &name(called), of);
             Inlet::new(session, seat, move |request| {
                 let sent = address.try_send(Requested(part, request));
-                sent.map_err(|error| error.into_inner().1)
+                sent.err().map(|error| error.into_inner().1)
             })
         };
         let inlets = [

@@ -24,10 +24,10 @@ impl Inlet {
     pub(super) fn new(
         session: &Session,
         seat: Seat,
-        take: impl Fn(Request) -> Result<(), Request> + Send + Sync + 'static,
+        take: impl Fn(Request) -> Option<Request> + Send + Sync + 'static,
     ) -> zenoh::Result<Self> {
         let take = move |query| {
-            if let Err(Request(query)) = take(Request(query)) {
+            if let Some(Request(query)) = take(Request(query)) {
                 refuse(&query, "too many requests wait");
             }
         };

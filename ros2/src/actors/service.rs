@@ -45,7 +45,7 @@ impl ServiceBridge {
         let address: Addr<Self> = context.address();
         let inlet = Inlet::new(session, seat, move |request| {
             let sent = address.try_send(Requested(request));
-            sent.map_err(|error| error.into_inner().0)
+            sent.err().map(|error| error.into_inner().0)
         })?;
         Ok(context.run(Self {
             service,

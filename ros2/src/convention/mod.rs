@@ -184,7 +184,7 @@ mod tests {
         }
     }
 
-    /// The examples of rmw_zenoh's design document, but for the depth of the queue.
+    /// The examples of `rmw_zenoh`'s design document, but for the depth of the queue.
     #[test]
     fn names_are_those_of_the_design_document() {
         let here = place("");
