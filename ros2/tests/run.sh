@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# pendularm-ros2 against peers that nobody here wrote: run.sh PROGRAM, which is the arm. Needs cargo, python3 and a
-# network the first time. It installs into the build folder.
+# pendularm-ros2 against peers that nobody here wrote: run.sh ARM [BUILD_FOLDER]. Needs cargo, python3 and a network
+# the first time. It installs into the build folder.
 set -euo pipefail
 program=$(realpath "$1")
+target=$(realpath -m "${2:-target/ros2}")
 cd "$(dirname "$0")/.."
-target=$(realpath -m "${CARGO_TARGET_DIR:-../target/ros2}")
 environment=$target/peers
 
 echo "test-ros2: the bridge, and its own tests"

@@ -45,7 +45,7 @@ pub(super) fn feedback<const N: usize>(
             .map(|(wanted, is)| wanted - is)
             .collect()
     };
-    // Of joints with several degrees of freedom there are none.
+    // There are no joints with several degrees of freedom.
     let nothing =
         json!({"transforms": [], "velocities": [], "accelerations": [], "time_from_start": stamp});
     json!({
