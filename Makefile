@@ -82,7 +82,7 @@ audit: ## Check the dependencies: licences, duplicates, sources, advisories wher
 	@echo "make audit: cargo-deny against deny.toml"
 	@bash scripts/audit.sh
 
-# What is public must not link to what is not; then private items too, for whoever reads the source.
+# Public items must not link to private ones; then private items too, for whoever reads the source.
 doc: ## Build the documentation; any warning fails
 	@echo "make doc: $(TARGET_DIR)/doc/pendularm/index.html"
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps

@@ -26,7 +26,7 @@ results_folder() {
     fi
 }
 
-# What the figures hang on. $1: the command that was given.
+# Prints what the figures hang on. $1: the command that was given.
 environment() {
     echo "command:   $1"
     echo "date:      $(date -u +%FT%TZ)"

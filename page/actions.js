@@ -1,5 +1,5 @@
 // @ts-check
-// What the page does with all settings at once: applies them, undoes the last change, goes back to the defaults, starts a
+// Actions on all settings at once: the page applies them, undoes the last change, goes back to the defaults, starts a
 // lesson; and the reset that belongs to it.
 // Invariant: every change can be undone, and what the runtime refused is said.
 

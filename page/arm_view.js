@@ -159,7 +159,7 @@ function drawArm(now) {
   return ripple;
 }
 
-/** What lies behind the arm: the backdrop, the trail up to now and the setpoint's ghost. Between two paintings the trail's
+/** Paints all that lies behind the arm: the backdrop, the trail up to now and the setpoint's ghost. Between two paintings the trail's
  * latest piece is drawn on each frame. */
 function paintBehind(n) {
   behindStale = false;

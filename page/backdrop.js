@@ -1,5 +1,5 @@
 // @ts-check
-// What stands still behind the arm: metric grid, axes with metres, the circles of reach, the direction of gravity.
+// The backdrop of the arm, which stands still: metric grid, axes with metres, the circles of reach, the direction of gravity.
 // Invariant: drawn once per size, parameters and theme, and then copied.
 
 import { fixed, significant } from "./format.js";

@@ -1,5 +1,5 @@
 // @ts-check
-// What was recorded, as a CSV file: the settings in lines that begin with #, then one row per joint state, SI units named in
+// The recording as a CSV file: the settings in lines that begin with #, then one row per joint state, SI units named in
 // the header.
 // Invariant: what is not known, or not finite, is an empty field.
 

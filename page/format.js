@@ -45,8 +45,8 @@ export function exact(value) {
   return Number.isFinite(value) ? String(value) : "";
 }
 
-/** Full names of the integrators, in the order of their keys. */
-export const METHODS = [["euler", "Euler"], ["midpoint", "Midpoint"], ["verlet", "Verlet"], ["rk4", "Runge–Kutta 4"]];
+/** The integrators in the order of their keys: name, full name, order as a Runge-Kutta method; Verlet is none. @type {[string, string, number?][]} */
+export const METHODS = [["euler", "Euler", 1], ["midpoint", "Midpoint", 2], ["verlet", "Verlet"], ["rk4", "Runge–Kutta 4", 4]];
 
 /** The same where there is little room. @param {string | undefined} method */
 export function shortName(method) {

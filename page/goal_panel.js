@@ -33,7 +33,7 @@ export function startGoalPanel() {
 
 function submit(event) {
   event.preventDefault();
-  // What is missing is left to the runtime to name.
+  // The runtime names the fields that are missing.
   report(sendGoal({ x: fields.x.number(), y: fields.y.number(), ...goalOptions() }));
 }
 

@@ -83,7 +83,7 @@ function pressed(event) {
   if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing) return;
   const { target, key } = event;
   const typing = target.matches("input:not([type=range], [type=radio], [type=checkbox]), select, textarea");
-  // What has the focus keeps the keys that it needs itself.
+  // An element that has the focus keeps the keys that it needs itself.
   const own = key === " " && target.matches("button, input, summary, select");
   if (typing || own) return;
   if (!byId("shortcuts-on").checked && key !== "?") return;

@@ -37,7 +37,7 @@ const CLEAR = 4;
 /** An uncertainty of the reference beyond this is of a motion that it could not follow [rad]. */
 const FOLLOWED = 1e-3;
 
-/** What a table says of a run. @param {Rung} rung */
+/** A run's row in the table. @param {Rung} rung */
 export function errorText({ error, uncertainty, divergedAt }) {
   if (divergedAt !== null) return `diverged at ${significant(divergedAt, 3)} s`;
   if (error !== null) return significant(error, 2);

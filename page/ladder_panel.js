@@ -20,7 +20,6 @@ const TOP = 8;
 const BOTTOM = 32;
 const SAMPLES = 101;
 const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
-const LETTERS = { euler: "E", midpoint: "M", verlet: "V", rk4: "R" };
 
 let surface;
 let said;
@@ -131,7 +130,7 @@ function draw() {
     if (!last) return;
     context.font = "700 12px system-ui, sans-serif";
     context.textAlign = "left";
-    context.fillText(LETTERS[method], Math.min(width - 14, x(last.wall) + 7), y(last.error) + 4);
+    context.fillText(methodName(method)[0], Math.min(width - 14, x(last.wall) + 7), y(last.error) + 4);
   });
 }
 

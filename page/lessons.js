@@ -27,7 +27,7 @@ function first(links, values) {
   return values.slice(0, links);
 }
 
-/** Of the last link [kg]: as heavy as the usual gains still hold in every pose. @type {Record<number, number>} */
+/** Mass of the last link [kg]: as heavy as the usual gains still hold in every pose. @type {Record<number, number>} */
 const HEAVY = { 2: 5, 3: 3 };
 const FOLDED = [0.9, -1.3, 0.8];
 

@@ -6,6 +6,7 @@
 // Invariant: nothing here knows the page or the runtime.
 
 import { eigenvalues } from "./eigen.js";
+import { METHODS } from "./format.js";
 
 /** @typedef {import("./eigen.js").Matrix} Matrix */
 /** @typedef {import("./eigen.js").Complex} Complex */
@@ -13,8 +14,8 @@ import { eigenvalues } from "./eigen.js";
 /** @typedef {{kp: number[], ki: number[], kd: number[]}} Gains */
 /** @typedef {{n: number, inverse: Matrix, sway: Matrix, gains: Gains, integrals: number[]}} Loop */
 
-/** Order of the Runge-Kutta methods; Verlet is none. @type {Record<string, number>} */
-const ORDER = { euler: 1, midpoint: 2, rk4: 4 };
+/** Order of the Runge-Kutta methods. @type {Record<string, number>} */
+const ORDER = Object.fromEntries(METHODS.map(([method, , order]) => [method, order ?? NaN]));
 /** Growth that rounding can feign, relative to the fastest eigenvalue. */
 const NEUTRAL = 1e-11;
 const SEARCH_START = 1e-3;

@@ -13,7 +13,7 @@ import { state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
-/** What is seen of the complex plane: middle and half of the width. */
+/** The part of the complex plane that is seen: middle and half of the width. */
 const CIRCLE = { re: -0.4, half: 1.5 };
 const REGION = { re: -1.2, half: 3.2 };
 const MARGIN = 4;

@@ -135,7 +135,7 @@ export class PhasePlot {
     context.fill();
   }
 
-  /** Of two samples, on the screen [px]. */
+  /** Distance of two samples on the screen [px]. */
   distance(joint, a, b) {
     const { data } = record;
     const [from, to] = [record.at(a) + joint, record.at(b) + joint];

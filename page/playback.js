@@ -6,7 +6,7 @@
 import { EFFORT, POSITION, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./recorder.js";
 import { MOST_LINKS, state, tell } from "./store.js";
 
-/** What the pictures show: the latest joint state, or one of the recording. */
+/** The joint state that the pictures show: the latest joint state, or one of the recording. */
 export const shown = {
   live: true,
   playing: false,

@@ -1,5 +1,5 @@
 // @ts-check
-// What is to be thought of the present timestep: the limit of the loop in force, where it holds, and the verdict in words.
+// A verdict on the present timestep: the limit of the loop in force, where it holds, and the verdict in words.
 // Invariant: a figure is used only for the loop that it was asked about; while the answer is on its way there is none.
 
 import { duration, fixed, significant } from "./format.js";
@@ -79,7 +79,7 @@ export function limitInForce(/** @type {any} */ state) {
   };
 }
 
-/** Which pose bears least, how surely that is known, and what shakes there first; empty where nothing limits. */
+/** The pose that bears least, how surely that is known, and what shakes there first; empty where nothing limits. */
 export function worstText(/** @type {any} */ answer) {
   const { minimum_over_poses_held: least, worst_pose: pose, critical, certified, minimum_over_poses_bound: bound } = answer ?? {};
   if (!(least > 0) || !pose || !critical) return "";
@@ -121,7 +121,7 @@ function excess(timestep, limit, where) {
     : `No timestep is stable, ${where}.`;
 }
 
-/** What the present loop bears, here and everywhere, and what to use; empty while that is not known. */
+/** The timesteps that the present loop bears, here and everywhere, and the one to use; empty while that is not known. */
 export function adviceText(/** @type {any} */ state) {
   const { limit, where, everyPose, advised } = limitInForce(state);
   if (!answerInForce(state) || Number.isNaN(limit)) return "";
@@ -137,14 +137,14 @@ export function limitText(limit) {
   return limit === 0 ? "no timestep" : limit === Infinity ? "any timestep" : duration(limit);
 }
 
-/** What to call the energy since the last reset: drift only if nothing puts any in or takes any out. */
+/** The word for the energy since the last reset: drift only if nothing puts any in or takes any out. */
 export function energyName(/** @type {{enabled: boolean | null, pushed: boolean}} */ { enabled, pushed }) {
   if (enabled) return "work done";
   return pushed ? "pushed in" : "drift";
 }
 
 /**
- * What to begin anew with: the arm is at rest then, and how fast it has become does not count.
+ * The timestep to begin anew with: the arm is at rest then, and how fast it has become does not count.
  * @param {Object<string, any>} answer of `/study/stability`
  * @returns {number} timestep [s]; NaN where there is none
  */

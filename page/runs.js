@@ -1,5 +1,5 @@
 // @ts-check
-// What a comparison says of its runs: how far each lies from the reference over time, where it ended, what it gained.
+// The figures of a comparison's runs: how far each lies from the reference over time, where it ended, what it gained.
 // Invariant: nothing is computed from what is not there; a run that ended early has figures up to its end, and says when.
 
 import { duration, fixed, shortName, significant } from "./format.js";

@@ -24,7 +24,7 @@ const HIDDEN_MS = 100;
 const TOUCHED_MS = 300;
 /** Estimates of the error are shown as the median of two seconds of them. */
 const ESTIMATE_MS = 200;
-/** What is reckoned or searched may take its time. */
+/** Time for a computation or a search [ms]. */
 const LONG_CALL_MS = 120000;
 /** A joint state is as old as this at most when it arrives. */
 const LATENESS_MS = 40;

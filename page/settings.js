@@ -3,7 +3,7 @@
 // force before the latest changes.
 // Invariant: nothing here speaks to the runtime; whoever applies settings hears its refusals.
 
-import { exact } from "./format.js";
+import { METHODS, exact } from "./format.js";
 
 /** @typedef {import("./loop.js").Gains} Gains */
 /** @typedef {import("./loop.js").Arm} Arm */
@@ -16,7 +16,6 @@ import { exact } from "./format.js";
  * @property {number[] | null} setpoint
  */
 
-const METHOD = /^(euler|midpoint|verlet|rk4)$/;
 /** Changes that can be undone. */
 const MOST_STEPS = 100;
 /** Changes closer together than this are one: a slider is dragged through many values [ms]. */
@@ -64,7 +63,7 @@ export function toFragment({ integrator, params, gains, servo, setpoint }, links
   return parts.map(([name, value]) => `${name}=${value}`).join("&");
 }
 
-/** What a link's fragment holds; checked no further than its form, since the runtime checks it all. @returns {Settings} */
+/** The settings in a link's fragment; checked no further than its form, since the runtime checks it all. @returns {Settings} */
 export function fromFragment(/** @type {string} */ hash) {
   const given = new URLSearchParams(hash.replace(/^#/, ""));
   const numbers = (/** @type {string} */ name) => given.get(name)?.split(",").map(Number);
@@ -75,7 +74,7 @@ export function fromFragment(/** @type {string} */ hash) {
   const single = (/** @type {string} */ name) => (given.has(name) ? Number(given.get(name)) : undefined);
   const method = given.get("method") ?? "";
   return {
-    integrator: pick(["method", "timestep"], (name) => (name === "method" ? (METHOD.test(method) ? method : undefined) : single(name))),
+    integrator: pick(["method", "timestep"], (name) => (name === "method" ? (METHODS.some(([known]) => known === method) ? method : undefined) : single(name))),
     params: pick(["gravity", "masses", "lengths"], (name) => (name === "gravity" ? single(name) : numbers(name))),
     gains: pick(["kp", "ki", "kd"], numbers),
     servo: given.has("servo") ? given.get("servo") === "on" : null,
@@ -100,7 +99,7 @@ export class Undo {
     if (this.past.length > MOST_STEPS) this.past.shift();
   }
 
-  /** What to go back to; undefined if there is nothing. */
+  /** The settings to go back to; undefined if there is nothing. */
   take() {
     this.lastTime = -Infinity;
     return this.past.pop();

@@ -1,5 +1,5 @@
 // @ts-check
-// What the page knows about the runtime, in one place; whoever shows a part of it watches that part.
+// All that the page knows about the runtime, in one place; a view watches the part that it shows.
 // Invariant: only what the runtime has said is stored here, never what was merely asked for.
 
 export const MOST_LINKS = 3;

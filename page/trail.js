@@ -61,7 +61,7 @@ function turned(n, a, b) {
   return sum;
 }
 
-// Of the tip, at the sample before: place and velocity.
+// Position and velocity of the end effector at the sample before.
 const before = { x: 0, y: 0, vx: 0, vy: 0, time: 0 };
 
 /** On to the tip of recorded row `i`, along the cubic that has the tip's places and velocities. */

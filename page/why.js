@@ -1,5 +1,5 @@
 // @ts-check
-// Which timestep each method bears in the loop in force, and why, in words: from the loop's modes near where it rests.
+// The timestep that each method bears in the loop in force, and the reason in words: from the loop's modes near where it rests.
 // Invariant: it is said of the pose that the limit is about, for small deviations; how fast the arm moves is left to others.
 
 import { eigenvalues } from "./eigen.js";
@@ -24,7 +24,7 @@ export function methodLimits(/** @type {any} */ state) {
   return found && Object.fromEntries(METHODS.map(([method]) => [method, limitOf(found.loop, method, true)]));
 }
 
-/** What moves the limits; equal texts have equal limits. */
+/** All that moves the limits, as a text; equal texts have equal limits. */
 export function limitsKey(/** @type {any} */ state) {
   const found = loopInForce(state);
   return found ? JSON.stringify([found.pose, found.free, state.params, found.free ? null : state.gains]) : "";
@@ -67,7 +67,7 @@ function whyServo(modes, loop, limits, method) {
   return `Why ${duration(limit)}: ${cause(modes, loop, method, limit)} ${others(limits)}`;
 }
 
-/** What grows first when the step is a little too long. @param {Complex[]} modes @param {Loop} loop @param {string} method @param {number} limit */
+/** The mode that grows first when the step is a little too long. @param {Complex[]} modes @param {Loop} loop @param {string} method @param {number} limit */
 function cause(modes, loop, method, limit) {
   const step = BEYOND * limit;
   const first = largest(multipliers(loop, method, step) ?? []);

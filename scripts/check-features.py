@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PLACE = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve() / "check-features"
 TABLES = ["dependencies", "dev-dependencies"]
 
-# What the compiler does not miss and a user would: the test that does.
+# Features that the compiler does not miss and a user would, each with the test that does.
 MISSED_BY_A_TEST = {
     ("clap", "error-context"): "wire",
     ("clap", "help"): "wire",

@@ -43,7 +43,7 @@ section() { # name, of Cargo.toml
     awk -v section="[$1]" '/^\[/ { on = $0 == section } on && NF' "$root/Cargo.toml"
 }
 
-# What the actors are made of, a crate of its own that no mutant changes, and what stands beside them.
+# Lays out the layers below the actors, a crate of its own that no mutant changes, and the modules beside them.
 lay_out_below() { # folder
     local part
     rm -rf "$1/below" "$1/page"
@@ -90,7 +90,7 @@ lay_out() { # layer, folder
         fi
         echo "pub mod $1;"
         echo '#[cfg(test)] mod first_failure;'
-        # What the tests share stands at the root of their crate, under its own name.
+        # Modules that the tests share stand at the root of their crate, under their own names.
         sed -n 's|^#\[path = "../support/\(.*\)\.rs"\]$|#[cfg(test)] #[path = "../tests/support/\1.rs"] mod \1;|p' "$root/tests/$1/main.rs"
         sed -n 's/^mod \([a-z_]*\);$/\1/p' "$root/tests/$1/main.rs" | while read -r name; do
             if [ "$name" = default_gains ] || [ -e "$root/tests/support/$name.rs" ]; then continue; fi
@@ -144,7 +144,7 @@ keep_outcomes() { # folder
     mv "$1/known.part" "$1/known.tsv"
 }
 
-# Of the mutants that there are now, each with its outcome, or `open`.
+# Lists the mutants that there are now, each with its outcome, or `open`.
 outcomes() { # layer, folder
     (cd "$2" && cargo mutants --list) |
         awk -F '\t' 'FILENAME == ARGV[1] { version[$1] = $2; next } FILENAME == ARGV[2] { known[$1 FS $3] = $2; next }

@@ -6,7 +6,7 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 cd "$root"
 archive=${1:-submission.tar.gz}
-# What an upload may weigh.
+# The most that an upload may weigh.
 limit_bytes=25000000
 # Where the archive builds. Packages that none of these needs are replaced by empty ones.
 platforms="x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu x86_64-unknown-linux-musl aarch64-unknown-linux-musl

@@ -12,7 +12,7 @@ if ! command -v chromium >/dev/null; then
     }
 fi
 
-# What it is judged by: axe, of the same version everywhere.
+# The page is judged by axe, of the same version everywhere.
 [ -f node_modules/axe-core/axe.min.js ] || npm ci --silent --no-audit --no-fund
 target=${CARGO_TARGET_DIR:-target}
 if [ -z "${PENDULARM:-}" ]; then

@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sink_that_takes_nothing_blocks_nobody_and_the_loss_is_told() {
+    fn a_sink_that_takes_nothing_blocks_nobody_and_the_loss_is_reported() {
         let (gate, seen) = Gate::new(false);
         let mut log = Log::to(gate.clone()).unwrap();
         // The writer holds one line at the gate, or none yet; the queue holds the rest.

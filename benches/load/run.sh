@@ -41,7 +41,7 @@ await() {
 
 { read -r redis_port; read -r mosquitto_port; } < <("$built/load" ports 2)
 
-# Whatever would drop a message or write one to a disk is off.
+# Every setting that would drop a message or write one to a disk is off.
 redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \
     --client-output-buffer-limit "pubsub 0 0 0" >"$scratch/redis.log" 2>&1 &
 redis=$!

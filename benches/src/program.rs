@@ -15,7 +15,7 @@ const MAX_LINES: usize = 50;
 /// The program, running.
 pub struct Program {
     child: Child,
-    /// Where it listens.
+    /// Address that it listens on.
     pub address: SocketAddr,
     log: Arc<Mutex<Log>>,
 }

@@ -1,6 +1,6 @@
 //! Messages as CBOR and as CDR: any JSON as a message of any type that the runtime knows, or of none.
 //!
-//! What holds: the frame is CBOR that another reader takes, with the topic and all that was in the JSON: of a known type, every
+//! Asserted: the frame is CBOR that another reader takes, with the topic and all that was in the JSON: of a known type, every
 //! field of the type that was there, in its order. CDR is what another reader, which knows the type by the text of its definition
 //! alone, reads to the last byte as the same message, with a zero for what was not there.
 //!
@@ -151,7 +151,7 @@ fn check_cdr(name: &str, definition: &Definition, msg: &Value, length: usize) {
     }
 }
 
-/// That a message is decoded as it was, with zeros for what was absent or of another type.
+/// Asserts that a message is decoded as it was, with zeros for what was absent or of another type.
 fn is_decoded(found: &Json, all: &Definition, fields: &[Field], msg: Option<&Value>) {
     let Json::Object(members) = found else {
         panic!("{found:?} is no message");

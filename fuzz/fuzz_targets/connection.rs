@@ -1,6 +1,6 @@
 //! Whole connections over plain TCP, in virtual time: three clients, a registry, and a node that is prompt, slow or forgetful.
 //!
-//! What holds is said in [`pendularm_fuzz::session`].
+//! [`pendularm_fuzz::session`] says what is asserted.
 //!
 //! Input: whether room is scarce, the script.
 

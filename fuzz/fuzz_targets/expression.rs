@@ -1,6 +1,6 @@
 //! Expressions against a second reading that makes a tree and walks it.
 //!
-//! What holds: both readings accept the same texts; an accepted one has the same value to the bit at every time, and as
+//! Asserted: both readings accept the same texts; an accepted one has the same value to the bit at every time, and as
 //! many nodes; printed and read again it is the very same expression, and prints alike.
 //!
 //! Input: the text itself; behind a `#`, one token of the grammar per byte.
@@ -228,7 +228,7 @@ impl Reading<'_> {
         }
     }
 
-    /// What stands in a parenthesis that is open.
+    /// The expression in a parenthesis that is open.
     fn closed(&mut self) -> Option<Tree> {
         let tree = self.sum()?;
         self.sign(")").map(|_| tree)

@@ -1,6 +1,6 @@
 //! The field reader against a second reading of the same JSON.
 //!
-//! What holds: for any arguments of any of the arm's services, both readings take the same fields with the same values, to
+//! Asserted: for any arguments of any of the arm's services, both readings take the same fields with the same values, to
 //! the bit and within their bounds; every other field is refused by its name, once and in the order of reading; the status
 //! names it and is one bounded line.
 //!
@@ -52,7 +52,7 @@ fn examine(input: &[u8]) {
     }
 }
 
-/// What comes out of a frame with these arguments, if it is one.
+/// The arguments that a frame with these has, if it is one.
 fn arguments(service: Service, args: &[u8]) -> Option<Arguments> {
     let mut frame = format!(
         "{{\"op\":\"call_service\",\"service\":\"{}\",\"args\":",
@@ -75,7 +75,7 @@ fn arguments(service: Service, args: &[u8]) -> Option<Arguments> {
     }
 }
 
-/// What is asked of a field.
+/// The ways in which a field is read.
 #[derive(Clone, Copy)]
 enum How {
     Number(Bound),
@@ -130,7 +130,7 @@ impl<'a> Model<'a> {
         })
     }
 
-    /// What there is to be read of a field.
+    /// The value of a field, if there is one to be read.
     fn take(&mut self, field: &Field) -> Option<&'a Json> {
         let (_, value) = self.values.iter().find(|(name, _)| *name == field.name)?;
         match value {

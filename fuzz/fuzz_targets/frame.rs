@@ -1,6 +1,6 @@
 //! The frame reader against a slow model that has all bytes at once and looks at them one by one.
 //!
-//! What holds: reader and model find the same frames and complain of the same stretches, in the same order, however the
+//! Asserted: reader and model find the same frames and complain of the same stretches, in the same order, however the
 //! stream is cut; what the reader keeps is bounded; it says that a line ended behind a frame only where one did.
 //!
 //! Input: a byte that chooses the limit, a byte that chooses the cuts, the stream.
@@ -25,7 +25,7 @@ fn examine(input: &[u8]) {
     check(&expected, limit, stream, Cuts { stream, seed });
 }
 
-/// What a stretch of the stream is.
+/// The kinds of a stretch of the stream.
 #[derive(Debug, PartialEq, Eq)]
 enum Outcome {
     /// The text, and the bytes that follow it start here.
@@ -136,7 +136,7 @@ fn line_end(stream: &[u8], from: usize) -> usize {
     newline.map_or(stream.len(), |offset| from + offset)
 }
 
-/// What begins with the brace at `start` is, and where it ends. The first thing that is wrong is what it is; it ends where
+/// The kind of the stretch that begins with the brace at `start`, and its end. The first fault decides the kind; it ends where
 /// it would have ended without that, or with the line where brackets do not match.
 fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
     let mut open = Vec::new();
@@ -152,7 +152,7 @@ fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
         match (in_string, byte) {
             (false, b'\n') => return (wrong.unwrap_or(Outcome::LineEnded), at),
             (true, b'\n') => return (wrong.unwrap_or(Outcome::LineEndedInString), at),
-            // What is escaped is looked at by nobody, unless it is a newline.
+            // Nobody looks at an escaped byte, unless it is a newline.
             (true, b'\\') if stream.get(at + 1).is_some_and(|next| *next != b'\n') => {
                 at += 1;
                 if at + 1 - start > limit {
@@ -167,7 +167,7 @@ fn object(stream: &[u8], start: usize, limit: usize) -> (Outcome, usize) {
                 }
             }
             (false, b'}' | b']') => {
-                // Which brackets were opened beyond that depth is not remembered.
+                // Brackets that were opened beyond that depth are not remembered.
                 let opener = if byte == b'}' { b'{' } else { b'[' };
                 if open.len() <= MAX_NESTING && open.last() != Some(&opener) {
                     return (wrong.unwrap_or(Outcome::Mismatch), line_end(stream, at + 1));

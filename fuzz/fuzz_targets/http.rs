@@ -1,6 +1,6 @@
 //! The first bytes of a connection, and HTTP behind them: one request, with and without a token to be shown.
 //!
-//! What holds: the answer is lines of JSON, or one well-formed HTTP answer of known headers, as long as it says, and then the
+//! Asserted: the answer is lines of JSON, or one well-formed HTTP answer of known headers, as long as it says, and then the
 //! end, whatever follows the request; a file is never one from outside the report's folder; who is let in, and who is not, is
 //! what a [second opinion](pendularm_fuzz::admission) says; whoever speaks JSON and does not show the token hears one line.
 //!
@@ -42,7 +42,7 @@ const LONGEST: usize = 4 * 1024 * 1024;
 const LONG: Duration = Duration::from_secs(600);
 
 const STATUSES: [u16; 11] = [101, 200, 301, 400, 403, 404, 405, 408, 426, 431, 503];
-/// What an answer may have, in lower case.
+/// Headers that an answer may have, in lower case.
 const HEADERS: [&str; 19] = [
     "content-type",
     "content-length",
@@ -209,7 +209,7 @@ fn check_answer(answer: &[u8], expected: Option<(Opinion, bool)>) {
     let shown = String::from_utf8_lossy(body);
     assert!(!shown.contains(SECRET), "a file from outside the report");
     let opinion = expected.map(|(opinion, _)| opinion);
-    // Whatever else is odd about a request: nobody is let in who may not.
+    // However odd a request is otherwise, nobody is let in who may not.
     match status {
         101 | 426 => assert_eq!(opinion, Some(Opinion::Socket), "{head}"),
         200 | 301 => assert_eq!(opinion, Some(Opinion::Page), "{head}"),

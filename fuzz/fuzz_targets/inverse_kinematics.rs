@@ -1,6 +1,6 @@
 //! Inverse kinematics of any arm, from any pose, for any finite target.
 //!
-//! What holds: a target is refused with a bounded sentence, or every joint is in (-π, π] and the hand is where it was asked
+//! Asserted: a target is refused with a bounded sentence, or every joint is in (-π, π] and the end effector is where it was asked
 //! for, to a billionth of the arm, orientation included; what lies clearly inside the reach is never refused, and what lies
 //! clearly outside always.
 //!
@@ -17,7 +17,7 @@ use pendularm::math::kinematics::{Target, nearest_turn, solve};
 use pendularm_fuzz::limits::{DOING, hold};
 use pendularm_fuzz::numbers::{Finite, Positive, finite, positive};
 
-/// What the contract asks of a round trip, as a share of the sum of the lengths. A target that far outside the reach is
+/// Error that the contract allows in a round trip, as a share of the sum of the lengths. A target that far outside the reach is
 /// solved as the edge itself, so that this is the distance, and roundings come on top.
 const ROUND_TRIP: f64 = 1e-9 + 1e-14;
 /// Around the edge of the reach a billionth of the arm is either in or out; this is clear of it.

@@ -1,6 +1,6 @@
 //! Frames into operations: any text that the frame reader lets through.
 //!
-//! What holds: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object gives an
+//! Asserted: every frame gives one operation or one complaint, and its `id` as it came; only a JSON object gives an
 //! operation; names and numbers are those of the frame, bounded, and so is what a complaint repeats; whatever is passed on or echoed is one line of strict
 //! JSON in which nothing but numbers that overflow has changed.
 //!
@@ -134,7 +134,7 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
             let number = |name: &str| json.get(name).and_then(Json::number);
             let milliseconds = number("throttle_rate").unwrap_or_default();
             assert_eq!(one.throttle, duration(milliseconds / 1000.0, MAX_THROTTLE));
-            // What is beyond every count is as good as the largest.
+            // A number beyond every count is as good as the largest.
             let length = number("queue_length").unwrap_or(1.0);
             let longest = MAX_QUEUE_LENGTH as f64;
             assert_eq!(one.queue_length as f64, length.clamp(1.0, longest));

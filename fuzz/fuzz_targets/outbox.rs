@@ -1,6 +1,6 @@
 //! The outbox against a slow model that keeps everything in lists and searches them.
 //!
-//! What holds: both give the same frames in the same order and count the same; topic messages that wait have at most 4 MiB,
+//! Asserted: both give the same frames in the same order and count the same; topic messages that wait have at most 4 MiB,
 //! and of too many the oldest go; no response is ever lost; throttled topics keep their distance, the newest of what they
 //! hold back, and their place in the order.
 //!
@@ -157,12 +157,12 @@ struct Throttle {
 #[derive(Default)]
 struct Model {
     produced: u64,
-    /// What leaves next, in order.
+    /// Frames that leave next, in order.
     queue: Vec<Waiting>,
-    /// What throttles hold back, oldest first.
+    /// Messages that throttles hold back, oldest first.
     held: Vec<Waiting>,
     throttles: [Option<Throttle>; TOPICS.len()],
-    /// What is being written: what is left of it, and whether it is a response.
+    /// The frame that is being written: its bytes left, and whether it is a response.
     in_flight: Vec<(usize, bool)>,
     dropped: u64,
 }
@@ -246,7 +246,7 @@ impl Model {
         self.drop_while(|model| model.topic_bytes() > MAX_TOPIC_BYTES);
     }
 
-    /// Of what is held back of a topic only so many remain.
+    /// Drops the oldest messages that are held back of a topic, until so many remain.
     fn keep_newest(&mut self, topic: usize, most: usize) {
         let mut excess = self
             .held

@@ -1,6 +1,6 @@
 //! Whole connections with the runtime's own nodes behind them: the arm, inverse kinematics, goals, trials, rosapi.
 //!
-//! What holds is said in [`pendularm_fuzz::session`], and that every position and velocity that the arm publishes is a number.
+//! Asserted is all that [`pendularm_fuzz::session`] says, and that every position and velocity that the arm publishes is a number.
 //!
 //! Input: whether room is scarce, whether they speak through a WebSocket, the script.
 

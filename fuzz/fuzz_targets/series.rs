@@ -1,6 +1,6 @@
 //! Messages that are passed on unread against the same stream read frame by frame.
 //!
-//! What holds: whatever is taken for a series is, message by message and byte for byte, what reading each frame and writing
+//! Asserted: a series is, message by message and byte for byte, what reading each frame and writing
 //! it anew gives; nothing is lost or read twice around it, however the stream is cut.
 //!
 //! Input: a byte that says in which pieces the rest comes, the rest. A `~` in it stands for how a message begins.
@@ -34,7 +34,7 @@ fn examine(input: &[u8]) {
     assert_eq!(read(&stream, usize::from(piece).max(1), true), one_by_one);
 }
 
-/// What a frame comes to: the message as it is passed on, or the frame.
+/// The outcome of a frame: the message as it is passed on, or the frame.
 #[derive(Debug, PartialEq, Eq)]
 enum Outcome {
     Message(Vec<u8>),

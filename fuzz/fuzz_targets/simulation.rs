@@ -1,6 +1,6 @@
 //! The live loop with any valid arm, gains, method, timestep, state, setpoint and push.
 //!
-//! What holds: the state is finite after every step; a step that would leave the finite numbers is not taken, in whole or
+//! Asserted: the state is finite after every step; a step that would leave the finite numbers is not taken, in whole or
 //! in part, and none after it until a reset; efforts are finite, integrals within their limit, time is base plus whole
 //! steps; many steps at once are the same as one after the other, to the bit.
 //!
@@ -113,7 +113,7 @@ where
         }
     }
     steps(&mut simulation, MAX_STEPS);
-    // Whatever it is, it can be asked for.
+    // The energy of any state can be asked for.
     let _ = energy(simulation.arm(), simulation.state());
 }
 

@@ -1,6 +1,6 @@
 //! The study's computations for any arm, gains and setpoint: the stable timestep, and offline runs.
 //!
-//! What holds: a predicted limit is none, zero, or a finite timestep, and found in bounded work; an offline run is refused
+//! Asserted: a predicted limit is none, zero, or a finite timestep, and found in bounded work; an offline run is refused
 //! with a reason, or ends in bounded work with finite samples in order of time; cut into slices, both give the same bits.
 //!
 //! Input: the loop, and what is asked of it.

@@ -2,12 +2,13 @@
 //!
 //! It is written from the README's rules, not from the runtime's code, and knows one address: 127.0.0.1:9095.
 
+use std::borrow::Cow;
 use std::net::IpAddr;
 
 /// The rules in force.
 #[derive(Debug, Clone, Copy)]
 pub struct Rules<'a> {
-    /// What has to be shown.
+    /// The token that has to be shown, if any.
     pub token: Option<&'a str>,
     /// `arm.example:80` is a name of ours.
     pub has_name: bool,
@@ -17,7 +18,7 @@ pub struct Rules<'a> {
     pub is_strict: bool,
 }
 
-/// What becomes of a request.
+/// The fates of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Opinion {
     /// It says nothing, or not once, of the host that it looks for.
@@ -33,15 +34,15 @@ pub enum Opinion {
 const PORT: u16 = 9095;
 
 /// A head, taken apart as far as the rules need it.
-struct Head<'a> {
-    target: &'a str,
+struct Head {
+    target: String,
     /// Names in lower case, values without white space around them.
-    headers: Vec<(String, &'a str)>,
+    headers: Vec<(String, String)>,
     /// Every line is as the RFC has it, so that there is only one way to read it.
     is_plain: bool,
 }
 
-/// What has to become of what is sent, and whether that is certain: a request may be too odd to be read by anybody, and then must
+/// The fate that a request must have, and whether that is certain: a request may be too odd to be read by anybody, and then must
 /// not be let in for what this makes of it. `None` if it is no whole GET request.
 #[must_use]
 pub fn judge(bytes: &[u8], rules: Rules<'_>) -> Option<(Opinion, bool)> {
@@ -52,7 +53,7 @@ pub fn judge(bytes: &[u8], rules: Rules<'_>) -> Option<(Opinion, bool)> {
 /// Stands for a value that is no text.
 const NO_TEXT: &str = "\u{fffd}";
 
-fn read(bytes: &[u8]) -> Option<Head<'_>> {
+fn read(bytes: &[u8]) -> Option<Head> {
     let ends = [&b"\r\n\r\n"[..], b"\n\n"];
     let end = ends.iter().filter_map(|mark| {
         let at = bytes.windows(mark.len()).position(|window| window == *mark);
@@ -63,21 +64,18 @@ fn read(bytes: &[u8]) -> Option<Head<'_>> {
     let bare = String::from_utf8_lossy(head).replace("\r\n", "");
     let mut is_plain = head.is_ascii() && end <= 8 * 1024 && !bare.contains(['\r', '\n']);
     // A value may hold any byte: what is no text is not what is looked for, but stands there.
-    let mut lines = head.split(|&byte| byte == b'\n').map(|line| {
-        let line = line.strip_suffix(b"\r").unwrap_or(line);
-        match std::str::from_utf8(line) {
-            Ok(line) => (line, true),
-            // Such lines are few and short, and the fuzzer's process is soon over.
-            Err(_) => (&*String::from_utf8_lossy(line).into_owned().leak(), false),
-        }
-    });
-    let first = lines.next()?.0.strip_prefix("GET ")?;
+    let mut lines = head
+        .split(|&byte| byte == b'\n')
+        .map(|line| String::from_utf8_lossy(line.strip_suffix(b"\r").unwrap_or(line)));
+    let first = lines.next()?;
+    let first = first.strip_prefix("GET ")?;
     let (target, version) = first.split_once(' ').unwrap_or((first, ""));
     is_plain &= matches!(version, "HTTP/1.1" | "HTTP/1.0");
     is_plain &= target.starts_with('/') && target.bytes().all(|byte| byte.is_ascii_graphic());
     is_plain &= !target.contains(['"', '<', '>', '\\', '^', '`', '{', '|', '}']);
     let mut headers = Vec::new();
-    for (line, is_text) in lines.filter(|(line, _)| !line.is_empty()) {
+    for line in lines.filter(|line| !line.is_empty()) {
+        let is_text = matches!(line, Cow::Borrowed(_));
         let Some((name, value)) = line.split_once(':') else {
             is_plain = false;
             continue;
@@ -87,31 +85,26 @@ fn read(bytes: &[u8]) -> Option<Head<'_>> {
         let in_value = |byte: u8| byte.is_ascii_graphic() || byte == b' ';
         is_plain &= value.bytes().all(in_value);
         let value = value.trim_matches([' ', '\t']);
-        headers.push((
-            name.to_ascii_lowercase(),
-            if is_text || name.eq_ignore_ascii_case("cookie") {
-                value
-            } else {
-                NO_TEXT
-            },
-        ));
+        let is_kept = is_text || name.eq_ignore_ascii_case("cookie");
+        let value = if is_kept { value } else { NO_TEXT };
+        headers.push((name.to_ascii_lowercase(), value.to_owned()));
     }
     is_plain &= headers.len() <= 32;
     Some(Head {
-        target,
+        target: target.to_owned(),
         headers,
         is_plain,
     })
 }
 
-impl<'a> Head<'a> {
-    fn all(&self, name: &str) -> Vec<&'a str> {
+impl Head {
+    fn all(&self, name: &str) -> Vec<&str> {
         let named = self.headers.iter().filter(|(one, _)| one == name);
-        named.map(|(_, value)| *value).collect()
+        named.map(|(_, value)| value.as_str()).collect()
     }
 }
 
-fn opinion(head: &Head<'_>, rules: Rules<'_>) -> Opinion {
+fn opinion(head: &Head, rules: Rules<'_>) -> Opinion {
     let hosts = head.all("host");
     let [host] = hosts[..] else {
         return Opinion::NoHost;
@@ -187,7 +180,7 @@ fn may_open(origins: &[&str], own: &Place, rules: Rules<'_>) -> bool {
     }
 }
 
-fn shows(head: &Head<'_>, token: &str) -> bool {
+fn shows(head: &Head, token: &str) -> bool {
     let query = head.target.split_once('?').map(|(_, query)| query);
     let in_query = first_of(
         query.into_iter().flat_map(|query| query.split('&')),

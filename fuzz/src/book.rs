@@ -1,10 +1,10 @@
-//! What was sent, kept beside the session, so that what comes can be compared with it.
+//! A record of everything sent, kept beside the session, so that everything that comes can be compared with it.
 
 use std::collections::HashMap;
 
 use crate::json::Json;
 
-/// What clients have said.
+/// Everything that clients have said.
 #[derive(Debug, Default)]
 pub struct Book {
     /// Messages by number.
@@ -45,7 +45,7 @@ impl Book {
         self.answers.insert(id.to_owned(), (result, value(payload)));
     }
 
-    /// That a message is what was published, where it was.
+    /// Asserts that a message is what was published, where it was.
     pub fn check_message(&self, number: u64, from: u64, topic: &str, payload: Option<&Json>) {
         if self.is_forged {
             return;
@@ -57,14 +57,14 @@ impl Book {
         check(&sent.payload, payload, "message", &number);
     }
 
-    /// That a provider is asked what was asked.
+    /// Asserts that a provider is asked what was asked.
     pub fn check_call(&self, id: &str, payload: Option<&Json>) {
         if let Some(sent) = self.arguments.get(id).filter(|_| !self.is_forged) {
             check(sent, payload, "call", &id);
         }
     }
 
-    /// That the caller `id` hears what the provider of its call said.
+    /// Asserts that the caller `id` hears what the provider of its call said.
     pub fn check_answer(&self, id: &str, said_of: &str, result: bool, payload: Option<&Json>) {
         if self.is_forged {
             return;

@@ -11,7 +11,7 @@ use tokio::task::JoinHandle;
 use pendularm_client::codec::{Codec, Event, Framing};
 use pendularm_client::websocket::{LAST, append, append_close, append_message, handshake, opcode};
 
-/// Which way a client speaks.
+/// The ways in which clients speak.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Door {
     /// One object per line.
@@ -20,7 +20,7 @@ pub enum Door {
     Socket,
 }
 
-/// What came from the runtime.
+/// Something that came from the runtime.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Received {
     /// A frame, without its newline.
@@ -76,7 +76,7 @@ impl Client {
         client
     }
 
-    /// Which way it speaks.
+    /// The way in which it speaks.
     #[must_use]
     pub fn door(&self) -> Door {
         self.door
@@ -157,7 +157,7 @@ impl Client {
         self.line.bytes.borrow().is_empty() && self.codec.is_between_messages()
     }
 
-    /// What was left over, to be shown.
+    /// The bytes that were left over, to be shown.
     #[must_use]
     pub fn rest(&self) -> String {
         let bytes = String::from_utf8_lossy(&self.line.bytes.borrow()).into_owned();
@@ -170,7 +170,7 @@ impl Client {
         self.codec.discard();
     }
 
-    /// What has come since.
+    /// Takes everything that has come since.
     pub fn take(&mut self) -> Vec<Received> {
         self.codec
             .push(&std::mem::take(&mut *self.line.bytes.borrow_mut()));

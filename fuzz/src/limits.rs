@@ -1,4 +1,4 @@
-//! What one execution may cost: processor time and memory, by the bytes of its input.
+//! The cost that one execution may have: processor time and memory, by the bytes of its input.
 //!
 //! Time is looked at on the wall first. Where that was too long, the execution is done again and its thread's own time counts:
 //! a busy machine makes nothing fail.
@@ -7,10 +7,10 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// What an execution may cost.
+/// The cost that an execution may have.
 #[derive(Debug, Clone, Copy)]
 pub struct Allowance {
-    /// Whatever the input is.
+    /// Time for an input of any length.
     pub time: Duration,
     /// For each of its bytes.
     pub time_per_byte: Duration,

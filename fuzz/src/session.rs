@@ -31,7 +31,7 @@ use crate::client::{Client, Door, Received};
 use crate::json::Json;
 use crate::stage::{Manner, Stage, run, run_apart, scarce};
 
-/// What happens in one execution, and to how many clients.
+/// Most steps of one execution, and its number of clients.
 const MAX_STEPS: usize = 48;
 const CLIENTS: usize = 3;
 /// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time: an arm of tiny timesteps
@@ -216,7 +216,7 @@ struct Session {
     cast: Cast,
     stage: Stage,
     players: Vec<Player>,
-    /// What is left of [`ARM_TIME`].
+    /// Milliseconds left of [`ARM_TIME`].
     left: u16,
     /// Calls and messages so far: their numbers tell them apart.
     calls: u64,
@@ -233,7 +233,7 @@ struct Player {
     answered: BTreeMap<String, u32>,
     /// Calls that came for it as a provider: id, service, and the caller's own id.
     forwarded: Vec<(String, String, String)>,
-    /// What it heard in the end: whose, and which.
+    /// The messages that it heard in the end: whose, and which.
     last: Vec<(u64, u64)>,
     book: Rc<RefCell<Book>>,
     /// The last message of each topic and sender.
@@ -399,7 +399,7 @@ impl Session {
                 }
             }
             self.hear();
-            // Whoever reads again has taken all there was by now, and given its signs of life: it has not stalled.
+            // A client that reads again has taken all there was by now, and given its signs of life: it has not stalled.
             for player in &mut self.players {
                 if !player.client.is_paused() {
                     player.idle = Duration::ZERO;
@@ -616,7 +616,7 @@ impl Session {
         for player in &self.players {
             player.client.pause(false);
         }
-        // Whoever has not been reading for long finds here that it was given up; from then on it is owed nothing.
+        // A client that has not been reading for long finds here that it was given up; from then on it is owed nothing.
         self.pass(Duration::from_millis(5)).await;
         self.stage.release_all();
         let mut waited = Duration::ZERO;
@@ -655,7 +655,7 @@ impl Session {
         assert!(self.has_emptied(), "left when all have left: {left:?}");
     }
 
-    /// Those who are left tell one another something and ask one another something, and nothing of that may be lost: all of them
+    /// Lets the clients that are left tell one another and ask one another something, and nothing of that may be lost: all of them
     /// read, and have done what they wanted to.
     async fn exchange(&mut self) {
         let left: Vec<u8> = (0..CLIENTS as u8)
@@ -852,7 +852,7 @@ impl Player {
         }
     }
 
-    /// What it sends now may be a message, a call or an answer that is in no book.
+    /// Notes bytes that may be a message, a call or an answer that is in no book.
     fn note_forgery(&self, bytes: &[u8]) {
         let text = String::from_utf8_lossy(bytes);
         let words = ["publish", "service", "fragment", "\\u"];

@@ -32,7 +32,7 @@ use pendularm::protocol::op::fields::Fields;
 use serde_json::json;
 use tokio::io::{DuplexStream, duplex};
 
-/// Where clients connect to: what `Host` has to say.
+/// Address that clients connect to: what `Host` has to say.
 pub const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 
 thread_local! {
@@ -59,7 +59,7 @@ pub fn run_apart<T>(execution: impl Future<Output = T>) -> T {
     system().block_on(execution)
 }
 
-/// What the node does with a call.
+/// The ways in which the node treats a call.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Manner {
     /// Answers at once.
@@ -72,7 +72,7 @@ pub enum Manner {
     Forgetful,
 }
 
-/// What script and node share.
+/// The state that script and node share.
 #[derive(Default)]
 struct Desk {
     manner: Cell<Option<Manner>>,
@@ -186,7 +186,7 @@ impl Stage {
     }
 }
 
-/// What `actors/runtime.rs` starts, all of it on one thread.
+/// All that `actors/runtime.rs` starts, on one thread.
 fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Nodes) {
     let arm = ArmSim::<2>::new(
         Arm::default(),

@@ -3,7 +3,6 @@
 //! **Invariant:** the numbers are those of the functions that step the live arm; nothing is reckoned a second time.
 
 use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
-use pendularm::math::arm::Arm as Rods;
 use pendularm::math::{dynamics, kinematics};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
@@ -11,18 +10,21 @@ use pyo3::prelude::{PyResult, Python, pyfunction};
 use crate::arm::{Arm, Chain, for_either};
 use crate::fields::{Bound, Held, Numbers, Object, Rows, joints_or, refused};
 
-/// What a function of a state answers for it.
+/// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shape {
     /// A number.
     One,
-    /// So many numbers.
-    Many(usize),
-    /// A square of numbers.
-    Square(usize),
+    /// A point of the plane.
+    Point,
+    /// A number per joint.
+    Joints,
+    /// A square matrix, with a row per joint.
+    Square,
 }
 
-/// Applies `function` to every row of the fields; a field of one row goes with every row of the others.
+/// Applies `function` to every row of the fields; a field of one row goes with every row of the others. The number `N`
+/// of links is that of the arm which `function` asks.
 fn each_row<'py, const N: usize, const K: usize>(
     py: Python<'py>,
     fields: [(&str, &Object<'py>); K],
@@ -52,8 +54,9 @@ fn each_row<'py, const N: usize, const K: usize>(
     let mut shape: Vec<usize> = count.filter(|_| !is_one).into_iter().collect();
     match answer {
         Shape::One => {}
-        Shape::Many(size) => shape.push(size),
-        Shape::Square(size) => shape.extend([size, size]),
+        Shape::Point => shape.push(2),
+        Shape::Joints => shape.push(N),
+        Shape::Square => shape.extend([N, N]),
     }
     if shape.is_empty() {
         return Ok(flat
@@ -74,21 +77,12 @@ pub(crate) fn mass_matrix<'py>(
     arm: Held<'py, Arm>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        q: &Object<'py>,
-    ) -> PyResult<Object<'py>> {
-        each_row(
-            py,
-            [("q", q)],
-            Shape::Square(N),
-            |[q]: [[f64; N]; 1], out| {
-                out.extend(dynamics::mass_matrix(arm, &q).as_flattened());
-            },
-        )
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q)];
+        each_row(py, fields, Shape::Square, |[q], out| {
+            out.extend(dynamics::mass_matrix(arm, &q).as_flattened());
+        })
+    })
 }
 
 /// Coriolis and centrifugal effort C(q, qd) qd [N m] at positions `q` [rad] and rates `qd` [rad/s], of shape (links,)
@@ -100,22 +94,12 @@ pub(crate) fn coriolis<'py>(
     q: Object<'py>,
     qd: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        q: &Object<'py>,
-        qd: &Object<'py>,
-    ) -> PyResult<Object<'py>> {
-        each_row(
-            py,
-            [("q", q), ("qd", qd)],
-            Shape::Many(N),
-            |[q, qd]: [[f64; N]; 2], out| {
-                out.extend(dynamics::coriolis(arm, &q, &qd));
-            },
-        )
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q, &qd))
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q), ("qd", &qd)];
+        each_row(py, fields, Shape::Joints, |[q, qd], out| {
+            out.extend(dynamics::coriolis(arm, &q, &qd));
+        })
+    })
 }
 
 /// Gravity load G(q) [N m], the effort that holds the arm still at `q` [rad], of shape (links,) or (n, links).
@@ -125,16 +109,12 @@ pub(crate) fn gravity_load<'py>(
     arm: Held<'py, Arm>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        q: &Object<'py>,
-    ) -> PyResult<Object<'py>> {
-        each_row(py, [("q", q)], Shape::Many(N), |[q]: [[f64; N]; 1], out| {
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q)];
+        each_row(py, fields, Shape::Joints, |[q], out| {
             out.extend(dynamics::gravity_load(arm, &q));
         })
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+    })
 }
 
 /// Joint accelerations [rad/s²] under `effort` [N m] at `q` [rad] and `qd` [rad/s], each of shape (links,) or (n,
@@ -147,23 +127,12 @@ pub(crate) fn forward_dynamics<'py>(
     qd: Object<'py>,
     effort: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        given: [&Object<'py>; 3],
-    ) -> PyResult<Object<'py>> {
-        let [q, qd, effort] = given;
-        let fields = [("q", q), ("qd", qd), ("effort", effort)];
-        each_row(
-            py,
-            fields,
-            Shape::Many(N),
-            |[q, qd, effort]: [[f64; N]; 3], out| {
-                out.extend(dynamics::forward_dynamics(arm, &q, &qd, &effort));
-            },
-        )
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, [&q, &qd, &effort]))
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q), ("qd", &qd), ("effort", &effort)];
+        each_row(py, fields, Shape::Joints, |[q, qd, effort], out| {
+            out.extend(dynamics::forward_dynamics(arm, &q, &qd, &effort));
+        })
+    })
 }
 
 /// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape (links,)
@@ -176,23 +145,12 @@ pub(crate) fn inverse_dynamics<'py>(
     qd: Object<'py>,
     qdd: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        given: [&Object<'py>; 3],
-    ) -> PyResult<Object<'py>> {
-        let [q, qd, qdd] = given;
-        let fields = [("q", q), ("qd", qd), ("qdd", qdd)];
-        each_row(
-            py,
-            fields,
-            Shape::Many(N),
-            |[q, qd, qdd]: [[f64; N]; 3], out| {
-                out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
-            },
-        )
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, [&q, &qd, &qdd]))
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q), ("qd", &qd), ("qdd", &qdd)];
+        each_row(py, fields, Shape::Joints, |[q, qd, qdd], out| {
+            out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
+        })
+    })
 }
 
 /// Kinetic energy [J] at `q` [rad] and `qd` [rad/s], of shape (links,) or (n, links): a number, or (n,).
@@ -203,22 +161,12 @@ pub(crate) fn kinetic_energy<'py>(
     q: Object<'py>,
     qd: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        q: &Object<'py>,
-        qd: &Object<'py>,
-    ) -> PyResult<Object<'py>> {
-        each_row(
-            py,
-            [("q", q), ("qd", qd)],
-            Shape::One,
-            |[q, qd]: [[f64; N]; 2], out| {
-                out.push(dynamics::kinetic_energy(arm, &q, &qd));
-            },
-        )
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q, &qd))
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q), ("qd", &qd)];
+        each_row(py, fields, Shape::One, |[q, qd], out| {
+            out.push(dynamics::kinetic_energy(arm, &q, &qd));
+        })
+    })
 }
 
 /// Potential energy [J] at `q` [rad], of shape (links,) or (n, links), zero with the arm along the x axis: a number,
@@ -229,35 +177,27 @@ pub(crate) fn potential_energy<'py>(
     arm: Held<'py, Arm>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        q: &Object<'py>,
-    ) -> PyResult<Object<'py>> {
-        each_row(py, [("q", q)], Shape::One, |[q]: [[f64; N]; 1], out| {
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q)];
+        each_row(py, fields, Shape::One, |[q], out| {
             out.push(dynamics::potential_energy(arm, &q));
         })
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+    })
 }
 
-/// Where the end effector is [m], (2,) or (n, 2), at `q` [rad] of shape (links,) or (n, links).
+/// Position of the end effector [m], (2,) or (n, 2), at `q` [rad] of shape (links,) or (n, links).
 #[pyfunction]
 pub(crate) fn end_effector<'py>(
     py: Python<'py>,
     arm: Held<'py, Arm>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    fn of<'py, const N: usize>(
-        py: Python<'py>,
-        arm: &Rods<N>,
-        q: &Object<'py>,
-    ) -> PyResult<Object<'py>> {
-        each_row(py, [("q", q)], Shape::Many(2), |[q]: [[f64; N]; 1], out| {
+    for_either!(Chain, &arm.get().chain, arm => {
+        let fields = [("q", &q)];
+        each_row(py, fields, Shape::Point, |[q], out| {
             out.extend(kinematics::forward(arm.lengths(), &q).position.to_array());
         })
-    }
-    for_either!(Chain, &arm.get().chain, arm => of(py, arm, &q))
+    })
 }
 
 /// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].

@@ -138,7 +138,7 @@ impl<'py> Numbers<'py> {
     }
 }
 
-/// Whatever NumPy can make doubles of.
+/// Converts whatever NumPy can make doubles of.
 fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     let array = py

@@ -14,7 +14,7 @@ const PIECE: Duration = Duration::from_millis(50);
 /// Advances a computation, with the interpreter's lock released, until it has an answer.
 ///
 /// # Errors
-/// What a signal's handler raises, `KeyboardInterrupt` say.
+/// Any that a signal's handler raises, such as `KeyboardInterrupt`.
 pub(crate) fn until_done<T: Send>(
     py: Python<'_>,
     mut advance: impl FnMut() -> Option<T> + Send,

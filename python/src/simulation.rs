@@ -30,7 +30,7 @@ enum Either {
     Three(Mutex<Loop<3>>),
 }
 
-/// Where a simulation left the finite numbers.
+/// The place at which a simulation left the finite numbers.
 #[pyclass(frozen, eq, get_all, module = "pendularm")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Divergence {
@@ -124,7 +124,7 @@ impl Simulation {
         for_either!(Either, &self.own, one => hold(py, one).enable(data));
     }
 
-    /// Where the controller holds the arm: `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,)
+    /// Has the controller hold the arm at `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,)
     /// each.
     #[pyo3(signature = (positions, velocities=None))]
     fn set_setpoint(
@@ -322,7 +322,7 @@ impl Simulation {
         })
     }
 
-    /// Where the end effector is [m], (2,).
+    /// Position of the end effector [m], (2,).
     #[getter]
     fn end_effector<'py>(&self, py: Python<'py>) -> Numbers<'py> {
         for_either!(Either, &self.own, one => {
@@ -331,7 +331,7 @@ impl Simulation {
         })
     }
 
-    /// Where the simulation left the finite numbers, if it did since the reset; from there on no step is taken.
+    /// The place at which the simulation left the finite numbers, if it did since the reset; from there on no step is taken.
     #[getter]
     fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
         for_either!(Either, &self.own, one => hold(py, one).divergence()).map(|found| Divergence {

@@ -37,7 +37,7 @@ def test_the_readmes_policy_learns(tmp_path):
     # A seed makes it the same at each run; so long a search is for those who wait for it.
     short = policy.replace("10_000", "1_000, 'seed': 1, 'verbose': -9")
     said = run(short, tmp_path)
-    # Whoever hangs has 0, and a network drawn at random some 0.2.
+    # An arm that hangs has 0, and a network drawn at random some 0.2.
     assert float(said.strip().strip("[]")) > 0.3
 
 

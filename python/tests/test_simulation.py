@@ -78,7 +78,7 @@ def test_a_settled_arm_carries_its_gravity_load(links):
     arm.set_setpoint([0.5, -0.8, 0.3][:links])
     arm.step(20_000)
     assert np.allclose(arm.position, [0.5, -0.8, 0.3][:links], atol=1e-6)
-    # What the integrals still lack after 20 s is some millionths of the load.
+    # The integrals still lack, after 20 s, some millionths of the load.
     assert np.allclose(arm.effort, dynamics.gravity_load(arm.arm, arm.position), rtol=1e-4)
 
 

@@ -304,7 +304,7 @@ fn announce(address: SocketAddr) {
     tracing::info!(%address, "serving rosbridge clients");
 }
 
-/// Where a browser finds the page. The token is not for the log.
+/// Says at which address a browser finds the page. The token is not for the log.
 #[cfg(feature = "web")]
 fn announce_page(address: SocketAddr, asks_token: bool) {
     let host = if address.ip().is_unspecified() {

@@ -167,7 +167,7 @@ fn check_positive(field: &'static str, values: &[f64]) -> Result<(), ArmError> {
     Ok(())
 }
 
-/// Where the joints are and how fast they turn.
+/// Positions and velocities of the joints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct State<const N: usize> {
     /// Joint angles \[rad\], never wrapped.

@@ -1,4 +1,4 @@
-//! The four one-step methods, side by side: each advances `q̈ = a(t, q, q̇)` from `t` to `t + h`.
+//! The one-step methods, side by side: each advances `q̈ = a(t, q, q̇)` from `t` to `t + h`.
 //!
 //! | method | order | evaluations | map, with `a₁ = a(t, q, v)` |
 //! | --- | --- | --- | --- |
@@ -23,7 +23,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-/// One of the four selectable one-step methods.
+/// One of the selectable one-step methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Method {
     /// Forward Euler, order 1. Weakness: gains energy on every undamped swing, at every timestep.
@@ -81,9 +81,9 @@ impl fmt::Display for Method {
     }
 }
 
-/// A name that is none of the four methods'.
+/// A name that is no method's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("must be one of euler, midpoint, verlet, rk4")]
+#[error("must be one of {}", Method::ALL.map(Method::name).join(", "))]
 pub struct UnknownMethod;
 
 impl FromStr for Method {

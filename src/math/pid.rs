@@ -70,7 +70,7 @@ impl Default for Gains<3> {
     }
 }
 
-/// Where the arm is to be held.
+/// Positions and velocities at which the arm is to be held.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setpoint<const N: usize> {
     /// Joint positions q* \[rad\], not wrapped: a setpoint of 2π asks for a whole turn.

@@ -79,7 +79,7 @@ impl<const N: usize> JointPath<N> {
         self.points.last().map_or(0.0, |last| last.time)
     }
 
-    /// Where the joints should be, and how fast, `time` after the start \[s\].
+    /// Positions and velocities that the joints should have `time` after the start \[s\].
     #[must_use]
     pub fn at(&self, time: f64) -> Setpoint<N> {
         let behind = self.points.partition_point(|point| point.time <= time);

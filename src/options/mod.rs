@@ -38,7 +38,7 @@ use crate::protocol::op::token::Token;
 #[cfg(feature = "report")]
 use crate::report::ReportOptions;
 
-/// Where the runtime listens unless an option says otherwise; bound here, it listens on `[::1]` too.
+/// Address of the runtime unless an option says otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
     SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 1), 9095));
 
@@ -143,7 +143,7 @@ const SETTINGS: &[&LaunchOption] = &[
 pub struct Options {
     /// How many links the arm has.
     pub links: Links,
-    /// Where to listen: a loopback address, or any if there is a token; port 0 takes a free one.
+    /// Address to listen on: a loopback address, or any if there is a token; port 0 takes a free one.
     pub bind: SocketAddr,
     /// Whether `bind` is [`DEFAULT_BIND`], which brings `[::1]` with it.
     pub is_default_bind: bool,

@@ -18,7 +18,7 @@ pub struct PlanOptions {
     pub is_servo: bool,
     /// How many links the arm has.
     pub links: Links,
-    /// Where a servo moves the joints \[rad\]; a joint without a number stays at 0.
+    /// Positions to which a servo moves the joints \[rad\]; a joint without a number stays at 0.
     pub setpoint: Vec<f64>,
 }
 

@@ -33,7 +33,7 @@ pub(super) const RECORD_DIR: LaunchOption = LaunchOption {
 pub struct RecordOptions {
     /// The file into which this run is recorded, if it is.
     pub file: Option<PathBuf>,
-    /// Where clients may have runs recorded, if anywhere.
+    /// Folder in which clients may have runs recorded, if any.
     pub folder: Option<PathBuf>,
 }
 

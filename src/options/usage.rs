@@ -8,7 +8,7 @@ use clap::error::ErrorKind;
 
 use crate::protocol::op::token::TokenError;
 
-/// Where a value came from, as a refusal names it.
+/// Origin of a value, as a refusal names it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {
     /// An option on the command line, by its long name.

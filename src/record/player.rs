@@ -24,7 +24,7 @@ pub struct ReplayVerdict {
     pub states: u64,
     /// Inputs that took effect again.
     pub inputs: u64,
-    /// Where inputs are missing, because the queue was full: as often did the record begin again.
+    /// Gaps in the inputs, because the queue was full: as often did the record begin again.
     pub losses: u64,
     /// The last step whose state was the same, or at which the record began.
     pub agreed_to: u64,

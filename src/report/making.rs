@@ -12,7 +12,7 @@ use super::progress::ProgressBar;
 #[derive(Debug)]
 pub(crate) struct Making<'a> {
     pub(super) quick: bool,
-    /// Where the report is written, and counts from outside are looked for.
+    /// Folder in which the report is written, and counts from outside are looked for.
     pub(super) out: &'a Path,
     /// The section's name, and where it says how far it is.
     pub(super) section: &'static str,

@@ -55,7 +55,7 @@ pub enum ReportError {
     /// A file or directory that cannot be written.
     #[error("cannot write {}: {error}", path.display())]
     Write {
-        /// Which.
+        /// The file.
         path: PathBuf,
         /// The system's word for it.
         error: io::Error,

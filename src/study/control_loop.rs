@@ -17,7 +17,7 @@ pub struct ControlLoop<const N: usize> {
     pub arm: Arm<N>,
     /// Gains of the controller; all zero: the arm is left to itself.
     pub gains: Gains<N>,
-    /// Where the controller holds it.
+    /// The setpoint at which the controller holds it.
     pub setpoint: Setpoint<N>,
     /// The method that takes the steps.
     pub method: Method,

@@ -1,5 +1,5 @@
-//! Which motion a loop loses first: the eigenvalue that leaves the unit circle at the limit, and the joint that moves
-//! with it.
+//! The motion that a loop loses first: the eigenvalue that leaves the unit circle at the limit, and the joint that
+//! moves with it.
 //!
 //! **Invariant:** bounded; none where something is not finite.
 

@@ -1,4 +1,4 @@
-//! Where an arm rests under its control law.
+//! Resting poses of an arm under its control law.
 //!
 //! Joints that integrate stay at the setpoint. The others go downhill on the potential of the arm and of its springs,
 //! `V = U + ½ kp (q - q*)² - c q`, and come to rest in one of its minima: a place without slope at which it curves down
@@ -40,7 +40,7 @@ const BALANCED: f64 = 1e-9;
 /// Curvature, in parts of the largest, that rounding can feign.
 const FLAT: f64 = 1e-12;
 
-/// Where an arm rests under control.
+/// A pose at which an arm rests under control.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Equilibrium<const N: usize> {
     /// Joint positions \[rad\].

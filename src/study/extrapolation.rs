@@ -1,7 +1,7 @@
 //! The arm under constant efforts, followed to rounding: Gragg's midpoint rule extrapolated to vanishing steps.
 //!
-//! Over a span the rule is run with 2, 4, 6, … steps; its error is a series in the square of the step, which the Aitken-Neville
-//! scheme removes term by term until two results agree. A span on which they don't is cut in two.
+//! Over a span the rule is run with 2, 4, 6, … steps; its error is a series in the square of the step, which the
+//! Aitken-Neville scheme removes term by term until two results agree. A span on which they don't is cut in two.
 //!
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.9.
 //!
@@ -20,7 +20,8 @@ use crate::math::integrator::two_sum;
 /// Rows of the scheme; the last has order 16.
 const ROWS: usize = 8;
 
-/// Two results agree if they differ by so little, relative to what the span changes: some ten times what rounding leaves.
+/// Two results agree if they differ by so little, relative to what the span changes: some ten times what rounding
+/// leaves.
 const TOLERANCE: f64 = 3e-15;
 
 /// How often a span may be halved. A timestep of a second is followed in spans of a millisecond.
@@ -66,7 +67,7 @@ impl<const N: usize> Follower<N> {
         }
     }
 
-    /// Where the arm is.
+    /// The arm's state.
     #[must_use]
     pub fn state(&self) -> &State<N> {
         &self.state
@@ -78,8 +79,8 @@ impl<const N: usize> Follower<N> {
         self.evaluations
     }
 
-    /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere on
-    /// the way.
+    /// Follows the arm under `effort` \[N m\] for `span` \[s\]; `false` if it could not be followed, and is somewhere
+    /// on the way.
     pub fn follow(&mut self, arm: &Arm<N>, effort: &[f64; N], span: f64) -> bool {
         self.begin(span);
         self.go_on(arm, effort, u64::MAX).unwrap_or(false)
@@ -95,8 +96,8 @@ impl<const N: usize> Follower<N> {
         };
     }
 
-    /// Goes on with the span until there have been so many `evaluations` in all, or some more; none while it is not over, `false` if it
-    /// could not be followed.
+    /// Goes on with the span until there have been so many `evaluations` in all, or some more; none while it is not
+    /// over, `false` if it could not be followed.
     pub(super) fn go_on(
         &mut self,
         arm: &Arm<N>,

@@ -1,9 +1,9 @@
 //! Gains for an arm and a timestep: stable in every pose with a margin, and settled in time.
 //!
 //! The default gains are scaled to the arm. A joint's gains go with the inertia that it moves, and with the pace `σ` of
-//! the loop, for which time runs `σ` times as fast: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The inertia of a joint is that
-//! of all links beyond it, or, where a heavy outer link turns a light inner one along, what it feels while the others are
-//! free; means of the two are tried in turn (`SHAPES`).
+//! the loop, for which time runs `σ` times as fast: `kp ~ J σ²`, `ki ~ J σ³`, `kd ~ J σ`. The inertia of a joint is
+//! that of all links beyond it, or, where a heavy outer link turns a light inner one along, what it feels while the
+//! others are free; means of the two are tried in turn (`SHAPES`).
 //!
 //! A pace is taken if the smallest stable timestep over all poses leaves the margin, and if the arm itself, stepped as
 //! the live arm is, settles in time in every one of [`MOVES`] moves. The slowest pace that does is the answer.
@@ -100,8 +100,8 @@ pub enum GainsError {
     },
     /// Slow enough for the timestep, no loop settles in time; fast enough to settle, none has the margin.
     #[error(
-        "no gains found that settle within {settling_time} s and leave a margin of {margin} at the timestep {timestep} s; \
-         ask for more time or set a shorter timestep"
+        "no gains found that settle within {settling_time} s and leave a margin of {margin} at the timestep \
+         {timestep} s; ask for more time or set a shorter timestep"
     )]
     NotFound {
         /// The time that was asked for \[s\].
@@ -122,11 +122,11 @@ pub struct GainsSearch<const N: usize> {
     shape: usize,
     pace: f64,
     paces: u32,
-    stage: Stage<N>,
+    stage: GainsStage<N>,
 }
 
 #[derive(Debug, Clone)]
-enum Stage<const N: usize> {
+enum GainsStage<const N: usize> {
     Limiting(Box<LimitSearch<N>>),
     Moving(Box<TestMove<N>>),
     Done(Result<SuggestedGains<N>, GainsError>),
@@ -163,7 +163,7 @@ impl<const N: usize> GainsSearch<N> {
             shape: 0,
             pace: 1.0,
             paces: 0,
-            stage: Stage::Done(Err(wish.not_found(control.timestep))),
+            stage: GainsStage::Done(Err(wish.not_found(control.timestep))),
         };
         search.control.setpoint = Setpoint::default();
         search.begin_shape(0);
@@ -173,30 +173,32 @@ impl<const N: usize> GainsSearch<N> {
     /// Goes on by one piece; the answer, once it is found.
     pub fn advance(&mut self) -> Option<Result<SuggestedGains<N>, GainsError>> {
         match &mut self.stage {
-            Stage::Done(answer) => return Some(*answer),
-            Stage::Limiting(search) => {
+            GainsStage::Done(answer) => return Some(*answer),
+            GainsStage::Limiting(search) => {
                 if let Some(limits) = search.advance() {
                     self.judge(limits.trusted(), limits.certified);
                 }
             }
-            Stage::Moving(trial) => match trial.advance(&self.control, self.wish.settling_time) {
-                None => {}
-                Some(None) => self.go_faster(),
-                Some(Some(settled_after)) => {
-                    self.stage = Stage::Done(Ok(SuggestedGains {
-                        gains: self.control.gains,
-                        limit: trial.limit,
-                        certified: trial.certified,
-                        settled_after,
-                    }));
+            GainsStage::Moving(trial) => {
+                match trial.advance(&self.control, self.wish.settling_time) {
+                    None => {}
+                    Some(None) => self.go_faster(),
+                    Some(Some(settled_after)) => {
+                        self.stage = GainsStage::Done(Ok(SuggestedGains {
+                            gains: self.control.gains,
+                            limit: trial.limit,
+                            certified: trial.certified,
+                            settled_after,
+                        }));
+                    }
                 }
-            },
+            }
         }
         None
     }
 
-    /// Goes on to the moves if the limit leaves the margin. Where it does not, the loop is too fast, or its springs hardly
-    /// hold the load: some faster paces tell.
+    /// Goes on to the moves if the limit leaves the margin. Where it does not, the loop is too fast, or its springs
+    /// hardly hold the load: some faster paces tell.
     fn judge(&mut self, limit: Option<f64>, certified: bool) {
         let least = self.wish.margin * self.control.timestep;
         match limit {
@@ -212,7 +214,7 @@ impl<const N: usize> GainsSearch<N> {
                     off_at: 0.0,
                     slowest: 0.0,
                 };
-                self.stage = Stage::Moving(Box::new(trial));
+                self.stage = GainsStage::Moving(Box::new(trial));
             }
         }
     }
@@ -234,13 +236,13 @@ impl<const N: usize> GainsSearch<N> {
             self.pace = self.slowest_pace();
             self.try_pace();
         } else {
-            self.stage = Stage::Done(Err(self.wish.not_found(self.control.timestep)));
+            self.stage = GainsStage::Done(Err(self.wish.not_found(self.control.timestep)));
         }
     }
 
     fn try_pace(&mut self) {
         self.control.gains = self.gains(self.pace);
-        self.stage = Stage::Limiting(Box::new(LimitSearch::new(&self.control)));
+        self.stage = GainsStage::Limiting(Box::new(LimitSearch::new(&self.control)));
     }
 
     /// The default gains, scaled to the arm's inertia and to a pace.

@@ -113,11 +113,11 @@ pub struct LimitSearch<const N: usize> {
     limits: Limits<N>,
     /// How the loop rests, unless it runs away.
     at_rest: Rest,
-    stage: Stage<N>,
+    stage: LimitStage<N>,
 }
 
 #[derive(Debug, Clone)]
-enum Stage<const N: usize> {
+enum LimitStage<const N: usize> {
     Setpoint,
     Held(Linear),
     Continuous(Linear),
@@ -151,7 +151,7 @@ impl<const N: usize> LimitSearch<N> {
                 advised: None,
             },
             at_rest: Rest::Setpoint,
-            stage: Stage::Setpoint,
+            stage: LimitStage::Setpoint,
         }
     }
 
@@ -159,36 +159,36 @@ impl<const N: usize> LimitSearch<N> {
     pub fn advance(&mut self) -> Option<Limits<N>> {
         let method = self.control.method;
         let limits = &mut self.limits;
-        self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Setpoint => Stage::Held(self.settle()),
-            Stage::Held(linear) => {
+        self.stage = match std::mem::replace(&mut self.stage, LimitStage::Done) {
+            LimitStage::Setpoint => LimitStage::Held(self.settle()),
+            LimitStage::Held(linear) => {
                 limits.held = largest_timestep(&linear, method, Sampling::Held);
                 // A joint that nothing draws back drifts; what is stable at some timestep does not run away.
                 if limits.held == Some(0.0) && Modes::of(&linear).run_away() {
                     limits.rest = Rest::Unstable;
                 }
-                Stage::Continuous(linear)
+                LimitStage::Continuous(linear)
             }
-            Stage::Continuous(linear) => {
+            LimitStage::Continuous(linear) => {
                 limits.continuous = largest_timestep(&linear, method, Sampling::Continuous);
-                Stage::Proving(Proof::new(&self.control).map(Box::new))
+                LimitStage::Proving(Proof::new(&self.control).map(Box::new))
             }
-            Stage::Proving(None) => Stage::Proven(None),
-            Stage::Proving(Some(mut proof)) => match proof.advance(BOXES) {
-                None => Stage::Proving(Some(proof)),
-                proven => Stage::Proven(proven),
+            LimitStage::Proving(None) => LimitStage::Proven(None),
+            LimitStage::Proving(Some(mut proof)) => match proof.advance(BOXES) {
+                None => LimitStage::Proving(Some(proof)),
+                proven => LimitStage::Proven(proven),
             },
-            Stage::Proven(proven) => self.compare(proven),
-            Stage::Poses(sampling, mut search) => {
+            LimitStage::Proven(proven) => self.compare(proven),
+            LimitStage::Poses(sampling, mut search) => {
                 if search.advance() {
-                    Stage::Poses(sampling, search)
+                    LimitStage::Poses(sampling, search)
                 } else {
                     self.conclude(sampling, search.smallest())
                 }
             }
-            Stage::Done => return Some(self.limits),
+            LimitStage::Done => return Some(self.limits),
         };
-        matches!(self.stage, Stage::Done).then_some(self.limits)
+        matches!(self.stage, LimitStage::Done).then_some(self.limits)
     }
 
     /// The loop where it rests.
@@ -213,12 +213,12 @@ impl<const N: usize> LimitSearch<N> {
 
     /// Compares what is proven with the limit in the worst pose of the proof; where they agree there is nothing to
     /// search.
-    fn compare(&mut self, proven: Option<Proven<N>>) -> Stage<N> {
+    fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
         let mut found = (self.limits.held, self.limits.equilibrium);
         let search = |sampling, found| {
             let search = PoseSearch::new(control, sampling, found);
-            Stage::Poses(sampling, search)
+            LimitStage::Poses(sampling, search)
         };
         let Some(Proven { timestep, pose }) = proven else {
             return search(Sampling::Held, found);
@@ -246,12 +246,16 @@ impl<const N: usize> LimitSearch<N> {
     }
 
     /// Takes in the smallest limit over all poses, and goes on with the next search, if there is one.
-    fn conclude(&mut self, sampling: Sampling, (least, pose): (Option<f64>, [f64; N])) -> Stage<N> {
+    fn conclude(
+        &mut self,
+        sampling: Sampling,
+        (least, pose): (Option<f64>, [f64; N]),
+    ) -> LimitStage<N> {
         let control = &self.control;
         let limits = &mut self.limits;
         if sampling == Sampling::Continuous {
             limits.minimum_continuous = least;
-            return Stage::Done;
+            return LimitStage::Done;
         }
         limits.minimum_held = least;
         limits.bound = limits
@@ -267,7 +271,7 @@ impl<const N: usize> LimitSearch<N> {
         }
         let known = (limits.continuous, limits.equilibrium);
         let search = PoseSearch::new(control, Sampling::Continuous, known);
-        Stage::Poses(Sampling::Continuous, search)
+        LimitStage::Poses(Sampling::Continuous, search)
     }
 }
 

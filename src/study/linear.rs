@@ -122,8 +122,8 @@ impl Linear {
         2 * self.joints() + self.integrals.len()
     }
 
-    /// The matrix `A` of `ẋ = A x` with control that follows the state at every instant; `x` holds positions, velocities,
-    /// integrals.
+    /// The matrix `A` of `ẋ = A x` with control that follows the state at every instant; `x` holds positions,
+    /// velocities, integrals.
     #[must_use]
     pub fn flow(&self) -> Matrix {
         let n = self.joints();
@@ -145,7 +145,7 @@ impl Linear {
         flow
     }
 
-    /// The matrix of the arm alone under efforts that stay what they are: `x` holds positions, velocities, efforts \[N m\].
+    /// The matrix of the arm alone under constant efforts: `x` holds positions, velocities, efforts \[N m\].
     #[must_use]
     pub fn plant(&self) -> Matrix {
         let n = self.joints();

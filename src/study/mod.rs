@@ -2,7 +2,7 @@
 //!
 //! | module | answers |
 //! | --- | --- |
-//! | [`stability`] | the largest stable timestep, predicted from the linearised loop ([`linear`], [`matrix`]); over all poses, proven |
+//! | [`stability`] | the largest stable timestep, by the linearised loop ([`linear`], [`matrix`]) |
 //! | [`motion`] | the largest timestep that a motion bears |
 //! | [`control_loop`] | the loop that all of these speak of, and how it is stepped |
 //! | [`continuous`] | the same loop with its law in every stage |

@@ -6,8 +6,8 @@
 //!
 //! | motion | speed Ω assumed |
 //! | --- | --- |
-//! | of an arm without springs | all of its energy in one link: `Ω² = 2 (E - U_min) max (M⁻¹)_ii`, angles of links, arm stretched |
-//! | to a setpoint | the joints' own peaks and the present speed: `Σ kp e / (√(kp I) + kd)` and `max φ̇`, or the former if that is less |
+//! | of an arm without springs | all energy in one link: `Ω² = 2 (E - U_min) max (M⁻¹)_ii`, arm stretched |
+//! | to a setpoint | the joints' peaks and the present speed: `Σ kp e / (√(kp I) + kd)` and `max φ̇`, or the former |
 //!
 //! `(M⁻¹)_ii` says how easily link i is turned while the others are free, `I` is the inertia that a joint then moves.
 //! The peak of one joint that is let go at rest is `e √(kp/I)` without damping and `kp e / kd` with much of it; in

@@ -3,12 +3,12 @@
 //! | question | the truth that errors are measured from |
 //! | --- | --- |
 //! | an arm left to itself | its motion |
-//! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding the effort for a step is part of the error |
+//! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //!
-//! The truth is followed with ever smaller steps until two of them agree to a part of the allowed error. Then each method
-//! is run as the live arm runs it, with ever smaller steps until it stays within the rest at all samples, and a little
-//! larger again by bisection. The cheapest run, in evaluations of the dynamics, is the plan: it has been run, and its
-//! error is that which was seen. A run that could only be dearer than another is not made.
+//! The truth is followed with ever smaller steps until two of them agree to a part of the allowed error. Then each
+//! method is run as the live arm runs it, with ever smaller steps until it stays within the rest at all samples, and a
+//! little larger again by bisection. The cheapest run, in evaluations of the dynamics, is the plan: it has been run,
+//! and its error is that which was seen. A run that could only be dearer than another is not made.
 //!
 //! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
 //! every pose, since the error of one move says nothing about the next.
@@ -49,7 +49,7 @@ const PART_OF_TRUTH: f64 = 0.05;
 pub struct Task<const N: usize> {
     /// The loop; its method and timestep are what is looked for. Gains of zero: an arm left to itself.
     pub control: ControlLoop<N>,
-    /// Where the arm starts.
+    /// The arm's state at the start.
     pub start: State<N>,
     /// How long \[s\].
     pub duration: f64,
@@ -122,11 +122,11 @@ pub struct Planning<const N: usize> {
     /// Methods that have not been tried, the next one last.
     methods: Vec<Method>,
     candidates: Vec<Candidate>,
-    stage: Stage<N>,
+    stage: PlanStage<N>,
 }
 
 #[derive(Debug, Clone)]
-enum Stage<const N: usize> {
+enum PlanStage<const N: usize> {
     Truth(Box<Followed<ContinuousLoop<N>>>),
     Limiting(Method, Box<LimitSearch<N>>),
     Running(Bracket, Box<Followed<Simulation<N>>>),
@@ -164,9 +164,9 @@ impl<const N: usize> Planning<N> {
             spacing,
             truth: Vec::new(),
             uncertainty: f64::INFINITY,
-            methods: vec![Method::Euler, Method::Midpoint, Method::Verlet, Method::Rk4],
+            methods: Method::ALL.to_vec(),
             candidates: Vec::new(),
-            stage: Stage::Done(Err(PlanError::Unknown {
+            stage: PlanStage::Done(Err(PlanError::Unknown {
                 uncertainty: f64::INFINITY,
             })),
         };
@@ -177,22 +177,22 @@ impl<const N: usize> Planning<N> {
     /// Goes on by one piece; the plan, once it is made.
     pub fn advance(&mut self) -> Option<Result<Planned, PlanError>> {
         match &mut self.stage {
-            Stage::Done(answer) => return Some(answer.clone()),
-            Stage::Truth(run) => {
+            PlanStage::Done(answer) => return Some(answer.clone()),
+            PlanStage::Truth(run) => {
                 if let Some(finite) = run.advance(self.samples) {
                     let track = std::mem::take(&mut run.track);
                     let per_sample = run.per_sample;
                     self.compare(finite, track, per_sample);
                 }
             }
-            Stage::Limiting(method, search) => {
+            PlanStage::Limiting(method, search) => {
                 let method = *method;
                 if let Some(limits) = search.advance() {
                     let most = limits.advised.unwrap_or(f64::INFINITY);
                     self.begin(method, most);
                 }
             }
-            Stage::Running(bracket, run) => {
+            PlanStage::Running(bracket, run) => {
                 if let Some(finite) = run.advance(self.samples) {
                     let (bracket, per_sample) = (*bracket, run.per_sample);
                     let error = if finite {
@@ -216,7 +216,7 @@ impl<const N: usize> Planning<N> {
             state: self.task.start,
             integral: [0.0; N],
         };
-        self.stage = Stage::Truth(Box::new(Followed::new(truth, per_sample)));
+        self.stage = PlanStage::Truth(Box::new(Followed::new(truth, per_sample)));
     }
 
     /// Compares a truth with the one before, which took steps twice as long.
@@ -233,7 +233,7 @@ impl<const N: usize> Planning<N> {
             self.follow(2 * per_sample);
         } else {
             let uncertainty = self.uncertainty;
-            self.stage = Stage::Done(Err(PlanError::Unknown { uncertainty }));
+            self.stage = PlanStage::Done(Err(PlanError::Unknown { uncertainty }));
         }
     }
 
@@ -242,7 +242,7 @@ impl<const N: usize> Planning<N> {
             let error = self.task.error;
             self.candidates
                 .sort_by_key(|one| std::cmp::Reverse(one.evaluations));
-            self.stage = Stage::Done(if self.candidates.is_empty() {
+            self.stage = PlanStage::Done(if self.candidates.is_empty() {
                 Err(PlanError::NotFound { error })
             } else {
                 Ok(Planned {
@@ -256,7 +256,7 @@ impl<const N: usize> Planning<N> {
             self.begin(method, f64::INFINITY);
         } else {
             let search = LimitSearch::new(&self.task.control.with_method(method));
-            self.stage = Stage::Limiting(method, Box::new(search));
+            self.stage = PlanStage::Limiting(method, Box::new(search));
         }
     }
 
@@ -282,7 +282,7 @@ impl<const N: usize> Planning<N> {
         let control = self.task.control.with_method(method);
         let timestep = self.spacing / in_f64(per_sample);
         let live = control.with_timestep(timestep).simulation(self.task.start);
-        self.stage = Stage::Running(bracket, Box::new(Followed::new(live, per_sample)));
+        self.stage = PlanStage::Running(bracket, Box::new(Followed::new(live, per_sample)));
     }
 
     fn narrow(&mut self, bracket: Bracket, per_sample: u64, error: f64) {

@@ -30,7 +30,7 @@ const MAX_POSES: usize = 1024;
 /// Parts of the smallest limit so far at which a pose must be stable to pass without a search of its own.
 const PROBES: [f64; 3] = [1.0, 0.6, 0.2];
 
-/// Where a climb ends \[rad\]: near its top a limit then changes by a millionth.
+/// Stride at which a climb ends \[rad\]: near its top a limit then changes by a millionth.
 const SMALLEST_STRIDE: f64 = 1e-3;
 
 /// Moves of one climb at most.
@@ -54,14 +54,14 @@ struct Climb<const N: usize> {
     at: Judged<N>,
     growth: f64,
     stride: f64,
-    /// Which of the directions is tried next, and how many have failed in turn.
+    /// The direction that is tried next, and how many have failed in turn.
     direction: usize,
     failed: usize,
     moves: u32,
 }
 
 #[derive(Debug, Clone)]
-enum Stage<const N: usize> {
+enum PoseStage<const N: usize> {
     Grid(usize),
     /// The growth of every cell at the smallest limit, where it is largest.
     Rating(usize, Vec<(Judged<N>, f64)>),
@@ -76,9 +76,9 @@ pub(super) struct PoseSearch<const N: usize> {
     sampling: Sampling,
     /// The smallest so far \[s\]; `None` while nothing limits.
     smallest: Option<f64>,
-    /// Where that is.
+    /// The pose of that value.
     worst: [f64; N],
-    stage: Stage<N>,
+    stage: PoseStage<N>,
 }
 
 impl<const N: usize> PoseSearch<N> {
@@ -93,37 +93,39 @@ impl<const N: usize> PoseSearch<N> {
             sampling,
             smallest: bound,
             worst,
-            stage: Stage::Grid(0),
+            stage: PoseStage::Grid(0),
         }
     }
 
     /// Judges the loop at one more pose; false once there is none left.
     pub(super) fn advance(&mut self) -> bool {
-        self.stage = match std::mem::replace(&mut self.stage, Stage::Done) {
-            Stage::Grid(index) => match self.judged(index) {
+        self.stage = match std::mem::replace(&mut self.stage, PoseStage::Done) {
+            PoseStage::Grid(index) => match self.judged(index) {
                 Some(judged) => {
                     self.judge(&judged);
-                    Stage::Grid(index + 1)
+                    PoseStage::Grid(index + 1)
                 }
-                None if self.smallest.is_none_or(|limit| limit == 0.0) => Stage::Done,
-                None => Stage::Rating(0, Vec::new()),
+                None if self.smallest.is_none_or(|limit| limit == 0.0) => PoseStage::Done,
+                None => PoseStage::Rating(0, Vec::new()),
             },
-            Stage::Rating(index, mut cells) => match self.judged(index) {
+            PoseStage::Rating(index, mut cells) => match self.judged(index) {
                 Some(judged) => {
                     self.rate(index, judged, &mut cells);
-                    Stage::Rating(index + 1, cells)
+                    PoseStage::Rating(index + 1, cells)
                 }
-                None => Stage::Climbing(summits::<N>(&cells), None),
+                None => PoseStage::Climbing(summits::<N>(&cells), None),
             },
-            Stage::Climbing(starts, Some(climb)) => Stage::Climbing(starts, self.climb(climb)),
-            Stage::Climbing(mut starts, None) => match starts.pop() {
+            PoseStage::Climbing(starts, Some(climb)) => {
+                PoseStage::Climbing(starts, self.climb(climb))
+            }
+            PoseStage::Climbing(mut starts, None) => match starts.pop() {
                 Some(start) => {
                     let climb = self.begin(start);
-                    Stage::Climbing(starts, Some(climb))
+                    PoseStage::Climbing(starts, Some(climb))
                 }
-                None => Stage::Done,
+                None => PoseStage::Done,
             },
-            Stage::Done => return false,
+            PoseStage::Done => return false,
         };
         true
     }

@@ -22,8 +22,8 @@
 //!
 //! The three methods that look at gravity in several stages see the springs' part moved by up to `h²/4 Kp M⁻¹ Γ`, no
 //! longer symmetric. Where `P₃, P₂ > 0` that is at most `ε Kp` with `ε = h/2 max(kp/kd) max(Γ/kp)`; every coefficient
-//! must be good by twice that, and `ε` at most 0.01, or nothing is proven. (For these methods under gravity the bound so
-//! rests on an estimate of what is not symmetric; without gravity, and for Euler, it is exact.)
+//! must be good by twice that, and `ε` at most 0.01, or nothing is proven. (For these methods under gravity the bound
+//! so rests on an estimate of what is not symmetric; without gravity, and for Euler, it is exact.)
 //!
 //! The bound is sharp where an arm is limited by its damping, as stiff controllers are. Where damping is weak the
 //! matrices mix (`P₂` loses its sign for one joint before the loop is unstable), and it is only safe.

@@ -1,19 +1,20 @@
 //! The largest stable timestep, predicted.
 //!
-//! A method steps the linear system of [`Linear`] by a matrix, `x ↦ (I + h E) x`. The loop is stable at the timestep `h`
-//! as long as no eigenvalue `1 + h μ` of that matrix leaves the unit circle: `2 Re μ + h |μ|² ≤ 0` for every eigenvalue μ
-//! of `E`. `E` is formed without subtracting the identity, so that growth of a trillionth part shows at any timestep.
+//! A method steps the linear system of [`Linear`] by a matrix, `x ↦ (I + h E) x`. The loop is stable at the timestep
+//! `h` as long as no eigenvalue `1 + h μ` of that matrix leaves the unit circle: `2 Re μ + h |μ|² ≤ 0` for every
+//! eigenvalue μ of `E`. `E` is formed without subtracting the identity, so that growth of a trillionth part shows at
+//! any timestep.
 //!
 //! | control | what is stepped | `E` |
 //! | --- | --- | --- |
 //! | in every stage | the loop `ẋ = A x` | Runge-Kutta of order p: `A + h/2 A² + … + h^(p-1)/p! A^p` |
-//! | held over the step | the arm with constant efforts, then the law closes the loop | monodromy matrix of one period |
+//! | held over the step | the arm with constant efforts, then the law closes the loop | monodromy matrix of a period |
 //!
 //! Verlet steps positions (and integrals) by `A + h/2 A²`, velocities by the mean of the accelerations at the start and
 //! at the predicted state. The held law is the shipped one: the integral takes up the error before it is used.
 //!
-//! Source: Hairer and Wanner, *Solving Ordinary Differential Equations II* (1996), ch. IV.2; for sampled control, Åström
-//! and Wittenmark, *Computer-Controlled Systems* (1997), ch. 2 and 3.
+//! Source: Hairer and Wanner, *Solving Ordinary Differential Equations II* (1996), ch. IV.2; for sampled control,
+//! Åström and Wittenmark, *Computer-Controlled Systems* (1997), ch. 2 and 3.
 //!
 //! **Invariant:** the answer is the end of the stable timesteps that begin at zero; stable islands beyond are ignored.
 
@@ -32,7 +33,7 @@ use crate::math::integrator::Method;
 /// some 1e-13.
 pub(super) const NEUTRAL: f64 = 1e-11;
 
-/// Where the search begins, in units of the fastest time constant. Already here an undamped swing shows its growth
+/// Start of the search, in units of the fastest time constant. Already here an undamped swing shows its growth
 /// under Euler (1e-3) and midpoint (2.5e-10).
 const SEARCH_START: f64 = 1e-3;
 
@@ -42,7 +43,7 @@ const SEARCH_FINE: f64 = 0.1;
 /// Step of the search beyond, as a factor: an unstable window narrower than this may be missed.
 const SEARCH_STEP: f64 = 1.05;
 
-/// Where the search ends. No explicit method reaches beyond 3.
+/// End of the search. No explicit method reaches beyond 3.
 const SEARCH_END: f64 = 30.0;
 
 /// When the control law looks at the state.
@@ -85,8 +86,8 @@ pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<
     stepping.search(&Modes::of(linear))
 }
 
-/// As [`largest_period`] with every effort acting one period late, as a bus or a slow controller would have it. There is no
-/// integral in it.
+/// As [`largest_period`] with every effort acting one period late, as a bus or a slow controller would have it. There
+/// is no integral in it.
 #[must_use]
 pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
     let stepping = Stepping {

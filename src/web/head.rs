@@ -39,7 +39,7 @@ pub enum HeadError {
     Method,
 }
 
-/// Where the head ends, blank line included, if it does; `seen` bytes were searched before.
+/// End of the head, blank line included, if it is there; `seen` bytes were searched before.
 #[must_use]
 pub fn end(bytes: &[u8], seen: usize) -> Option<usize> {
     let from = seen.saturating_sub(3);

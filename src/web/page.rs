@@ -15,7 +15,7 @@ use super::response::HttpResponse;
 /// A file of the page.
 #[derive(Debug)]
 pub struct Asset {
-    /// Where it is served.
+    /// Path under which it is served.
     pub path: &'static str,
     /// Its name in `page/`.
     pub file: &'static str,

@@ -6,7 +6,7 @@
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Where it is served.
+/// Path under which it is served.
 pub const PREFIX: &str = "/report/";
 /// The kinds of files that are shown of a folder.
 const INDEX: &str = "index.html";

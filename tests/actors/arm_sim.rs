@@ -537,7 +537,7 @@ fn nothing_is_said_on_a_topic_that_nobody_wants() {
     });
 }
 
-/// Whatever is done to it, the live arm is at every moment what the offline simulation is after as many steps, in every bit
+/// The live arm, whatever is done to it, is at every moment what the offline simulation is after as many steps, in every bit
 /// of state, rounding carry, integral, effort and time.
 fn assert_live_is_offline<const N: usize>(seed: u64)
 where

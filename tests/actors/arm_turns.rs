@@ -30,7 +30,7 @@ const TURNS_PER_TICK: usize = 17;
 /// Turns after which a test gives up.
 const MANY_TURNS: usize = 1_000_000;
 
-/// What the arm says, in order.
+/// Everything that the arm says, in order.
 #[derive(Debug, Clone, PartialEq)]
 enum Said {
     Tick,

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, run, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::limits::{
     MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
@@ -39,18 +39,25 @@ fn id(frame: &Value) -> u64 {
     frame["id"].as_u64().expect("an id")
 }
 
+/// A publisher and a subscriber of `/t`, which has messages every `throttle_rate` ms at most.
+async fn throttled(gateway: &Gateway, throttle_rate: u64, queue_length: u64) -> (Peer, Peer) {
+    let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+    publisher.advertise("/t").await;
+    subscriber
+        .send(
+            json!({"op": "subscribe", "topic": "/t", "throttle_rate": throttle_rate,
+            "queue_length": queue_length}),
+        )
+        .await;
+    subscriber.receive().await;
+    (publisher, subscriber)
+}
+
 #[test]
 fn a_throttled_topic_comes_at_its_rate_and_the_newest_are_kept() {
     run(async {
         let gateway = Gateway::bare().await;
-        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        publisher.advertise("/t").await;
-        subscriber
-            .send(
-                json!({"op": "subscribe", "topic": "/t", "throttle_rate": 100, "queue_length": 2}),
-            )
-            .await;
-        subscriber.receive().await;
+        let (mut publisher, mut subscriber) = throttled(&gateway, 100, 2).await;
         let began = Instant::now();
         for n in 0..100 {
             publisher.publish("/t", n).await;
@@ -78,19 +85,12 @@ fn a_throttled_topic_comes_at_its_rate_and_the_newest_are_kept() {
     });
 }
 
-/// What the stream shows can be late by what was read at once; the last of n can't come before (n - 1) intervals.
+/// Messages can be late by what was read at once; the last of n can't come before (n - 1) intervals.
 #[test]
 fn no_more_messages_come_than_the_interval_allows() {
     run(async {
         let gateway = Gateway::bare().await;
-        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        publisher.advertise("/t").await;
-        subscriber
-            .send(
-                json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1000, "queue_length": 5}),
-            )
-            .await;
-        subscriber.receive().await;
+        let (mut publisher, mut subscriber) = throttled(&gateway, 1000, 5).await;
         let began = Instant::now();
         for n in 0..10 {
             publisher.publish("/t", n).await;

@@ -109,7 +109,7 @@ fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
     });
 }
 
-/// What is read ahead is counted, and little.
+/// Bytes that are read ahead are counted, and few.
 #[test]
 fn a_client_whose_queue_is_full_is_read_a_little_further_and_all_of_it_is_performed() {
     run(async {

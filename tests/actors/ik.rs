@@ -113,7 +113,7 @@ impl<const N: usize> Bench<N> {
         answer
     }
 
-    /// What a client is answered that asks for this.
+    /// The answer to a client that asks for this.
     async fn read_and_solve(&mut self, args: Value) -> [f64; N] {
         let answer = self.call(args).await;
         assert_eq!(answer["result"], true, "{answer}");
@@ -166,7 +166,7 @@ fn turned(target: Target, phi: f64) -> Target {
     }
 }
 
-/// What a closed form may lose to rounding: a few units in the last place of each angle, far below the 1e-9 asked for.
+/// Rounding that a closed form may lose: a few units in the last place of each angle, far below the 1e-9 asked for.
 const ROUNDING: f64 = 1e-14;
 
 #[test]

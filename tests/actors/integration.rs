@@ -89,7 +89,7 @@ impl Bench {
     }
 
     async fn assert_nothing_more(&mut self) {
-        // Whatever else the worker would say, it would say before it is done with the next call.
+        // The worker would say anything else before it is done with the next call.
         let call = self.call(99, request("t", 1));
         assert_eq!(self.answer().await.0, 99);
         let _ = call.ended.await;

@@ -60,7 +60,7 @@ fn a_port_in_use_is_an_error() {
     });
 }
 
-/// What the kernel will do about a silent client: it has set a timer to ask whether the client is there.
+/// The kernel has set a timer to ask whether a silent client is there.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_silent_client_is_asked_after_a_while_whether_it_is_there() {
@@ -95,7 +95,7 @@ fn a_silent_client_is_asked_after_a_while_whether_it_is_there() {
     });
 }
 
-/// Which timer a connection has, and when it runs out, in hundredths of a second: 2 is the one of keepalive.
+/// The timer that a connection has, and when it runs out, in hundredths of a second: 2 is the one of keepalive.
 #[cfg(target_os = "linux")]
 fn timer(local: u16, remote: u16) -> Option<(u8, u64)> {
     let table = std::fs::read_to_string("/proc/net/tcp").unwrap();

@@ -1,4 +1,4 @@
-//! What all clients together may hold, in virtual time: who gives way when it is too much, and that nobody else does.
+//! Memory that all clients together may hold, in virtual time: who gives way when it is too much, and that nobody else does.
 //!
 //! **Invariant:** a client that asks for little and reads what it gets is served whatever the others do.
 
@@ -69,7 +69,7 @@ fn the_limits_are_as_the_readme_says_and_leave_room_for_every_client() {
     // A client that never gives way, times all that there may be.
     const { assert!(MAX_CONNECTIONS * MODEST <= MAX_HELD) };
     const { assert!(CONNECTION_BYTES + MESSAGES_LEFT < MODEST) };
-    // What is counted, a quarter of it for the allocator, the files of the report, and the program itself.
+    // The memory that is counted, a quarter of it for the allocator, the files of the report, and the program itself.
     #[cfg(feature = "web")]
     let files = usize::try_from(pendularm::web::MAX_FILES_TOTAL).unwrap();
     #[cfg(not(feature = "web"))]
@@ -158,7 +158,7 @@ fn the_largest_gives_way_first_and_only_until_the_rest_fits() {
         for (account, gives_way) in accounts.iter().zip([None, Some(true), None, None]) {
             assert_eq!(asked(account).await, gives_way);
         }
-        // What is leaving is not waited for twice, nor asked again; and what comes on top is the next one's turn.
+        // A client that is leaving is not waited for twice, nor asked again; bytes on top are the next one's turn.
         let other = accounts[3].take(MIB);
         assert_eq!((asked(&accounts[2]).await, memory.cut_off()), (None, 1));
         let much = accounts[2].take(2 * MIB);
@@ -244,7 +244,7 @@ fn who_finds_no_room_for_an_answer_is_told_whether_it_is_worth_waiting() {
     let answer = computing.cover(Bytes::from(vec![0; 4 * MIB]));
     let before = memory.held();
     assert_eq!(other.promise(4 * MIB, false).unwrap_err(), NoRoom::Now);
-    // Whoever would hold most is refused; who asks for less has it, and if need be the largest gives way.
+    // The client that would hold most is refused; one that asks for less has it, and if need be the largest gives way.
     let as_much = other.promise(4 * MIB + FRAME_BYTES, true);
     assert_eq!(as_much.unwrap_err(), NoRoom::Now);
     assert_eq!(memory.held(), before, "what is refused comes off again");
@@ -271,7 +271,7 @@ fn a_modest_answer_finds_room_beside_long_ones() {
         .map(|account| account.promise(modest, false))
         .collect();
     assert!(given.iter().all(Result::is_ok), "{given:?}");
-    // What needs no promise has its part besides.
+    // Bytes that need no promise have their part besides.
     assert!(memory.held() <= MAX_HELD / 8 * 7);
     drop((long, given));
     drop(accounts);

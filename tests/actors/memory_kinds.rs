@@ -27,7 +27,7 @@ struct Scene {
     gateway: Gateway,
     memory: Memory,
     client: Peer,
-    /// What was held before anything was done.
+    /// Bytes that were held before anything was done.
     before: usize,
 }
 
@@ -131,7 +131,7 @@ async fn publish_small(scene: &mut Scene, publisher: &mut Peer, count: usize) {
     }
     settle().await;
     let message = "{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{\"n\":0}}\n".len();
-    // Those that were written one behind the other come as a series: one place, one frame.
+    // Messages that were written one behind the other come as a series: one place, one frame.
     let places = (scene.held() / (message + FRAME_BYTES + PLACE_BYTES)).min(count);
     assert!(scene.held() > count * message, "{}", scene.held());
     assert!(places > 0);
@@ -149,7 +149,7 @@ fn small_messages_that_are_not_read() {
     });
 }
 
-/// What a throttle holds back is message by message.
+/// A throttle holds back message by message.
 #[test]
 fn small_messages_that_are_held_back() {
     run(async {
@@ -347,7 +347,7 @@ fn requests_of_computations_that_wait() {
     });
 }
 
-/// What waits has been read already: its text is gone, and beside what came there is the line that is written of it, if that is another.
+/// Messages that wait have been read already: their text is gone, and beside what came there is the line that is written of it, if that is another.
 #[test]
 fn arguments_are_counted_as_they_are_kept() {
     // As they came and as they are written: the same; shorter by one of six; both longer than the text, six and five for four.

@@ -17,7 +17,7 @@ const SECOND: Duration = Duration::from_secs(1);
 #[test]
 fn a_client_that_sends_a_byte_per_second_is_told_after_a_minute_and_closed() {
     run(async {
-        // What is no frame is told after 32 bytes, and from then on has its time to end.
+        // A line that is no frame is refused after 32 bytes, and from then on has its time to end.
         for (opening, time) in [
             ("{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{", FRAME_TIME),
             ("nonsense", 24 * SECOND + FRAME_TIME),
@@ -67,7 +67,7 @@ fn a_frame_that_comes_in_time_is_served_and_the_next_has_its_own_time() {
     });
 }
 
-/// What is longer than a frame may be is skipped to its end: it has a minute for every 4 MiB.
+/// A line that is longer than a frame may be is skipped to its end: it has a minute for every 4 MiB.
 #[test]
 fn a_frame_that_is_skipped_has_time_by_its_length() {
     run(async {

@@ -1,4 +1,7 @@
-//! The node `study` on the worker pool, and what the arm asks of it and says of its timestep, in virtual time.
+//! The node `study` on the worker pool; and, in virtual time, the arm's questions to it and words about its timestep.
+//!
+//! The node is asked as another node asks it; a client's calls are here where it is meant what is made of their fields,
+//! and how an answer is written.
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
@@ -6,17 +9,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::stage::in_virtual_time;
+use crate::stage::{in_virtual_time, ms, pass};
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::sim::{
     ArmSettings, ArmSim, Consult, Enable, HeldLimit, LEAST_PAUSE, Pause, Present, Reset, SetGains,
     SetIntegrator, SetParams, SetSetpoint, TakeSnapshot,
 };
-use pendularm::actors::compute::integration::Integration;
-use pendularm::actors::compute::study::Study;
+use pendularm::actors::compute::integration::{Integration, IntegrationStep};
+use pendularm::actors::compute::study::{
+    NotPlanned, NotRun, PlanRun, PredictStability, RunOffline, Study, SuggestGains,
+};
 use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Ask, Call, Interest, Publish, Respond, ask};
+use pendularm::actors::node::{
+    Ask, Asker, Call, Done, Interest, Publish, Reply, Respond, Unserved, ask,
+};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::work_clock;
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
@@ -41,40 +48,65 @@ use tokio::time::{sleep, timeout};
 /// How long anything may take before a test gives up.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-fn call(
-    service: Service,
-    args: &Value,
-    to: Recipient<Respond>,
+/// Stands in for a client that has called: says that it has its answer, and hands it on.
+struct Asking<T> {
     connection: u64,
-) -> (ServiceCall, Called) {
-    let gone = Arc::new(AtomicBool::new(false));
-    let (caller, ended) = Caller::new(
-        to,
-        ConnectionId(connection),
-        service,
-        service.name().into(),
-        None,
-        Arc::clone(&gone),
-    );
-    let arguments = Arguments::Object(to_raw_value(args).unwrap().into());
-    let call = ServiceCall {
-        service,
-        arguments,
-        caller,
-    };
-    (call, Called { ended, gone })
+    gone: Arc<AtomicBool>,
+    answered: mpsc::UnboundedSender<u64>,
+    answer: oneshot::Sender<Result<T, Unserved>>,
 }
 
-/// A call on its way: ends with it; and the flag that its caller has gone.
-struct Called {
+impl<T: Send> Asker<T> for Asking<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+        let _ = self.answered.send(self.connection);
+        let _ = self.answer.send(answer);
+    }
+
+    fn client(&self) -> Option<ConnectionId> {
+        Some(ConnectionId(self.connection))
+    }
+
+    fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+}
+
+/// A call on its way: its answer and its end to come, and the flag that its caller has gone.
+struct Called<T> {
+    answer: oneshot::Receiver<Result<T, Unserved>>,
     ended: oneshot::Receiver<()>,
     gone: Arc<AtomicBool>,
 }
 
+/// Asks as the client of that connection, which says so once it has its answer.
+fn call<A: Ask>(
+    node: &Recipient<Call<A>>,
+    connection: u64,
+    answered: &mpsc::UnboundedSender<u64>,
+    ask: A,
+) -> Called<A::Answer> {
+    let gone = Arc::new(AtomicBool::new(false));
+    let (done, ended) = oneshot::channel();
+    let (give, answer) = oneshot::channel();
+    let asking = Asking {
+        connection,
+        gone: Arc::clone(&gone),
+        answered: answered.clone(),
+        answer: give,
+    };
+    let reply = Reply::new(asking, Some(done));
+    node.do_send(Call { ask, reply });
+    Called {
+        answer,
+        ended,
+        gone,
+    }
+}
+
 // ---- the node, on real workers --------------------------------------------------------------------------------------
 
-/// Stands in for the registry; passes every answer on with the connection that it is for.
-struct Probe(mpsc::UnboundedSender<(u64, Value)>);
+/// Stands in for the registry; passes on every response.
+struct Probe(mpsc::UnboundedSender<Value>);
 
 impl Actor for Probe {
     type Context = Context<Self>;
@@ -85,7 +117,7 @@ impl Handler<Respond> for Probe {
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
         let frame = serde_json::from_slice(&respond.frame.write()).expect("valid JSON");
-        let _ = self.0.send((respond.connection.0, frame));
+        let _ = self.0.send(frame);
     }
 }
 
@@ -141,47 +173,83 @@ struct Bench<const N: usize> {
     pool: WorkerPool,
     study: Addr<Study<N>>,
     probe: Addr<Probe>,
-    answers: mpsc::UnboundedReceiver<(u64, Value)>,
+    responses: mpsc::UnboundedReceiver<Value>,
+    answered: mpsc::UnboundedSender<u64>,
+    order: mpsc::UnboundedReceiver<u64>,
 }
 
 impl<const N: usize> Bench<N> {
     /// With one worker, so that turns can be told from luck.
     fn new() -> Self {
-        let (sender, answers) = mpsc::unbounded_channel();
+        let (sender, responses) = mpsc::unbounded_channel();
+        let (answered, order) = mpsc::unbounded_channel();
         let pool = WorkerPool::start(1).unwrap();
         let arm = SettledArm::<N>.start();
         Self {
             study: Study::new(arm.recipient(), pool.clone()).start(),
             pool,
             probe: Probe(sender).start(),
-            answers,
+            responses,
+            answered,
+            order,
         }
     }
 
-    fn call(&self, connection: u64, service: Service, args: &Value) -> Called {
-        let (message, call) = call(service, args, self.probe.clone().recipient(), connection);
+    fn call<A: Ask>(&self, connection: u64, ask: A) -> Called<A::Answer>
+    where
+        Study<N>: Actor<Context = Context<Study<N>>> + Handler<Call<A>>,
+    {
+        let node = self.study.clone().recipient();
+        call(&node, connection, &self.answered, ask)
+    }
+
+    /// The connection whose call is answered next.
+    async fn next(&mut self) -> u64 {
+        let next = timeout(PATIENCE, self.order.recv()).await;
+        next.expect("an answer in time").expect("the bench lives")
+    }
+
+    async fn ask<A: Ask>(&self, question: A) -> A::Answer
+    where
+        Study<N>: Actor<Context = Context<Study<N>>> + Handler<Call<A>>,
+    {
+        let answer = ask(&self.study.clone().recipient(), question);
+        let answer = timeout(PATIENCE, answer).await;
+        answer.expect("an answer in time").expect("an answer")
+    }
+
+    /// The response to a client's call.
+    async fn response(&mut self, service: Service, args: &Value) -> Value {
+        let (caller, _) = Caller::new(
+            self.probe.clone().recipient(),
+            ConnectionId(1),
+            service,
+            service.name().into(),
+            None,
+            Arc::default(),
+        );
         let mut routes = Nodes::default();
         Study::attach(&self.study, &mut routes);
-        routes.services[&service](message);
-        call
+        routes.services[&service](ServiceCall {
+            service,
+            arguments: Arguments::Object(to_raw_value(args).unwrap().into()),
+            caller,
+        });
+        let response = timeout(PATIENCE, self.responses.recv()).await;
+        response
+            .expect("a response in time")
+            .expect("the probe lives")
     }
 
-    async fn answer(&mut self) -> (u64, Value) {
-        let answer = timeout(PATIENCE, self.answers.recv()).await;
-        answer.expect("an answer in time").expect("the probe lives")
-    }
-
-    async fn ask(&mut self, service: Service, args: &Value) -> Value {
-        self.call(1, service, args);
-        let (_, response) = self.answer().await;
+    async fn values(&mut self, service: Service, args: &Value) -> Value {
+        let response = self.response(service, args).await;
         assert_eq!(response["result"], true, "{response}");
         assert_eq!(response["status"], "", "{response}");
         response["values"].clone()
     }
 
     async fn refusal(&mut self, service: Service, args: &Value) -> String {
-        self.call(1, service, args);
-        let (_, response) = self.answer().await;
+        let response = self.response(service, args).await;
         assert_eq!(
             (&response["result"], &response["values"]),
             (&json!(false), &json!({})),
@@ -197,7 +265,7 @@ impl<const N: usize> Drop for Bench<N> {
     }
 }
 
-/// What the service says of these limits and this motion.
+/// The values that the service gives of these limits and this motion.
 fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Value {
     let critical = limits.critical.unwrap();
     let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
@@ -228,14 +296,16 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
     let Present { control, state } = settings::<N>();
     let expected = limits(&control);
     let motion = Motion::ahead(&control, &state);
-    let present = bench.ask(Service::Stability, &json!({})).await;
-    assert_eq!(present, stability_values(&expected, &motion));
     assert!(expected.held.is_some_and(|limit| limit > 0.0));
+    let predicted = bench.ask(PredictStability::default()).await.unwrap();
+    assert_eq!((predicted.limits, predicted.motion), (expected, motion));
+    let written = stability_values(&expected, &motion);
     let all = settings_as_args::<N>();
-    assert_eq!(bench.ask(Service::Stability, &all).await, present);
     let nulls =
         json!({"integrator": null, "gains": {"kp": null}, "params": null, "setpoint": null});
-    assert_eq!(bench.ask(Service::Stability, &nulls).await, present);
+    for args in [json!({}), all, nulls] {
+        assert_eq!(bench.values(Service::Stability, &args).await, written);
+    }
 }
 
 #[test]
@@ -249,18 +319,23 @@ fn the_predictions_are_the_studys_and_what_is_left_out_is_the_arms_own() {
 #[test]
 fn members_that_are_left_out_of_an_object_are_the_arms_own() {
     System::new().block_on(async {
-        let mut bench = Bench::<2>::new();
-        let args = json!({"gains": {"kd": [9, 4]}, "params": {"gravity": 0}, "integrator": "rk4"});
-        let values = bench.ask(Service::Stability, &args).await;
+        let bench = Bench::<2>::new();
+        let predicted = bench
+            .ask(PredictStability {
+                gains: Some(SetGains {
+                    kd: Some([9.0, 4.0]),
+                    ..SetGains::default()
+                }),
+                params: Some(gravity(0.0)),
+                method: Some(Method::Rk4),
+                setpoint: None,
+            })
+            .await
+            .unwrap();
         let mut control = settings::<2>().control.with_method(Method::Rk4);
         control.arm = Arm::new(*control.arm.lengths(), *control.arm.masses(), 0.0).unwrap();
         control.gains.kd = [9.0, 4.0];
-        let expected = limits(&control);
-        assert_eq!(values["timestep_limit_held"], json!(expected.held));
-        assert_eq!(
-            values["minimum_over_poses_continuous"],
-            json!(expected.minimum_continuous)
-        );
+        assert_eq!(predicted.limits, limits(&control));
     });
 }
 
@@ -271,7 +346,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
         let mut bench = Bench::<2>::new();
         let none = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
         let args = json!({"gains": none, "params": {"gravity": 0}});
-        let values = bench.ask(Service::Stability, &args).await;
+        let values = bench.values(Service::Stability, &args).await;
         for limit in [
             "timestep_limit_held",
             "timestep_limit_continuous",
@@ -283,13 +358,13 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
         ] {
             assert!(values[limit].is_null(), "{limit} {values}");
         }
-        // What limits is the motion alone: 0.2 and 0.4 rad/s of the links, all of whose energy one of them might have.
+        // The motion alone limits: 0.2 and 0.4 rad/s of the links, all of whose energy one of them might have.
         let speed = values["motion_speed"].as_f64().unwrap();
         assert!((0.4..2.0).contains(&speed), "{values}");
         assert_eq!(values["timestep_limit_motion"], 0.3 / speed);
         assert_eq!(values["advised_timestep"], 0.8 * (0.3 / speed));
         let args = json!({"gains": none, "integrator": "euler"});
-        let values = bench.ask(Service::Stability, &args).await;
+        let values = bench.values(Service::Stability, &args).await;
         assert_eq!(values["timestep_limit_held"], 0.0, "{values}");
         assert_eq!(values["advised_timestep"], 0.0, "{values}");
     });
@@ -311,7 +386,10 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
                 break found.unwrap();
             }
         };
-        let values = bench.ask(Service::SuggestGains, &json!({})).await;
+        let suggested = bench.ask(SuggestGains::default()).await.unwrap();
+        assert_eq!(suggested.found, found);
+        assert_eq!(suggested.timestep, control.timestep);
+        let values = bench.values(Service::SuggestGains, &json!({})).await;
         assert_eq!(values["kp"], json!(found.gains.kp));
         assert_eq!(values["timestep_limit"], json!(found.limit));
         let task = Task {
@@ -326,8 +404,11 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
                 break planned.unwrap();
             }
         };
+        let run = bench.ask(plan_with(0.05)).await.unwrap();
+        assert_eq!(run.planned, planned);
+        assert!(run.controlled);
         let args = json!({"error": 0.05, "servo": true});
-        let values = bench.ask(Service::Plan, &args).await;
+        let values = bench.values(Service::Plan, &args).await;
         let best = planned.best().unwrap();
         assert_eq!(values["integrator"], best.method.name());
         assert_eq!(values["timestep"], json!(best.timestep));
@@ -337,13 +418,36 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
                 .await,
             "error must be greater than 0, got -1; servo must be true or false, got 1"
         );
+        let tiny = SuggestGains {
+            timestep: Some(2_f64.powi(-20)),
+            ..SuggestGains::default()
+        };
+        let refused = bench.ask(tiny).await.unwrap_err();
         assert_eq!(
-            bench
-                .refusal(Service::SuggestGains, &json!({"timestep": 2_f64.powi(-20)}))
-                .await,
+            refused.to_string(),
             "settling_time / timestep must be at most 1e6 steps, got 4.194304e6"
         );
+        let too_long = PlanRun {
+            duration: Some(1e9),
+            ..plan_with(0.05)
+        };
+        let refused = bench.ask(too_long).await.unwrap_err();
+        assert!(matches!(refused, NotPlanned::Plan(_)), "{refused}");
     });
+}
+
+/// A servo's plan of which only the allowed error is said.
+fn plan_with(error: f64) -> PlanRun<2> {
+    PlanRun {
+        error,
+        duration: None,
+        servo: true,
+        q0: None,
+        qdot0: None,
+        params: None,
+        gains: None,
+        setpoint: None,
+    }
 }
 
 #[test]
@@ -386,6 +490,8 @@ fn every_field_that_is_wrong_is_named_members_with_their_object() {
         ] {
             assert_eq!(bench.refusal(Service::Rollout, &args).await, why);
         }
+        let too_long = RunOffline { duration: Some(20.0), timestep: Some(1e-6), ..RunOffline::default() };
+        assert!(matches!(bench.ask(too_long).await, Err(NotRun::Plan(_))));
     });
 }
 
@@ -393,7 +499,7 @@ fn joints(values: &Value) -> Vec<[f64; 2]> {
     serde_json::from_value(values.clone()).unwrap()
 }
 
-/// Against the live arm's stepper, asked for every sample; what is printed reads back as the same bits.
+/// Against the live arm's stepper, asked for every sample; the numbers as written read back as the same bits.
 #[test]
 fn a_rollout_is_the_live_simulation_bit_for_bit() {
     System::new().block_on(async {
@@ -415,7 +521,7 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                 live.set_timestep(0.005);
                 live.set_state(State { position: [0.4, -0.3], velocity: [0.5, 1.0] });
                 live.set_setpoint(Setpoint { position: [1.0, -0.5], velocity: [0.0; 2] });
-                let values = bench.ask(Service::Rollout, &args).await;
+                let values = bench.values(Service::Rollout, &args).await;
                 let times: Vec<f64> = serde_json::from_value(values["times"].clone()).unwrap();
                 assert_eq!(times.len(), 51);
                 let (positions, velocities) = (joints(&values["positions"]), joints(&values["velocities"]));
@@ -442,17 +548,17 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
 #[test]
 fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
     System::new().block_on(async {
-        let mut bench = Bench::<3>::new();
-        let values = bench.ask(Service::Rollout, &json!({})).await;
+        let bench = Bench::<3>::new();
+        let run = bench.ask(RunOffline::default()).await.unwrap().run;
         let mut live = Simulation::new(settings::<3>().control.arm, no_control());
         live.set_method(Method::Midpoint);
         live.set_timestep(0.002);
         live.advance(5000);
-        assert_eq!(values["times"].as_array().unwrap().len(), 1001);
-        assert_eq!(values["times"][1000], live.time());
-        assert_eq!(values["positions"][1000], json!(live.state().position));
-        assert_eq!(values["positions"][0], json!([0.0, 0.0, 0.0]));
-        assert_eq!(values["evaluations"], 10_000);
+        assert_eq!(run.times().len(), 1001);
+        assert_eq!(run.times()[1000], live.time());
+        assert_eq!(run.positions()[1000], live.state().position);
+        assert_eq!(run.positions()[0], [0.0; 3]);
+        assert_eq!(run.evaluations(), 10_000);
     });
 }
 
@@ -460,22 +566,45 @@ fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
 #[test]
 fn methods_can_be_compared_by_their_errors() {
     System::new().block_on(async {
-        let mut bench = Bench::<2>::new();
-        for gains in [Value::Null, json!({"kp": [200, 100], "kd": [30, 12]})] {
+        let bench = Bench::<2>::new();
+        let control = SetGains {
+            kp: Some([200.0, 100.0]),
+            kd: Some([30.0, 12.0]),
+            ..SetGains::default()
+        };
+        for gains in [None, Some(control)] {
             let mut errors = Vec::new();
-            for method in ["euler", "midpoint", "rk4"] {
-                let mut args = json!({"q0": [0.4, -0.3], "duration": 1, "timestep": 0.005, "samples": 11,
-                    "integrator": method, "gains": gains, "setpoint": [1, -0.5], "reference": true});
-                let values = bench.ask(Service::Rollout, &args).await;
-                errors.push(values["error"].as_f64().expect("finite"));
-                args["reference"] = json!(false);
-                let alone = bench.ask(Service::Rollout, &args).await;
-                for key in ["times", "positions", "velocities", "efforts", "energy", "evaluations"] {
-                    assert_eq!(values[key], alone[key], "{key}");
-                }
+            for method in [Method::Euler, Method::Midpoint, Method::Rk4] {
+                let alone = RunOffline {
+                    q0: Some([0.4, -0.3]),
+                    duration: Some(1.0),
+                    timestep: Some(0.005),
+                    samples: Some(11),
+                    method: Some(method),
+                    gains: gains.clone(),
+                    setpoint: Some([1.0, -0.5]),
+                    ..RunOffline::default()
+                };
+                let compared = RunOffline {
+                    reference: Some(true),
+                    ..alone.clone()
+                };
+                let compared = bench.ask(compared).await.unwrap().run;
+                errors.push(compared.deviation().unwrap().known().expect("finite"));
+                let alone = bench.ask(alone).await.unwrap().run;
+                assert!(alone.deviation().is_none(), "no reference was asked for");
+                assert_eq!(compared.times(), alone.times());
+                assert_eq!(compared.positions(), alone.positions());
+                assert_eq!(compared.velocities(), alone.velocities());
+                assert_eq!(compared.efforts(), alone.efforts());
+                assert_eq!(compared.energy(), alone.energy());
+                assert_eq!(compared.evaluations(), alone.evaluations());
             }
             // Orders 1, 2 and 4 at a timestep some fifty times shorter than the motion.
-            assert!(errors[0] > 20.0 * errors[1] && errors[1] > 20.0 * errors[2], "{errors:?}");
+            assert!(
+                errors[0] > 20.0 * errors[1] && errors[1] > 20.0 * errors[2],
+                "{errors:?}"
+            );
             assert!(errors[2] > 0.0);
         }
     });
@@ -487,7 +616,7 @@ fn a_rollout_that_diverges_ends_with_its_last_finite_sample() {
         let mut bench = Bench::<2>::new();
         let args = json!({"integrator": "euler", "timestep": 1, "duration": 1000, "q0": [1, 1], "reference": true,
             "gains": {"kp": [1e9, 1e9], "ki": [0, 0], "kd": [1e9, 1e9]}});
-        let values = bench.ask(Service::Rollout, &args).await;
+        let values = bench.values(Service::Rollout, &args).await;
         let times = values["times"].as_array().unwrap();
         assert!(times.len() < 1001, "{}", times.len());
         for key in ["positions", "velocities", "efforts", "energy"] {
@@ -499,70 +628,84 @@ fn a_rollout_that_diverges_ends_with_its_last_finite_sample() {
 }
 
 /// Minutes of work in an unoptimised build; no test waits for its end.
-fn heavy() -> Value {
-    json!({"duration": 10, "timestep": 1e-6, "reference": true, "gains": {"kp": [1, 1]}})
+fn heavy() -> RunOffline<2> {
+    RunOffline {
+        duration: Some(10.0),
+        timestep: Some(1e-6),
+        reference: Some(true),
+        gains: Some(SetGains {
+            kp: Some([1.0; 2]),
+            ..SetGains::default()
+        }),
+        ..RunOffline::default()
+    }
+}
+
+/// Ten steps.
+fn short<const N: usize>() -> RunOffline<N> {
+    RunOffline {
+        duration: Some(0.01),
+        timestep: Some(0.001),
+        ..RunOffline::default()
+    }
 }
 
 #[test]
 fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
     System::new().block_on(async {
         let mut bench = Bench::<2>::new();
-        let heavy = bench.call(1, Service::Rollout, &heavy());
-        let short = json!({"duration": 0.01, "timestep": 0.001});
-        bench.call(2, Service::Rollout, &short);
-        bench.call(3, Service::Rollout, &short);
-        let mut light = [bench.answer().await.0, bench.answer().await.0];
+        let heavy = bench.call(1, heavy());
+        bench.call(2, short());
+        bench.call(3, short());
+        let mut light = [bench.next().await, bench.next().await];
         light.sort_unstable();
         assert_eq!(light, [2, 3]);
         // A prediction is cut into slices too.
         let mut three = Bench::<3>::new();
-        three.call(1, Service::Stability, &json!({}));
-        three.call(2, Service::Rollout, &short);
-        assert_eq!(three.answer().await.0, 2);
-        assert_eq!(three.answer().await.0, 1);
+        three.call(1, PredictStability::default());
+        three.call(2, short());
+        assert_eq!(three.next().await, 2);
+        assert_eq!(three.next().await, 1);
         heavy.gone.store(true, Ordering::Relaxed);
         assert!(timeout(PATIENCE, heavy.ended).await.is_ok());
-        let (connection, frame) = bench.answer().await;
-        assert_eq!((connection, &frame["result"]), (1, &json!(false)));
+        assert_eq!(bench.next().await, 1);
+        assert!(matches!(heavy.answer.await, Ok(Err(Unserved::CallerGone))));
     });
 }
 
-/// Turns of one worker until a client has its 200,000 steps, while so many others have begun heavy rollouts.
+/// Turns of one worker until a client has its million steps, while so many others have begun heavy rollouts.
 async fn turns_until_integrated(others: u64) -> u32 {
-    let (sender, mut answers) = mpsc::unbounded_channel();
-    let probe = Probe(sender).start();
+    let (answered, mut order) = mpsc::unbounded_channel();
     let pool = WorkerPool::without_threads();
-    let study = Study::new(SettledArm::<2>.start().recipient(), pool.clone()).start();
-    let integration = Integration::new(pool.clone()).start();
-    let mut routes = Nodes::default();
-    Study::attach(&study, &mut routes);
-    Integration::attach(&integration, &mut routes);
-    let mut heavies = Vec::new();
+    let study = Study::new(SettledArm::<2>.start().recipient(), pool.clone())
+        .start()
+        .recipient();
+    let integration = Integration::new(pool.clone()).start().recipient();
     for connection in 1..=others {
-        let to = probe.clone().recipient();
-        let (message, heavy) = call(Service::Rollout, &heavy(), to, connection);
-        routes.services[&Service::Rollout](message);
-        heavies.push(heavy);
+        call(&study, connection, &answered, heavy());
     }
-    // The study asks the arm first.
-    sleep(Duration::from_millis(20)).await;
+    // The study asks the arm first; a moment of virtual time passes when all wait.
+    pass(ms(1)).await;
     for _ in 0..10 * others {
         assert!(pool.turn());
     }
-    let args =
-        json!({"function": "sin(t)", "x0": 0.5, "dt": 1e-3, "steps": 200_000, "integrator": "rk4"});
-    let to = probe.clone().recipient();
-    let (message, mut honest) = call(Service::IntegrationStep, &args, to, 100);
-    routes.services[&Service::IntegrationStep](message);
-    // The node hears of it.
-    sleep(Duration::from_millis(20)).await;
+    let step = IntegrationStep {
+        function: Some("sin(t)".to_owned()),
+        x0: Some(0.5),
+        dt: Some(1e-3),
+        steps: Some(1_000_000),
+        method: Some(Method::Rk4),
+        ..IntegrationStep::default()
+    };
+    let mut honest = call(&integration, 100, &answered, step);
+    pass(ms(1)).await;
     let mut turns = 0;
     while honest.ended.try_recv() == Err(oneshot::error::TryRecvError::Empty) {
         assert!(pool.turn());
         turns += 1;
     }
-    let (connection, frame) = answers.recv().await.unwrap();
-    assert_eq!((connection, &frame["result"]), (100, &json!(true)));
+    assert_eq!(order.recv().await, Some(100));
+    assert!(matches!(honest.answer.await, Ok(Ok(Ok(_)))));
     pool.close("the test is over");
     turns
 }
@@ -570,7 +713,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
 /// Each look at the clock costs the same here, so that turns can be counted on any machine.
 #[test]
 fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
-    System::new().block_on(async {
+    in_virtual_time(async {
         work_clock::count(Duration::from_micros(100));
         let alone = turns_until_integrated(0).await;
         let among_six = turns_until_integrated(5).await;
@@ -587,24 +730,23 @@ fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
 fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
     System::new().block_on(async {
         let mut bench = Bench::<2>::new();
-        bench.call(1, Service::Rollout, &heavy());
-        bench.call(2, Service::Stability, &json!({}));
-        bench.call(3, Service::Rollout, &heavy());
-        sleep(Duration::from_millis(5)).await;
+        let (first, third) = (bench.call(1, heavy()), bench.call(3, heavy()));
+        bench.call(2, PredictStability::default());
+        while bench.pool.is_idle() {
+            tokio::task::yield_now().await;
+        }
         bench.pool.close("shutting down");
-        bench.call(4, Service::Stability, &json!({}));
+        let late = bench.call(4, heavy());
         let mut heard = Vec::new();
         for _ in 1..=4 {
-            let (connection, frame) = bench.answer().await;
-            // The prediction may have been done already.
-            assert!(
-                connection == 2 || frame["status"] == "shutting down",
-                "{frame}"
-            );
-            heard.push(connection);
+            heard.push(bench.next().await);
         }
         heard.sort_unstable();
         assert_eq!(heard, [1, 2, 3, 4]);
+        for refused in [first, third, late] {
+            let answer = refused.answer.await.unwrap();
+            assert!(matches!(answer, Err(Unserved::Refused("shutting down"))));
+        }
         let control = settings::<2>().control;
         assert_eq!(bench.study.send(HeldLimit(control)).await.unwrap(), None);
     });
@@ -729,7 +871,7 @@ impl Stage {
         std::mem::take(&mut self.oracle.asked.borrow_mut())
     }
 
-    /// What was said on `topic` since the last look at anything.
+    /// The messages on `topic` since the last look at anything.
     fn said(&self, topic: Topic) -> Vec<Value> {
         let said = std::mem::take(&mut *self.ear.published.borrow_mut());
         said.into_iter()
@@ -801,7 +943,7 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
         assert_eq!(first, [free]);
         sleep(Duration::from_secs(10)).await;
         assert_eq!(stage.questions().await, []);
-        // What does not bear on the loop in force: with the controller off, gains and setpoint too.
+        // Changes that do not bear on the loop in force: with the controller off, gains and setpoint too.
         stage.ask(integrator(Some(0.002), Some(Method::Rk4))).await;
         stage.ask(gravity(9.81)).await;
         stage

@@ -118,7 +118,7 @@ fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() 
         let answer = rest(&mut begun).await;
         assert!(answer.contains("\"level\":\"error\""), "{answer}");
         assert_elapsed(began, HEAD_TIME);
-        // What can only become JSON, or BSON, has more time: a frame's.
+        // A stream that can only become JSON, or BSON, has more time: a frame's.
         let mut open = connect(&gateway, WIDE);
         open.write_all(b"{").await.unwrap();
         let began = Instant::now();
@@ -179,7 +179,7 @@ fn files_of_a_report_that_are_being_sent_have_a_total() {
     });
 }
 
-/// Those that take no byte of their answers keep nobody from one, nor do those that don't get to the end of their heads.
+/// Clients that take no byte of their answers keep nobody from one, nor do those that don't get to the end of their heads.
 #[test]
 fn of_too_many_requests_at_once_the_oldest_makes_room() {
     run(async {
@@ -421,7 +421,7 @@ fn frame_head(opcode: u8, length: usize) -> Vec<u8> {
     head
 }
 
-/// What the peer is told in the close frame: code and reason, behind whatever else comes.
+/// The close frame that the peer is sent: code and reason, behind whatever else comes.
 async fn farewell(stream: &mut DuplexStream) -> (u16, String) {
     let mut bytes = Vec::new();
     stream

@@ -1,4 +1,4 @@
-"""What every browser test stands on: one browser for all, a runtime and a page for each, and a silent console at the end.
+"""The stage of every browser test: one browser for all, a runtime and a page for each, and a silent console at the end.
 
 Invariant: a test passes only if its page's console said nothing: no exception, no error, no violation of the policy.
 """
@@ -69,7 +69,7 @@ class PageTest(unittest.TestCase):
         return self.page.screenshot(ARTEFACTS / f"{name}.png", **how)
 
     def image(self, selector):
-        """What the element looks like now."""
+        """A picture of the element as it is now."""
         box = self.page.run(
             f"(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}});"
             " const b = e.getBoundingClientRect(); return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()")

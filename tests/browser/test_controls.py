@@ -1,4 +1,4 @@
-"""What is done: drags, settings, refusals, keys, the trial, the comparison; the runtime is asked what came of it."""
+"""The page's controls: drags, settings, refusals, keys, the trial, the comparison; the runtime is asked what came of it."""
 
 import math
 
@@ -54,7 +54,7 @@ class Controls(PageTest):
     def test_a_target_out_of_reach_is_refused_in_words(self):
         self.page.drag(self.on_canvas((1.5, 0.0)), self.on_canvas((2.2, 0.3)))
         refusal = self.page.until("document.querySelector('#goal-body .refusal').textContent", why="refusal shown")
-        # What the runtime says itself to such a goal.
+        # The runtime's own answer to such a goal.
         said = self.runtime.call("/ik_action/send_goal", x=9, y=0)["status"]
         self.assertEqual(refusal.split(" ")[0], said.split(" ")[0])
         self.page.until("document.querySelector('#announce-assertive').textContent !== ''")

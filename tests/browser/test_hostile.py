@@ -44,7 +44,7 @@ window.tried = (async () => ({
 </script>
 """.replace("FRAME", repr(FRAME))
 
-# Of the runtime's own origin, as far as the browser knows.
+# This script is of the runtime's own origin, as far as the browser knows.
 REBOUND = """
 (async () => {
   const frame = "\\n" + FRAME + "\\n";

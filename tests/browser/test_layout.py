@@ -47,7 +47,7 @@ class Desktop(Access, PageTest):
             self.assertLessEqual(self.box(control)[3], 900, control)
 
     def test_no_moving_canvas_is_in_a_round_clip(self):
-        """Which a browser draws apart, and once more through a mask, in every frame."""
+        """Canvases, which a browser draws apart, and once more through a mask, in every frame."""
         clips = self.page.run("""[...document.querySelectorAll('#arm, #plots canvas')].flatMap((one) => {
             const found = [];
             for (let e = one.parentElement; e; e = e.parentElement) {

@@ -180,7 +180,7 @@ class BlowUp(Lesson):
         labels = self.page.run("own('axis.js').then(({ Axis, LOG_END }) => { const axis = new Axis(3, 0.2, 300); axis.begin();"
                                " axis.offer(-1e148); axis.offer(1); axis.end(); return [axis.log, axis.low, axis.labels.length <= 12]; })")
         self.assertEqual(labels, [True, -12, True])
-        # What the plot shows is not one line along an axis and a spike: the line is at several heights.
+        # The plot shows more than one line along an axis and a spike: the line is at several heights.
         picture = self.image("#plot-velocity")
         color = self.color("joint1")
         heights = {y // 12 for y in range(0, picture.height) for x in range(picture.width // 2, picture.width)

@@ -1,4 +1,4 @@
-"""What is seen: the arm where it is, its target, the plots; on dense screens, small ones, in the dark, with three links."""
+"""The page's pictures: the arm where it is, its target, the plots; on dense screens, small ones, in the dark, with three links."""
 
 from png import close
 from stage import PageTest
@@ -28,7 +28,7 @@ class View:
 
     def test_every_plot_shows_every_joint(self):
         # Free swing moves all joints, so that no line covers another.
-        # What is drawn begins when the page has connected, which may be late: so two seconds from then on.
+        # Drawing begins when the page has connected, which may be late: so two seconds from then on.
         shown = "Number(document.querySelector('#sim-time').textContent)"
         self.page.until(f"{shown} > 0")
         self.page.until(f"{shown} > {self.page.run(shown) + 2}")
@@ -55,7 +55,7 @@ class View:
 
 
 class Sums:
-    """What the page reckons for its plots, against the runtime."""
+    """The page's own numbers for its plots, against the runtime's."""
 
     def test_energy_and_gravity_load_are_those_of_the_runtime(self):
         self.settle(self.pose())
@@ -119,7 +119,7 @@ class TwoLinks(View, Sums, PageTest):
             self.page.run("gc()")
             return self.page.run("performance.memory.usedJSHeapSize")
 
-        # What is compiled and cached once is no growth, and comes when the browser likes: so the growth that lasts is sought, in one
+        # Memory that is compiled and cached once is no growth, and comes when the browser likes: so the growth that lasts is sought, in one
         # of four spans of half a minute. At 10 MB an hour, each would grow by 83 kB.
         self.page.run("new Promise((done) => setTimeout(done, 15000))")
         before, growths = heap(), []

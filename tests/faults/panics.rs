@@ -23,7 +23,7 @@ use tokio::time::timeout;
 
 static ENDS: OnceLock<Mutex<Vec<String>>> = OnceLock::new();
 
-/// What would have ended the process so far.
+/// Panics that would have ended the process so far.
 fn ends() -> Vec<String> {
     let ends = ENDS.get_or_init(|| {
         panics::end_with(|what| {

@@ -78,7 +78,7 @@ fn value(expression: &str, source: &str) -> f64 {
     value(&right, &source)
 }
 
-/// What the table says: numbers with units, added up.
+/// Values as the table says them: numbers with units, added up.
 fn said(limit: &str) -> f64 {
     limit
         .split(" + ")

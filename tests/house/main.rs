@@ -1,4 +1,4 @@
-//! What the papers, the tree and the manifest say, against the code.
+//! The papers, the tree and the manifest, held against the code.
 
 #![allow(
     clippy::cast_possible_truncation,
@@ -22,6 +22,5 @@ mod limits;
 #[path = "../support/papers.rs"]
 mod papers;
 mod readme;
-mod standing;
 mod style;
 mod tree;

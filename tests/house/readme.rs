@@ -11,7 +11,7 @@ use crate::limits::sources;
 use crate::papers::{table, text};
 use pendularm::protocol::catalog::{Field, Rosapi, Service, Topic};
 
-/// What stands between the code marks of a cell, in order.
+/// The texts between the code marks of a cell, in order.
 fn codes(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }

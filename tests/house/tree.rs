@@ -1,11 +1,11 @@
-//! What holds for every file of the tree.
+//! Rules for every file of the tree.
 //!
 //! **Invariant:** these checks look at every file that is written by hand, also at those that are added later.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What is made by tools or by somebody else, by its name anywhere in the tree.
+/// Files that are made by tools or by somebody else, by their names anywhere in the tree.
 const NOT_OURS: [&str; 7] = [
     ".git",
     "target",
@@ -189,7 +189,7 @@ fn no_line_ends_in_white_space_and_every_text_ends_in_a_newline() {
     }
 }
 
-/// What is decided by time is decided by the monotonic clock: a wall clock may jump.
+/// Time decides by the monotonic clock alone: a wall clock may jump.
 #[test]
 fn nothing_asks_the_wall_clock() {
     for path in rust_files("src") {

@@ -152,7 +152,7 @@ fn check_load<const N: usize>(case: &Case) {
     );
 }
 
-/// Where the arm stays without an integral term follows from `kp (q* - q) = G(q)`, which the oracle has solved.
+/// The pose at which the arm stays without an integral term follows from `kp (q* - q) = G(q)`, which the oracle has solved.
 #[test]
 fn without_an_integral_term_the_arm_sags_below_its_setpoint() {
     let case = oracle().into_iter().find(|case| case.name == "pd_only");

@@ -16,7 +16,7 @@ const SETTLING: f64 = 4.0;
 /// Time during which it must then stay \[s\].
 const STAYING: f64 = 4.0;
 
-/// Where the end effector is, with links of 1 m.
+/// Position of the end effector, with links of 1 m.
 fn tip<const N: usize>(q: &[f64; N]) -> (f64, f64) {
     let mut direction = 0.0;
     q.iter().fold((0.0, 0.0), |(x, y), q| {

@@ -1,4 +1,4 @@
-//! What happens when the numbers run out: the first step that is not finite is not taken, and nothing is after it.
+//! The end of the finite numbers: the first step that is not finite is not taken, and nothing is after it.
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;

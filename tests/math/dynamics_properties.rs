@@ -240,7 +240,7 @@ fn the_energy_grows_by_the_power_of_the_efforts() {
     for_one_to_six_links!(check);
 }
 
-// What must not matter
+// Changes that must not matter
 
 /// One joint wound up by 1e8 rad and the same joint at the angle that has that sine and cosine: the accelerations differ by what
 /// rounding that angle (2e-16 of at most π) does to them, which is far less than the 1e-8 rad that a sum of angles would be off.

@@ -9,10 +9,10 @@ use pendularm::math::kinematics::{
 use proptest::prelude::*;
 use serde_json::Value;
 
-/// What contract and oracle ask of a round trip, as a share of the sum of the lengths.
+/// Error that contract and oracle allow in a round trip, as a share of the sum of the lengths.
 const ROUND_TRIP: f64 = 1e-9;
 
-/// What the closed form achieves on targets that are not moved onto a boundary: a dozen roundings of the wrist, the
+/// Error of the closed form on targets that are not moved onto a boundary: a dozen roundings of the wrist, the
 /// angles and their sines, each 2⁻⁵³ of a quantity no larger than the sum of the lengths or than π, and 1e-15 that is
 /// lost before when an orientation is asked for a whole turn away.
 const INTERIOR: f64 = 4e-15;
@@ -745,7 +745,7 @@ fn a_refusal_says_which_limit_is_exceeded_and_by_which_numbers() {
         refusal([1.0, 1.0, 1.0], aimed(1.5, 0.0, PI)),
         "phi = 3.141592653589793 puts the wrist 2.5 m from the base, beyond the reach of links 1 and 2, 2 m"
     );
-    // Of another size, in metres all the same.
+    // Another size, in metres all the same.
     assert_eq!(
         refusal([4.0, 4.0, 4.0], aimed(6.0, 0.0, PI)),
         "phi = 3.141592653589793 puts the wrist 10 m from the base, beyond the reach of links 1 and 2, 8 m"

@@ -452,7 +452,7 @@ fn an_arm_whose_disturbance_is_over_steps_as_one_that_never_had_any() {
     assert_eq!(pushed, fresh);
 }
 
-/// What predicts a step has to know the effort that it will be taken with.
+/// A prediction of a step has to know the effort that it will be taken with.
 #[test]
 fn the_effort_of_the_next_step_is_what_that_step_is_then_taken_with() {
     for on in [false, true] {

@@ -206,7 +206,7 @@ fn a_start_while_running_cancels_the_goal_and_counts_and_times_afresh() {
     assert!(status.running);
     assert_eq!((status.elapsed, status.targets_reached), (0.0, 0));
     assert_cleared(&status);
-    // What the goal of the trial before comes to is nobody's success.
+    // The end of the goal of the trial before is nobody's success.
     assert_eq!(trial.concluded(preempted("g2"), unwanted), []);
     assert_eq!(trial.accepted(3, "g3", unwanted), [Action::PublishStatus]);
     assert_eq!(trial.concluded(reached("g2"), unwanted), []);
@@ -337,7 +337,7 @@ fn a_goal_preempted_by_somebody_else_is_shown_and_not_replaced() {
     assert_eq!(shown.action_status, ActionStatus::Preempted);
     assert_eq!(shown.target, Some(target(1)));
     assert_eq!((shown.error, shown.desired_positions), (None, None));
-    // Whatever becomes of the other's goal is not the trial's.
+    // The end of the other's goal is not the trial's.
     trial.feedback("theirs", 0.1, &[1.0, 1.0]);
     assert_eq!(trial.concluded(reached("theirs"), unwanted), []);
     assert_eq!(trial.tick(20.0), []);
@@ -663,7 +663,7 @@ proptest! {
 
 // ----------------------------------------------------------------------------------------------------------- sampling
 
-/// Where in the reach a target lies, 0 at its inner edge and 1 at its outer.
+/// The place of a target in the reach, 0 at its inner edge and 1 at its outer.
 fn share<const N: usize>(lengths: &[f64; N], target: &Target) -> f64 {
     let Reach { inner, outer } = Reach::of(lengths);
     (target.position.length() - inner) / (outer - inner)

@@ -1,4 +1,4 @@
-// What the figures say: comparisons, error against run time, growth, files to keep.
+// The page's figures: comparisons, error against run time, growth, files to keep.
 
 import assert from "node:assert/strict";
 import { test } from "node:test";

@@ -5,7 +5,7 @@ import { test } from "node:test";
 
 import { MISS, Pencil } from "../../page/pencil.js";
 
-/** What is drawn of `lines`, each a list of points. */
+/** The strokes that are drawn of `lines`, each a list of points. */
 function drawn(...lines) {
   const strokes = [];
   const pencil = new Pencil({ moveTo: (x, y) => strokes.push([[x, y]]), lineTo: (x, y) => strokes.at(-1).push([x, y]) });

@@ -1,4 +1,4 @@
-// Which timestep each method bears, and why: said of the loop in force, and in keeping with its modes.
+// The timestep that each method bears, and the reason: said of the loop in force, and in keeping with its modes.
 
 import assert from "node:assert/strict";
 import { readFileSync, readdirSync } from "node:fs";

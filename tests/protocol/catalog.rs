@@ -332,7 +332,7 @@ fn five_services_compute_and_those_with_one_purpose_take_all_or_nothing() {
     );
 }
 
-/// What changes seldom has to reach those that come late.
+/// A topic that changes seldom has to reach those that come late.
 #[test]
 fn the_fixed_frames_and_the_descriptions_are_latched_and_nothing_else_is() {
     let latched: Vec<_> = Topic::ALL

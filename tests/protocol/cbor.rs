@@ -5,7 +5,7 @@
 use pendularm::protocol::ros::cbor::{publish, publish_raw};
 use serde_json::{Value, json};
 
-/// What every frame of the topic `/t` begins with: a map of three, whose last key is `msg`.
+/// The head of every frame of the topic `/t`: a map of three, whose last key is `msg`.
 fn head() -> Vec<u8> {
     let mut head = vec![0xa3, 0x62];
     head.extend(b"op");
@@ -20,7 +20,7 @@ fn head() -> Vec<u8> {
     head
 }
 
-/// What a frame has behind its head.
+/// The part of a frame behind its head.
 #[track_caller]
 fn behind_head(frame: &[u8]) -> Vec<u8> {
     frame.strip_prefix(&head()[..]).expect("the head").to_vec()

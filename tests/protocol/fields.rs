@@ -17,7 +17,7 @@ fn args(text: &str) -> Arguments {
     }
 }
 
-/// What `read` makes of a request, and the status.
+/// The values that `read` takes from a request, and the status.
 fn reading<T>(
     service: Service,
     text: &str,
@@ -403,7 +403,7 @@ fn a_status_is_bounded_however_long_the_request_was() {
 }
 
 proptest! {
-    /// What a double prints as is read as that double.
+    /// The text that a double prints as is read as that double.
     #[test]
     fn every_finite_number_is_read_exactly(value in any::<f64>().prop_filter("finite", |value| value.is_finite())) {
         let (read, _) = number(&serde_json::to_string(&value).unwrap(), Bound::Finite);

@@ -279,7 +279,7 @@ fn frames_that_are_done_with_are_not_kept_though_one_is_always_unfinished() {
         assert_eq!(reader.next(), None);
         reader.push(chunk.as_bytes());
         assert_eq!(reader.by_ref().filter(Result::is_ok).count(), 10);
-        // What is unfinished and was last pushed, twice, and what a growing buffer has in reserve.
+        // The unfinished bytes and those pushed last, twice, and the reserve of a growing buffer.
         assert!(reader.buffered() < 5 * chunk.len());
     }
 }
@@ -471,7 +471,7 @@ fn every_foreign_protocol_is_named_in_one_line() {
     }
 }
 
-/// What became of a stretch of the stream, in the model's coarser terms.
+/// The outcome of a stretch of the stream, in the model's coarser terms.
 #[derive(Debug, PartialEq)]
 enum Expected {
     Frame(Vec<u8>),

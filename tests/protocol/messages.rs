@@ -1,4 +1,4 @@
-//! What the runtime sends, byte for byte.
+//! The runtime's frames, byte for byte.
 //!
 //! **Invariant:** every encoder's output is looked at whole.
 
@@ -156,7 +156,7 @@ fn memory(frame: Bytes) -> usize {
     frame.try_into_mut().expect("nobody else has it").capacity()
 }
 
-/// What waits for slow clients is counted by its length: it may not take more than that.
+/// Messages that wait for slow clients are counted by their length: they may not take more than that.
 #[test]
 fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_their_text() {
     for length in [2, 40, 1000, 100_000] {
@@ -179,7 +179,7 @@ fn frames_that_may_wait_in_great_numbers_or_are_large_take_no_more_memory_than_t
             assert_eq!(memory(frame), text);
         }
     }
-    // Of another spelling: exact too.
+    // Another spelling is counted exactly too.
     let frame = respelled("/x", "x", &publish("/x", &[1, 2, 3]));
     assert!(memory(frame) <= publish("/x", &[1, 2, 3]).len());
 }

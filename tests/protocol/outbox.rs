@@ -333,7 +333,7 @@ fn held_back_messages_count_for_the_limit_and_go_when_they_are_the_oldest() {
     assert_eq!(tags(bench.take(usize::MAX, usize::MAX)), [3]);
 }
 
-/// What the outbox is to do, written down as slowly as it reads: one list, searched from the front each time.
+/// The duties of an outbox, written down as slowly as they read: one list, searched from the front each time.
 #[derive(Default)]
 struct Model {
     /// Queued and held back, in the order of their numbers.

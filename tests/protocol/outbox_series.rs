@@ -1,4 +1,4 @@
-//! What an outbox gives of a series of messages.
+//! Series of messages in an outbox.
 //!
 //! **Invariant:** a series is one frame to whoever takes several, and messages one by one to whoever takes one.
 

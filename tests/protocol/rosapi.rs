@@ -1,4 +1,4 @@
-//! What rosapi answers, from the catalog and from what clients have registered; without a connection.
+//! Rosapi's answers, from the catalog and from what clients have registered; without a connection.
 //!
 //! **Invariant:** answers are compared whole; names are spelled here as clients spell them.
 

@@ -1,4 +1,4 @@
-//! What 3D tools get: the arm's description, its frames, and the setpoint that a goal sends.
+//! Messages for 3D tools: the arm's description, its frames, and the setpoint that a goal sends.
 //!
 //! **Invariant:** the description is compared whole, and frames are those of the description.
 

@@ -25,7 +25,7 @@ fn series(stream: &[u8]) -> Option<Series> {
     reader.series()
 }
 
-/// What the general reader and writer make of a stream: the topic of its last message, and all its messages.
+/// A stream as the general reader and writer take it: the topic of its last message, and all its messages.
 fn general(stream: &[u8]) -> Option<(String, Vec<u8>)> {
     let mut reader = FrameReader::new();
     reader.push(stream);
@@ -231,7 +231,7 @@ fn one_frame_of_a_series_is_taken_where_one_is_asked_for() {
 }
 
 proptest! {
-    /// Whatever becomes of a message on its way, it is a series only if the general way gives the same bytes.
+    /// A message is in a series only if the general way gives the same bytes.
     #[test]
     fn nothing_is_taken_for_a_series_that_the_general_way_would_not_give(
         msg in json(),

@@ -7,10 +7,10 @@ use std::fmt;
 use serde_json::Value;
 use tokio::time::Instant;
 
-/// What a count begins with that is the largest of many, and no sum.
+/// Prefix of a count that is the largest of many, and no sum.
 pub const MOST: &str = "most ";
 
-/// What ends a seed before its time. The number is the process's exit status.
+/// Reasons that end a seed before its time. The number is the process's exit status.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Something that came, or did not come, is wrong.
@@ -39,11 +39,11 @@ impl fmt::Display for Failure {
     }
 }
 
-/// What every part of a simulation shares.
+/// The state that all parts of a simulation share.
 pub struct Court {
     rng: RefCell<fastrand::Rng>,
     began: Instant,
-    /// Of everything logged so far.
+    /// Hash of everything logged so far.
     hash: Cell<u64>,
     /// The log itself, if it is kept.
     log: Option<RefCell<Vec<String>>>,
@@ -52,9 +52,9 @@ pub struct Court {
     pub turns: Cell<u64>,
     /// How often the clock has jumped.
     pub jumps: Cell<u64>,
-    /// What the arm must answer to the call of that id, as the model has it: the values, and whether all was done.
+    /// The arm's answer to the call of that id, as the model has it: the values, and whether all was done.
     pub expected: RefCell<BTreeMap<String, (Value, bool)>>,
-    /// What was done how often, for those who want to know what a run was made of.
+    /// Counts of what was done, for those who want to know what a run was made of.
     pub tally: RefCell<BTreeMap<&'static str, u64>>,
 }
 

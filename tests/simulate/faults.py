@@ -23,7 +23,7 @@ FROM = os.environ.get("FROM") or "1"
 
 REGISTRY, CONNECTION = "src/actors/gateway/registry", "src/actors/gateway/connection"
 
-# What is wrong, where, what stands there, what stands there when the fault holds (plant.py says how).
+# Each fault, its file, the text there, and the text there when the fault holds (plant.py says how).
 FAULTS = [
     ("two messages of one topic are swapped in a backlog, one time in 4", "src/protocol/outbox/mod.rs",
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));",

@@ -11,7 +11,7 @@ use crate::client::{Client, Door};
 use crate::court::Court;
 use crate::pipe::Fate;
 
-/// What a call must be answered with.
+/// The answer that a call must have.
 #[derive(Debug, Clone)]
 pub enum Expect {
     /// As the arm's double has it; false where a field was wrong.
@@ -22,9 +22,9 @@ pub enum Expect {
     Member(&'static str),
     /// Joints that put the hand there.
     Solution { x: f64, y: f64 },
-    /// What the offline computation gives.
+    /// The result of the offline computation.
     Computed(Computed),
-    /// What another client answers, or a failure that has its reason: the number of the call.
+    /// The answer of another client, or a failure that has its reason: the number of the call.
     Forwarded(u64),
     /// The result of a goal, and whether feedback may come before it.
     Goal { has_feedback: bool },
@@ -76,7 +76,7 @@ impl Call {
     }
 }
 
-/// Where a subscription stands.
+/// The state of a subscription.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
     Asked,
@@ -273,7 +273,7 @@ impl Honest {
     /// An answer has come: all frames before its call have been handled.
     pub fn handled_before(&mut self, order: u64) {
         self.handled = self.handled.max(order);
-        // What waits to be encoded for somebody who does not read comes behind later answers.
+        // Messages that wait to be encoded for somebody who does not read come behind later answers.
         let (handled, is_late) = (self.handled, self.is_hampered);
         self.subscriptions.retain(
             |_, one| !matches!(one.phase, Phase::Leaving(left) if left < handled && !is_late),

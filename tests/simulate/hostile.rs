@@ -1,4 +1,4 @@
-//! What hostile clients do: all that has ever made a server like this one stand still, swell or lie, in sizes that virtual time bears.
+//! Hostile clients: all that has ever made a server like this one stand still, swell or lie, in sizes that virtual time bears.
 //!
 //! Nothing is owed to them. What they must not do is show in what honest clients hear.
 
@@ -20,7 +20,7 @@ const LONG: [usize; 5] = [100, 1000, 1000, 8000, 70_000];
 pub struct Hostile {
     pub client: Client,
     pub fate: Rc<Cell<Fate>>,
-    /// What is left of a frame that it sends byte by byte.
+    /// The rest of a frame that it sends byte by byte.
     dribble: Vec<u8>,
     number: u64,
 }

@@ -187,7 +187,7 @@ fn attempt(seed: u64, keeps_log: bool, began: Instant) -> Outcome {
         tally: BTreeMap::new(),
     });
     if let Some(words) = panic {
-        // What a second reader asserts of the bytes that came is about the bytes, not about the reader.
+        // A second reader's assertions on the bytes that came are about the bytes, not about the reader.
         let is_ours = words.starts_with("src/");
         let verdict = if is_ours {
             Verdict::Crash
@@ -215,7 +215,7 @@ fn play_one(seed: u64, began: Instant) -> i32 {
     0
 }
 
-/// Where two runs of one seed part.
+/// The difference of two runs of one seed, if there is one.
 fn differ(first: &Outcome, second: &Outcome) -> Option<Failure> {
     if first.hash == second.hash {
         return None;

@@ -434,7 +434,7 @@ impl<const N: usize> Mirror<N> {
             return Some(json!({}));
         };
         let mut alone = self.simulation.clone();
-        // What is longer than a row goes on between what others ask: its end is not foreseen.
+        // A run that is longer than a row goes on between what others ask: its end is not foreseen.
         let steps = steps as u64;
         let taken = alone.advance(steps.min(STEPS_IN_A_ROW));
         self.by_hand += steps;

@@ -1,4 +1,4 @@
-//! What must come back: each frame that an honest client hears, held against what was asked and sent.
+//! The model of all that must come back: each frame that an honest client hears, held against what was asked and sent.
 
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -20,10 +20,10 @@ use crate::court::Court;
 use crate::honest::{Computed, Expect, Honest, Phase};
 use crate::json::Json;
 
-/// What comes is looked at so seldom, in virtual time, at most.
+/// Longest virtual time between two looks at what has come.
 const LOOKS_APART: Duration = Duration::from_millis(25);
 
-/// What a client is told that held the most when all together held too much.
+/// The reason that a client hears that held the most when all together held too much.
 const HELD_MOST: &str = "memory: this connection held the most";
 
 /// The status of a goal that ended because somebody asked for it.
@@ -76,7 +76,7 @@ pub struct Forward {
     pub since: Instant,
     pub turns: u64,
     pub timeout: Duration,
-    /// What its provider has answered, and when: result and values, as text.
+    /// The answer of its provider, and when: result and values, as text.
     pub answered: Option<(Instant, bool, String)>,
     /// The provider that has heard it.
     pub heard_by: Option<u64>,
@@ -104,7 +104,7 @@ pub struct Asked {
     pub number: u64,
 }
 
-/// What honest clients have said to one another.
+/// All that honest clients have said to one another.
 #[derive(Default)]
 pub struct Model {
     /// Every message, by its number.
@@ -248,7 +248,7 @@ impl Model {
                 ));
             }
         }
-        // Whatever hostile clients publish has no number.
+        // A hostile client's message has no number.
         let Some((from, number)) = body.origin() else {
             return;
         };
@@ -444,7 +444,7 @@ impl Model {
         (!result || !is_there).then(|| format!("the hand is at {tip:?}"))
     }
 
-    /// What a provider answered, word for word; or a failure for which there is a reason.
+    /// The provider's answer, word for word; or a failure for which there is a reason.
     fn forwarded(
         &mut self,
         hampered: bool,

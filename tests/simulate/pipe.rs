@@ -11,7 +11,7 @@ use tokio::io::{AsyncRead, AsyncWrite, DuplexStream, ReadBuf};
 /// In the words of every panic that was meant to happen.
 pub const MEANT: &str = "a panic that was put in";
 
-/// What is to become of a pipe.
+/// The fates of a pipe.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fate {
     /// It is as good as any.

@@ -1,4 +1,4 @@
-//! What a seed is made of: which features, faults and hostile behaviours are on in it, and how often each comes.
+//! The plan of a seed: which features, faults and hostile behaviours are on in it, and how often each comes.
 //!
 //! A seed has some of them and not others (swarm testing): what hides behind something else shows where that is off.
 
@@ -18,7 +18,7 @@ macro_rules! named {
 }
 
 named! {
-    /// What honest clients do.
+    /// Deeds of honest clients.
     Feature {
         Ask, DriveArm, Setpoint, Publish, Subscribe, Unsubscribe, Throttle, Pieces, Cbor, Provide, Withdraw, CallOut, Compute,
         Action, Goal, Trial, Watch, Rosapi, Mistake, FragmentIn, Wait,
@@ -26,12 +26,12 @@ named! {
 }
 
 named! {
-    /// What happens to honest clients and to the runtime without anybody's fault.
+    /// Mishaps of honest clients and of the runtime that are nobody's fault.
     Fault { Stall, Vanish, ResetMidFrame, PanicInPipe, HalfClose, Jump, PanicInComputation, ProviderLost }
 }
 
 named! {
-    /// What hostile clients do.
+    /// Deeds of hostile clients.
     Hostility {
         SlowNumbers, LongIds, GoalWithLongId, PingFlood, Deaf, FragmentBomb, Encodings, StepByHand, Registrations, DayLongCalls,
         Unfinished, Dribble, Garbage, TinyTimestep, Computations, Impersonate, Vanish, Silent, Foreign, ManyCalls, Throttles,
@@ -39,7 +39,7 @@ named! {
 }
 
 named! {
-    /// What honest clients do together, or at length.
+    /// Deeds of honest clients together, or at length.
     Burst { Stream, Flood, LongComputation, CancelAnothers }
 }
 

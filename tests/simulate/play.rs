@@ -38,7 +38,7 @@ const STANDSTILL: Duration = Duration::from_secs(2);
 /// How much more than the limit clients hold at most until whoever gives way is gone.
 const BESIDE: usize = 1 << 21;
 
-/// What a seed came to.
+/// The outcome of a seed.
 pub struct Outcome {
     pub plan: String,
     pub failure: Option<Failure>,
@@ -80,7 +80,7 @@ struct Course {
     hostile: Vec<Hostile>,
     /// Honest clients so far.
     clients: u64,
-    /// Of them, those that were cut off because they held the most.
+    /// Clients that were cut off because they held the most.
     cut_off: u64,
 }
 
@@ -380,7 +380,7 @@ impl Course {
                 self.lose_provider(who);
             }
             Fault::Jump => {
-                // What is under way arrives first: a jump within a frame is a frame that took too long.
+                // Bytes under way arrive first: a jump within a frame is a frame that took too long.
                 self.resume();
                 self.world.until_quiet().await;
                 self.look();
@@ -390,7 +390,7 @@ impl Course {
                 let time =
                     Duration::from_millis(self.court.among(&[250, 300, 1000, 9_000, 14_000]));
                 self.world.jump(time).await;
-                // What providers would have answered in the meantime they answer now.
+                // Providers now answer what they would have answered in the meantime.
                 let now = Instant::now();
                 for (due, number, _) in self.honest.iter().flat_map(|one| &one.owed) {
                     if let Some(forward) = self.model.forwards.get_mut(number)
@@ -555,7 +555,7 @@ impl Course {
     async fn come_to_rest(&mut self) {
         self.hostile.clear();
         self.resume();
-        // What was sent before arrives before what follows.
+        // Bytes that were sent before arrive before those that follow.
         self.pass(Duration::from_millis(500)).await;
         // A goal ends when the arm is reset, and time passes when it is not paused.
         let mut sober = self.enter();
@@ -661,7 +661,7 @@ impl Course {
                 .subscriptions
                 .iter()
                 .find(|(_, one)| one.throttle.is_some() && !has_newest(one));
-            // What hostile clients publish may be newer.
+            // A hostile client's message may be newer.
             let is_quiet = !one.is_hampered && !self.plan.scarce && self.plan.hostile == 0;
             if let Some((topic, subscription)) = stale.filter(|_| is_quiet) {
                 let (last, newest) = (subscription.last, &subscription.newest);

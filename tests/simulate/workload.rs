@@ -1,4 +1,4 @@
-//! What honest clients ask, and what they then expect.
+//! Requests of honest clients, and the answers that they then expect.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -629,7 +629,7 @@ impl Desk<'_> {
         }
     }
 
-    /// What takes longer than all else that clients compute: others' computations have their turns beside it.
+    /// The longest of all that clients compute: others' computations have their turns beside it.
     pub fn compute_long(&mut self) {
         let args = "{\"params\":{\"gravity\":9.81}}";
         let expect = Expect::Member("advised_timestep");
@@ -692,7 +692,7 @@ impl Desk<'_> {
 
     fn goal(&mut self) {
         if self.court.chance(0.3) {
-            // Whoever asks for that ends whosever goal is active.
+            // This ends the active goal, whosever it is.
             self.model.ends_any_goal = true;
             return self.call("/ik_action/cancel_goal", "{}", Expect::Anything, true);
         }
@@ -715,7 +715,7 @@ impl Desk<'_> {
             self.me().await_news(format!("subscribed to {topic}"));
             return self.send(&format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"));
         }
-        // What is on its way may still come: it stays on the list of what may be heard.
+        // Messages on their way may still come: they stay on the list of what may be heard.
         self.send(&format!("{{\"op\":\"unsubscribe\",\"topic\":\"{topic}\"}}"));
     }
 
@@ -830,7 +830,7 @@ impl Desk<'_> {
     }
 }
 
-/// What a client still waits for, in words.
+/// All that a client still waits for, in words.
 pub fn waits(honest: &Honest) -> String {
     let call = |(id, call): (&String, &Call)| {
         format!(

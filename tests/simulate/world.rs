@@ -31,9 +31,9 @@ use crate::court::Court;
 use crate::mirror::{Called, Compare, Sent, Tap};
 use crate::pipe::{Fate, MEANT, Pipe};
 
-/// What a look at the clock of work costs: a dozen to what the arm may work at a time, three to a slice.
+/// The cost of a look at the clock of work: a dozen to what the arm may work at a time, three to a slice.
 const LOOK: Duration = Duration::from_micros(400);
-/// Where clients connect to: what `Host` has to say.
+/// Address that clients connect to: what `Host` has to say.
 const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 /// Most virtual time that passes without a look at what came.
 const GLANCE: Duration = Duration::from_millis(20);
@@ -53,7 +53,7 @@ pub fn in_virtual_time<T>(course: impl Future<Output = T>) -> T {
     system.block_on(course)
 }
 
-/// What all clients together may hold in a world with little room: whoever holds more than is modest has to give way, soon.
+/// Bytes that all clients together may hold in a world with little room: one that holds more than is modest has to give way, soon.
 pub const SCARCE: usize = 400 << 10;
 
 pub struct World {
@@ -161,7 +161,7 @@ impl World {
         self.pool.submit(RUNTIME, Box::new(Trap));
     }
 
-    /// What all clients together hold.
+    /// Bytes that all clients together hold.
     pub fn held(&self) -> usize {
         self.gauges.memory().held()
     }
@@ -182,7 +182,7 @@ impl Computation for Trap {
     fn refuse(&mut self, _: &str) {}
 }
 
-/// What `actors/runtime.rs` starts, all of it in one thread, with the tap before the arm.
+/// All that `actors/runtime.rs` starts, in one thread, with the tap before the arm.
 fn start_nodes<const N: usize>(
     registry: &Addr<Registry>,
     gauges: &Arc<Gauges>,

@@ -1,4 +1,4 @@
-//! Where an arm rests, on random arms, gains and setpoints: never a saddle, and the arm itself comes to rest there.
+//! Resting poses of an arm, on random arms, gains and setpoints: never a saddle, and the arm itself comes to rest there.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -22,7 +22,7 @@ fn a_deviation_grows_per_control_period_as_the_spectral_radius_says() {
                 let period = part * limit;
                 let predicted = period_matrix(&linear, method, substeps, period).spectral_radius();
                 let measured = growth_per_period(&control.with_timestep(period), substeps).unwrap();
-                // What is left of the swing over 4000 periods.
+                // The ratio shows in the swing that is left over 4000 periods.
                 assert!(
                     (measured / predicted - 1.0).abs() < 1e-3,
                     "{method}, {substeps} steps in {period} s: {measured}, {predicted}"

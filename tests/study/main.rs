@@ -1,4 +1,4 @@
-//! What method and timestep do to the arm: limits, references, scenes, and the report that shows them.
+//! The study of method and timestep: limits, references, scenes, and the report that shows them.
 
 #![allow(
     clippy::cast_possible_truncation,

@@ -207,7 +207,7 @@ fn moves_are_carried_at_a_speed_that_is_known_before() {
     check_moves::<3>(34, 40);
 }
 
-/// Of two even links, stretched, `M = (4/3 1/2; 1/2 1/3)` in the angles of the links, and `(M⁻¹)₂₂ = 48/7`. From the
+/// Two even links, stretched, have `M = (4/3 1/2; 1/2 1/3)` in the angles of the links, and `(M⁻¹)₂₂ = 48/7`. From the
 /// starting pose the arm falls by `2 · 9.81` J, which the last link alone might have.
 #[test]
 fn the_speed_assumed_is_that_of_all_energy_in_one_link() {

@@ -1,4 +1,4 @@
-//! What every answer of the study claims, tried on random arms, gains, poses and setpoints.
+//! Claims of every answer of the study, tried on random arms, gains, poses and setpoints.
 //!
 //! A case is made from its number alone, which a failure names: `FROM=number COUNT=1` makes it again. `make check-study`
 //! runs as many as `COUNT` says, in an optimised build; the tests here run hundreds.
@@ -193,7 +193,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         found.advised.is_none_or(|advised| advised <= least),
         "{told}: {found:?}"
     );
-    // What runs away in earnest is said to, and what is stable at some timestep is not.
+    // A loop that runs away in earnest is said to, and one that is stable at some timestep is not.
     let is_said = found.rest == Rest::Unstable;
     assert!(
         if is_said {
@@ -227,7 +227,7 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
                 "{told}: {held} at {pose:?}, {found:?}"
             );
         }
-        // What is found by search alone may be missed by a little.
+        // A worst pose that is found by search alone may be missed by a little.
         let within = if found.certified { 0.99 } else { 0.9 };
         assert!(
             held >= within * least,

@@ -62,7 +62,7 @@ fn compare<const N: usize>(case: &Value) {
             assert!(q <= q_bound, "{name} {N} {index} {i}: {q:e} > {q_bound:e}");
             assert!(v <= v_bound, "{name} {N} {index} {i}: {v:e} > {v_bound:e}");
         }
-        // What is stored about sensitivity bounds what rounding at 106 bits can have done on the way.
+        // The stored sensitivity bounds what rounding at 106 bits can have done on the way.
         let own = reference.uncertainty()[index];
         assert!(
             own <= 1e-27 * growth,

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use pendularm::math::integrator::Method;
 use pendularm::report::{ReportError, ReportOptions, names, run};
 
 /// A directory that is gone after the test.
@@ -62,7 +63,7 @@ fn several_sections_are_made_and_shown_in_their_order() {
     assert!(at("forcing") < at("drift") && at("drift") < at("conditioning"));
     // A force, a method, and eleven timesteps each.
     let csv = fs::read_to_string(scratch.0.join("forcing.csv")).unwrap();
-    assert_eq!(csv.lines().count(), 1 + 6 * 4 * 11);
+    assert_eq!(csv.lines().count(), 1 + 6 * Method::ALL.len() * 11);
     let report = fs::read_to_string(scratch.0.join("report.json")).unwrap();
     let report: serde_json::Value = serde_json::from_str(&report).unwrap();
     for section in report["sections"].as_array().unwrap() {

@@ -87,7 +87,7 @@ impl ArmCase {
     }
 }
 
-/// Of an oscillator at ω = 1 the state is `(x, v)`, as the stored matrices have it. Entries are sums of terms `(h λ)^k / k!`
+/// For an oscillator at ω = 1 the state is `(x, v)`, as the stored matrices have it. Entries are sums of terms `(h λ)^k / k!`
 /// with `λ <= 1 + 2 z`, each a few times rounded.
 #[test]
 fn the_step_matrix_of_an_oscillator_is_the_stored_one() {

@@ -1,4 +1,4 @@
-//! What the tests of the arm share: reading its messages, sending it somewhere, and the gravity load by another route.
+//! Parts that the tests of the arm share: reading its messages, sending it somewhere, and the gravity load by another route.
 
 use std::time::{Duration, Instant};
 
@@ -114,7 +114,7 @@ pub fn gravity_load(lengths: &[f64], masses: &[f64], gravity: f64, q: &[f64]) ->
         .collect()
 }
 
-/// What a right runtime shows on a quiet machine and a wrong one never does may fail now and then on a busy one.
+/// A check that a right runtime passes on a quiet machine and a wrong one never does may fail now and then on a busy one.
 pub fn in_one_of_three_tries(what: &str, attempt: impl Fn() -> Result<(), String>) {
     let mut failures = Vec::new();
     for _ in 0..3 {

@@ -1,4 +1,4 @@
-//! What the process-level tests share: the built program on a free port, and the client that is connected to it.
+//! Parts that the process-level tests share: the built program on a free port, and the client that is connected to it.
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
@@ -111,7 +111,7 @@ impl Runtime {
         self.child.id()
     }
 
-    /// That [`SET_GRAVITY`], hidden in what was sent, was not executed.
+    /// Asserts that [`SET_GRAVITY`], hidden in what was sent, was not executed.
     pub fn assert_nothing_was_executed(&self) {
         let parameters = self.connect().ask("/arm_sim/set_params", json!({}));
         assert_eq!(parameters["gravity"], 9.81);

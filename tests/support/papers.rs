@@ -1,4 +1,4 @@
-//! What the tests of the papers share: a file's text, and a table in it.
+//! Parts that the tests of the papers share: a file's text, and a table in it.
 //!
 //! **Invariant:** what is looked for and not there fails the test.
 

@@ -1,7 +1,7 @@
-//! What the tests in virtual time share: the nodes around a goal on one thread whose clock stands still until nobody
-//! has anything to do, and a client that speaks rosbridge through an in-memory pipe.
+//! The nodes around a goal on one thread whose clock stands still until nobody has anything to do, and a client that
+//! speaks rosbridge through an in-memory pipe: tests in virtual time share them.
 //!
-//! A second passes in no time and always in the same way, so that steps, messages and their order can be counted.
+//! A test asks a node as another node does ([`asked`]), and hears what a subscriber hears. A second passes in no time and always in the same way, so that steps, messages and their order can be counted.
 
 use std::future::Future;
 use std::ops::{Deref, DerefMut};
@@ -11,25 +11,28 @@ use std::time::Duration;
 
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
-use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
+use pendularm::actors::arm::ik_action::{
+    CancelGoal, CancelRejected, GoalTracker, IkAction, SendGoal,
+};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSim, CommandGoal, EndGoal, GoalJudged, Pose, Snapshot, TakeSnapshot, TrackGoal,
-    Tracking,
+    ArmPose, ArmSim, CommandGoal, Enable, EndGoal, GoalJudged, Pause, Pose, Reset, SetParams,
+    SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
-use pendularm::actors::node::Publish;
+use pendularm::actors::node::{Ask, Call, Publish, Reply};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
-use pendularm::math::pid::Gains;
+use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Topic;
 use pendularm_client::pipe;
 use serde_json::{Value, json};
 use tokio::io::DuplexStream;
 use tokio::sync::mpsc::UnboundedSender;
+use tokio::sync::oneshot;
 use tokio::time::{sleep, timeout};
 
 /// Virtual time that anything may take before a test gives up.
@@ -66,6 +69,7 @@ pub struct Stage<const N: usize> {
     pub registry: Addr<Registry>,
     pub arm: Addr<ArmSim<N>>,
     pub action: Addr<IkAction<N>>,
+    pub trial: Addr<IkTrial<N>>,
     gauges: Arc<Gauges>,
 }
 
@@ -95,12 +99,13 @@ where
             end: arm.clone().recipient(),
         };
         let pose = arm.clone().recipient();
-        let action = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
+        let (action, trial) = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         Self {
             registry,
             arm,
             action,
+            trial,
             gauges,
         }
     }
@@ -118,23 +123,93 @@ where
     /// A client, with the arm weightless and at rest at q = 0: it stays where it is, to the bit.
     pub async fn with_a_floating_arm() -> (Self, Client) {
         let stage = Self::start().await;
-        let mut client = stage.connect();
-        client
-            .ask("/arm_sim/set_params", json!({"gravity": 0}))
-            .await;
-        client.ask("/arm_sim/reset", json!({})).await;
+        let weightless = SetParams {
+            gravity: Some(0.0),
+            ..SetParams::default()
+        };
+        asked(&stage.arm, weightless).await;
+        stage.reset().await;
+        let client = stage.connect();
         (stage, client)
+    }
+
+    pub async fn reset(&self) {
+        asked(&self.arm, Reset::default()).await;
+    }
+
+    pub async fn pause(&self, paused: bool) {
+        let pause = Pause {
+            paused: Some(paused),
+            ..Pause::default()
+        };
+        asked(&self.arm, pause).await;
+    }
+
+    /// Switches the controller on.
+    pub async fn enable(&self) {
+        let enable = Enable {
+            enabled: Some(true),
+            ..Enable::default()
+        };
+        asked(&self.arm, enable).await;
+    }
+
+    pub async fn set_lengths(&self, lengths: [f64; N]) {
+        let params = SetParams {
+            lengths: Some(lengths),
+            ..SetParams::default()
+        };
+        asked(&self.arm, params).await;
+    }
+
+    /// Has the controller hold `position` from the next step on, as the registry does for a message on
+    /// `/joint_trajectory`.
+    pub async fn hold(&self, position: [f64; N]) {
+        let setpoint = Setpoint::at(position);
+        let held = SetSetpoint {
+            setpoint,
+            done: None,
+        };
+        self.arm.send(held).await.unwrap();
+    }
+
+    /// Sends a goal that must be accepted and gives its id.
+    pub async fn send_goal(&self, goal: SendGoal<N>) -> String {
+        asked(&self.action, goal).await.expect("an accepted goal")
+    }
+
+    /// Cancels the active goal, whichever it is.
+    pub async fn cancel(&self) -> Result<(), CancelRejected> {
+        asked(&self.action, CancelGoal::default()).await
     }
 }
 
-/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to.
+/// Asks a node as another one does, and waits until the question has had all its effects.
+pub async fn asked<A, T>(node: &Addr<T>, ask: A) -> A::Answer
+where
+    A: Ask,
+    T: Actor<Context = Context<T>> + Handler<Call<A>>,
+{
+    let (answered, answer) = oneshot::channel();
+    let (done, ended) = oneshot::channel();
+    let reply = Reply::new(answered, Some(done));
+    node.send(Call { ask, reply }).await.unwrap();
+    let answer = answer.await.expect("an asker").expect("an answer");
+    assert!(
+        ended.await.is_err(),
+        "nobody sends the end of a call: it is dropped"
+    );
+    answer
+}
+
+/// The nodes `ik`, `ik_action` and `ik_trial`, around whatever arm these recipients belong to; gives the last two.
 pub fn start_goal_nodes<const N: usize>(
     registry: &Addr<Registry>,
     pose: Recipient<ArmPose<N>>,
     tracker: GoalTracker<N>,
     seed: u64,
     nodes: &mut Nodes,
-) -> Addr<IkAction<N>> {
+) -> (Addr<IkAction<N>>, Addr<IkTrial<N>>) {
     let publish = || registry.clone().recipient();
     let ik = Ik::<N>::new(pose.clone()).start();
     Ik::attach(&ik, nodes);
@@ -148,7 +223,7 @@ pub fn start_goal_nodes<const N: usize>(
     let rng = fastrand::Rng::with_seed(seed);
     let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
     IkTrial::attach(&trial, nodes);
-    action
+    (action, trial)
 }
 
 /// A client in the registry's own thread, through an in-memory pipe.
@@ -180,14 +255,14 @@ impl Client {
         self.receive().await
     }
 
-    pub async fn next_where(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
-        self.receive_where(wanted).await
+    /// Hears all that was said until now; what it asks for that itself is not remembered.
+    pub async fn settle(&mut self) {
+        self.0.settle().await;
+        self.heard.pop();
     }
 
-    /// Sends a goal that must be accepted and gives its id.
-    pub async fn send_goal(&mut self, args: Value) -> String {
-        let values = self.ask("/ik_action/send_goal", args).await;
-        values["goal_id"].as_str().unwrap().to_owned()
+    pub async fn next_where(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
+        self.receive_where(wanted).await
     }
 
     pub async fn unsubscribe(&mut self, topic: &str) {
@@ -220,12 +295,12 @@ impl Client {
         messages(&self.heard[before..], topic)
     }
 
-    /// What was heard on `topic` so far.
+    /// The messages on `topic` so far.
     pub fn messages(&self, topic: &str) -> Vec<Value> {
         messages(&self.heard, topic)
     }
 
-    /// What was heard so far in few words: topics, services and, of results, the outcome. Statuses are left out.
+    /// All that was heard so far in few words: topics, services and, of results, the outcome. Statuses are left out.
     pub fn story(&self) -> Vec<String> {
         let words = |frame: &Value| match frame["op"].as_str() {
             Some("publish") => {

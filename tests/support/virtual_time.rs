@@ -1,4 +1,4 @@
-//! What the actor tests share: the gateway's actors on one thread with a paused clock, clients on in-memory pipes, and
+//! Parts that the actor tests share: the gateway's actors on one thread with a paused clock, clients on in-memory pipes, and
 //! nodes that are closures.
 //!
 //! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.

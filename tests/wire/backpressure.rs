@@ -13,7 +13,7 @@ use pendularm::actors::gateway::limits::MAX_BACKLOG;
 use serde_json::{Value, json};
 
 const MIB: usize = 1024 * 1024;
-/// What the program needs by itself, and what an allocator and a test build add.
+/// Memory that the program needs by itself, and that an allocator and a test build add.
 const BASE: usize = 40 * MIB;
 
 fn diagnostic(client: &mut Client, key: &str) -> u64 {

@@ -238,7 +238,7 @@ fn every_topic_of_the_runtime_that_speaks_by_itself_can_be_had_as_cbor_raw() {
         };
         assert!(bytes.len() > 8 && bytes.starts_with(&[0, 1, 0, 0]));
         socket.send(&json!({"op": "unsubscribe", "topic": topic}));
-        // What is on its way still comes.
+        // Frames on their way still come.
         socket.send(&json!({"op": "call_service", "service": "/rosapi/nodes"}));
         while matches!(socket.event(), Event::Binary(_)) {}
     }

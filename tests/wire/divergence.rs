@@ -1,4 +1,4 @@
-//! What happens when a step leaves the finite numbers.
+//! Steps that leave the finite numbers.
 
 use crate::arm::{numbers, send_trajectory, stamp, state, state_where, trajectory};
 use crate::common::{Client, Runtime};

@@ -106,7 +106,7 @@ fn the_newest_provider_wins_and_calls_under_way_stay_with_theirs() {
     assert_eq!(caller.receive()["values"]["from"], "new");
     respond(&mut old, &under_way, json!({"from": "old"}));
     assert_eq!(caller.receive()["values"]["from"], "old");
-    // What is no longer its own it can't withdraw, and its end takes nothing along.
+    // A service that is no longer its own it can't withdraw, and its end takes nothing along.
     old.send(&json!({"op": "unadvertise_service", "service": "/s", "id": 5}));
     let status = old.status();
     assert_eq!(

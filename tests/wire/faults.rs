@@ -1,4 +1,4 @@
-//! What befalls a running program: computations that don't end, an end in the middle of everything.
+//! Faults of a running program: computations that don't end, an end in the middle of everything.
 //!
 //! **Invariant:** what a client is owed it gets, or it is told; nobody else notices.
 

@@ -7,7 +7,7 @@ use std::net::Shutdown;
 use crate::common::{Client, Runtime};
 use serde_json::{Value, json};
 
-/// What must not be executed where it stands inside a malformed frame.
+/// A call that must not be executed where it stands inside a malformed frame.
 const SET_GRAVITY: &str =
     r#"{"op":"call_service","service":"/arm_sim/set_params","args":{"gravity":1}}"#;
 const MAX_FRAME: usize = 4 * 1024 * 1024;

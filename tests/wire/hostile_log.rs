@@ -201,7 +201,7 @@ fn no_text_over_tcp_writes_a_line_of_the_log_or_a_file_and_each_comes_back_as_it
                 "{frame}"
             );
         }
-        // What is no JSON at all, in a line of its own and as a first one.
+        // Text that is no JSON at all, in a line of its own and as a first one.
         client.send_bytes(format!("{text}\n").as_bytes());
         client.settle();
         Client::to(runtime.address).send_bytes(format!("{text} {text}\n\n").as_bytes());
@@ -253,7 +253,7 @@ fn no_head_of_a_request_and_no_close_of_a_websocket_writes_a_line_of_the_log() {
     );
 }
 
-/// What carries a client's text on the runtime's own topics is JSON like any other.
+/// A message on the runtime's own topics that carries a client's text is JSON like any other.
 #[test]
 fn what_the_runtime_publishes_of_itself_is_json_whatever_clients_sent() {
     let runtime = Talkative::start("hostile_log_topics");

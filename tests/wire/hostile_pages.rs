@@ -1,6 +1,6 @@
 //! Pages that mean harm: requests as a browser can be made to send them, and what the answers let it do.
 //!
-//! What a page tries in a real browser is in `tests/browser/test_hostile.py`; who may ask, and well-formed refusals, are
+//! Attacks by a page in a real browser are in `tests/browser/test_hostile.py`; who may ask, and well-formed refusals, are
 //! in `wire_http.rs`, `wire_websocket.rs` and `wire_token.rs`.
 //!
 //! **Invariant:** whatever a page has its visitor's browser send, the arm's parameters stay as they were.
@@ -104,7 +104,7 @@ fn a_line_like_one_of_a_head_is_an_ordinary_malformed_frame_elsewhere() {
     client.settle();
 }
 
-/// Whoever must show a token has to show it first, whatever it looks like.
+/// A client that must show a token has to show it first, whatever it looks like.
 #[test]
 fn a_request_of_whatever_method_is_locked_out_by_the_token_too() {
     let runtime = Runtime::with(&["--token", "open-sesame-once-more"]);
@@ -128,7 +128,7 @@ mod web {
     use super::Runtime;
     use crate::web_client::{Answer, exchange, folder, get, handshake, request, try_handshake};
 
-    /// What every answer says to a browser, whatever it is about.
+    /// Headers of every answer to a browser, whatever it is about.
     const STRICT: [(&str, &str); 7] = [
         ("x-content-type-options", "nosniff"),
         ("x-frame-options", "DENY"),

@@ -9,7 +9,7 @@ use crate::common::{Client, Runtime};
 use pendularm::protocol::catalog::{Direction, Rosapi, Service, Topic};
 use serde_json::{Value, json};
 
-/// What a name that a client made up can be mistaken for, if anything of it is left out, added or folded.
+/// Names for which a name that a client made up can be mistaken, if anything of it is left out, added or folded.
 fn resembling(name: &str) -> Vec<String> {
     let bare = name.trim_start_matches('/');
     let doubled = name
@@ -367,7 +367,7 @@ fn no_frame_holds_another_for_readers_that_end_lines_at_a_carriage_return() {
     let mut line = String::new();
     lines.read_line(&mut line).unwrap();
     assert!(!line.contains('\r'), "{line:?}");
-    // What is said is the same.
+    // The content is the same.
     let frame: Value = serde_json::from_str(&line).unwrap();
     let list = frame["msg"]["a"].as_array().unwrap();
     assert_eq!(list[1..], [json!(1), json!("\r")]);

@@ -16,7 +16,7 @@ use serde_json::json;
 const SET_GRAVITY: &str =
     r#"{"op":"call_service","service":"/arm_sim/set_params","args":{"gravity":1}}"#;
 
-/// What a client closes with is as little to be trusted as what it sends before. Payloads of a close frame, each against a
+/// A client's close is as little to be trusted as what it sends before. Payloads of a close frame, each against a
 /// rule of RFC 6455, section 5.5.1 or 7.4.
 #[test]
 fn a_close_frame_against_the_protocol_is_answered_as_such_and_costs_nobody_else() {

@@ -199,7 +199,7 @@ fn any_other_host_is_a_403_that_names_the_option() {
             assert_eq!(answer.status, 403, "{host}");
             assert!(answer.text().contains("--allow-host"), "{host}");
             assert!(answer.text().contains(&format!("http://localhost:{port}/")));
-            // What it repeats of the request is plain text.
+            // The part of the request that it repeats is plain text.
             assert_eq!(
                 answer.header("content-type"),
                 Some("text/plain; charset=utf-8")
@@ -259,7 +259,7 @@ fn nothing_but_the_one_host_header_says_the_host() {
     }
 }
 
-/// What follows a request is no request, however its length is told: the first answer is the last.
+/// Bytes behind a request are no request, however its length is told: the first answer is the last.
 #[test]
 fn no_second_request_is_smuggled_behind_the_first() {
     let runtime = Runtime::start();

@@ -164,7 +164,7 @@ fn every_goal_has_exactly_one_result_whatever_clients_do_at_the_same_time() {
             std::thread::spawn(move || {
                 let mut sent = Vec::new();
                 for round in 0..100 {
-                    // Where a resting arm is, with nothing to hold: reached within a step, if it is let.
+                    // A goal where a resting arm is, with nothing to hold: reached within a step, if it is let.
                     let here = json!({"x": 2, "y": 0, "epsilon": 4, "success_hold": 0});
                     match (client + round) % 4 {
                         0 => drop(connection.call(CANCEL, json!({}))),

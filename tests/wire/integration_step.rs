@@ -387,7 +387,7 @@ fn a_million_steps_are_taken_and_one_more_is_refused_with_the_limit() {
     let positions = values["positions"].as_array().unwrap();
     assert_eq!(positions.len(), 1_000_001);
     assert_eq!(values["times"].as_array().unwrap().len(), 1_000_001);
-    // Of the closed form above only h²/6 is missing: 1.7e-13.
+    // Only h²/6 of the closed form above is missing: 1.7e-13.
     let last = positions.last().unwrap().as_f64().unwrap();
     assert!((last - 1.0 / 6.0).abs() < 2e-13, "{last}");
 }

@@ -268,14 +268,14 @@ fn a_signal_ends_it_within_a_second_with_status_0_clients_or_not() {
 fn a_client_that_never_reads_does_not_hold_up_the_end() {
     let mut serving = Serving::start(&["--bind", "127.0.0.1:0"], &[]);
     let mut deaf = serving.connect();
-    for topic in ["/joint_states", "/clock", "/diagnostics"] {
-        deaf.subscribe(topic);
-    }
-    // An answer of tens of megabytes, which fills every buffer on the way.
+    // An answer of tens of megabytes, which fills every buffer on the way once it has begun to come.
     let big =
         json!({"function": "t", "x0": 0, "dt": 1e-3, "steps": 1_000_000, "integrator": "euler"});
     deaf.send(&json!({"op": "call_service", "service": "/arm_sim/integration_step", "args": big}));
-    std::thread::sleep(Duration::from_secs(2));
+    deaf.stream().peek(&mut [0]).expect("an answer begins");
+    for topic in ["/joint_states", "/clock", "/diagnostics"] {
+        deaf.send(&json!({"op": "subscribe", "topic": topic}));
+    }
     let since = serving.signal("TERM");
     let (status, took) = serving.end(since);
     assert_eq!(status, Some(0));
@@ -287,7 +287,14 @@ fn an_arm_that_lags_does_not_hold_up_the_end() {
     let mut serving = Serving::start(&["--bind", "127.0.0.1:0"], &[]);
     let mut client = serving.connect();
     client.ask("/arm_sim/set_integrator", json!({"timestep": 1e-12}));
-    std::thread::sleep(Duration::from_millis(500));
+    client.subscribe("/diagnostics");
+    client.receive_where("a word of the delay", |frame| {
+        let statuses = frame["msg"]["status"].as_array();
+        statuses.is_some_and(|all| {
+            all.iter()
+                .any(|one| one["name"] == "arm_sim" && one["level"] != 0)
+        })
+    });
     let since = serving.signal("TERM");
     let (status, took) = serving.end(since);
     assert_eq!(status, Some(0));

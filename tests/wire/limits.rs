@@ -34,7 +34,7 @@ fn a_connection_holds_so_many_subscriptions() {
     let statuses = register(&mut client, "subscribe", "topic", MAX_SUBSCRIPTIONS + 1);
     assert_eq!(statuses.len(), MAX_SUBSCRIPTIONS + 1);
     assert_eq!(errors(&statuses), [MAX_SUBSCRIPTIONS]);
-    // What is subscribed already may be subscribed again, and a withdrawn one makes room.
+    // A topic that is subscribed already may be subscribed again, and a withdrawn one makes room.
     client.send(&json!({"op": "subscribe", "topic": "/5", "id": 5}));
     assert_eq!(client.status()["level"], "info");
     client.send(&json!({"op": "unsubscribe", "topic": "/5"}));

@@ -142,7 +142,7 @@ fn memory_of_a_burst_goes_back_to_the_system() {
         hoards.collect(),
     );
     assert!(peak > 100 * MB, "{peak}: nothing was tried");
-    // What was sent is carried out first.
+    // The program carries out first what was sent.
     let end = Instant::now() + Duration::from_secs(60);
     while resident_memory(&runtime) > 40 * MB {
         let resident = resident_memory(&runtime);
@@ -180,7 +180,7 @@ fn clients_that_read_no_answers() {
 #[test]
 #[ignore = "make test-slow"]
 fn subscribers_that_read_no_messages() {
-    // What their sockets take is filled by long messages first. Then long ones, or small ones by the thousand; or held back by throttles.
+    // Long messages fill their sockets first. Then long ones, or small ones by the thousand; or held back by throttles.
     for (name, count, throttle, length) in [
         ("100 deaf, 40-byte messages", 100, 0, 1),
         ("300 throttled, 40-byte messages", 300, 1_000_000, 1),

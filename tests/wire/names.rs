@@ -94,7 +94,7 @@ fn a_provider_is_called_by_its_own_spelling_and_the_caller_answered_in_his() {
     assert!(caller.refusal("add", json!({})).contains("no provider"));
 }
 
-/// What was held back of the arm's state is old once the arm has answered, under either spelling.
+/// A state of the arm that was held back is old once the arm has answered, under either spelling.
 #[test]
 fn after_a_response_no_older_state_follows_under_either_spelling() {
     let runtime = Runtime::start();

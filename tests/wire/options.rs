@@ -393,7 +393,7 @@ fn bytes_that_are_no_text_are_refused_like_any_other_value() {
 }
 
 proptest! {
-    /// Whatever is given: an answer, and a refusal is one line without control characters.
+    /// Any arguments give an answer, and a refusal is one line without control characters.
     #[test]
     fn no_arguments_and_no_variables_break_the_reader(
         arguments in prop::collection::vec(

@@ -163,7 +163,7 @@ fn a_question_that_is_none_is_refused_by_its_field_and_changes_nothing() {
     );
 }
 
-/// What a tool that shows a service asks beforehand.
+/// The questions of a tool that shows a service, beforehand.
 #[test]
 fn their_types_are_told_to_the_end() {
     let runtime = Runtime::start();

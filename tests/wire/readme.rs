@@ -35,7 +35,7 @@ fn the_readmes_client_is_six_lines_of_the_standard_library_and_on_the_first_scre
 #[test]
 fn the_readmes_client_moves_the_arm_to_its_setpoint() {
     if Command::new("python3").arg("--version").output().is_err() {
-        // Whoever builds this need not have Python; the project's own checks install it.
+        // A builder need not have Python; the project's own checks install it.
         assert!(std::env::var_os("CI").is_none(), "python3 is missing");
         return;
     }

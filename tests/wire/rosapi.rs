@@ -124,7 +124,7 @@ fn every_topics_type_is_told_to_its_end_in_the_form_that_parsers_take() {
             .iter()
             .filter_map(|one| one.lines().next())
             .collect();
-        // Whatever type a field has is primitive or defined below.
+        // Every type that a field has is primitive or defined below.
         for (index, part) in parts.iter().enumerate() {
             for line in part.lines().skip(usize::from(index > 0)) {
                 let kind = line.split(' ').next().unwrap().trim_end_matches("[]");

@@ -10,7 +10,7 @@ use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::stability::{limit_held, limits};
 use serde_json::{Value, json};
 
-/// What the arm's own services say of it, as the arguments of `/study/stability`.
+/// The arm as its own services tell it, as the arguments of `/study/stability`.
 fn present(client: &mut Client, setpoint: &Value) -> Value {
     let integrator = client.ask("/arm_sim/set_integrator", json!({}));
     json!({

@@ -107,7 +107,7 @@ fn of_too_many_wishes_the_oldest_ends() {
     assert_eq!((&end["id"], &end["status"]), (&json!("0"), &json!(6)));
 }
 
-/// What `TFClient` of roslib 1 does where nobody has told it otherwise.
+/// Goals as `TFClient` of roslib 1 sends them where nobody has told it otherwise.
 #[test]
 fn a_goal_that_is_published_gets_feedback_under_its_id_until_it_is_cancelled() {
     let runtime = Runtime::start();

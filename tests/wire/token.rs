@@ -296,7 +296,7 @@ fn the_token_is_shown_in_one_way_and_no_other_spelling_counts() {
         ),
         ("/".to_owned(), format!("{name} ={ENCODED}"), 403),
         ("/".to_owned(), format!("{name}=\"{ENCODED}\""), 403),
-        // What the query shows goes before the cookie.
+        // The token in the query goes before the cookie.
         ("/?token=x".to_owned(), format!("{name}={ENCODED}"), 403),
     ] {
         let headers = format!("Host: {address}\r\nCookie: {cookie}\r\n");
@@ -319,7 +319,7 @@ fn the_token_is_shown_in_one_way_and_no_other_spelling_counts() {
     }
 }
 
-/// Whoever guesses in a loop waits for each answer; whoever has the token does not, also from the same address meanwhile.
+/// A client that guesses in a loop waits for each answer; one that has the token does not, also from the same address meanwhile.
 #[test]
 fn a_loop_of_guesses_is_slow_and_the_holder_is_not_kept_out_by_it() {
     let runtime = guarded();

@@ -5,7 +5,6 @@
 #![cfg(feature = "web")]
 use std::io::{Read, Write};
 use std::net::TcpStream;
-use std::time::Duration;
 
 use crate::common::{PATIENCE, Runtime};
 use crate::web_client::{Answer, Socket, exchange, handshake, rest, try_handshake};
@@ -339,7 +338,6 @@ fn what_a_client_registered_goes_with_it_also_without_a_close() {
             break;
         }
         assert!(std::time::Instant::now() < deadline, "{response}");
-        std::thread::sleep(Duration::from_millis(5));
     }
 }
 

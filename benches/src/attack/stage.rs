@@ -44,7 +44,7 @@ struct Player<'a> {
     opening: Vec<u8>,
     /// Bytes sent of the opening and of what is said once.
     said: usize,
-    /// Where in what is said over and over it is.
+    /// Position in the bytes that are said over and over.
     at: usize,
     /// Bytes that it may still send until the next drip.
     allowance: usize,

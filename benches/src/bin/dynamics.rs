@@ -180,7 +180,7 @@ fn count<const N: usize>(gravity: &str, what: &str) {
     }
 }
 
-/// What callgrind counts.
+/// Runs the part that callgrind counts.
 #[inline(never)]
 fn counted<T>(run: impl FnOnce() -> T) -> T {
     run()

@@ -1,4 +1,4 @@
-//! What everybody else notices of a client that computes heavily: delays of calls and of `/joint_states`, lateness of the physics.
+//! The cost to everybody else of a client that computes heavily: delays of calls and of `/joint_states`, lateness of the physics.
 //!
 //! `cargo run --release --bin fairness -- PATH/TO/pendularm [SECONDS]`
 //!
@@ -34,7 +34,7 @@ fn connect(runtime: &Program, first: &[u8]) -> TcpStream {
     stream
 }
 
-/// What there is beside the clients that watch.
+/// The load beside the clients that watch.
 #[derive(Clone, Copy)]
 enum Beside {
     Nothing,
@@ -42,7 +42,7 @@ enum Beside {
     Computation,
 }
 
-/// What the others saw in one phase; delays in ms.
+/// Delays that the others saw in one phase \[ms\].
 #[derive(Default)]
 struct Phase {
     calls: Vec<f64>,

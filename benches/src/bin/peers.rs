@@ -307,7 +307,7 @@ impl Row {
         self.shortest.iter().copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// Of the passes' medians.
+    /// The median of the passes' medians.
     fn middle(&self) -> f64 {
         let mut medians = self.median.clone();
         medians.sort_unstable_by(f64::total_cmp);

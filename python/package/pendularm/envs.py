@@ -65,7 +65,7 @@ class _Task:
         raise NotImplementedError
 
     def further(self) -> list[Floats]:
-        """What is seen beside the joints, a row per arm."""
+        """Observations beside the joints, a row per arm."""
         return []
 
     def reward(self) -> Floats:

@@ -1,4 +1,4 @@
-"""What method and timestep do to the arm, predicted and measured: the answers of the services ``/study/*``.
+"""The effect of method and timestep on the arm, predicted and measured: the answers of the services ``/study/*``.
 
 Long computations release the interpreter's lock, and Ctrl-C ends them.
 """
@@ -62,7 +62,7 @@ class Stability:
     worst_pose: Floats | None
     """The pose of `minimum_over_poses_held` [rad], (links,)."""
     critical: Critical | None
-    """What grows there first."""
+    """The motion that grows there first."""
     timestep_limit_motion: float | None
     """Up to what timestep the method carries the motion that is ahead; `None` where nothing moves."""
     motion_speed: float
@@ -82,7 +82,7 @@ class Rollout:
     velocities: Floats
     """[rad/s], (samples, links)."""
     efforts: Floats
-    """Of the steps that led to the samples [N m], (samples, links)."""
+    """Efforts of the steps that led to the samples [N m], (samples, links)."""
     energy: Floats
     """Kinetic plus potential [J], (samples,)."""
     evaluations: int

@@ -53,7 +53,7 @@ class Run:
     velocities: Floats
     """[rad/s], (samples, arms, links)."""
     efforts: Floats
-    """Of the steps that led to the samples [N m], (samples, arms, links)."""
+    """Efforts of the steps that led to the samples [N m], (samples, arms, links)."""
     energy: Floats
     """Kinetic plus potential [J], (samples, arms)."""
     setpoint: Floats
@@ -67,7 +67,7 @@ Metric = Callable[[Run], NDArray[Any] | Mapping[str, NDArray[Any]]]
 
 
 class Executor(Protocol):
-    """Whatever hands out futures as `concurrent.futures` does."""
+    """Anything that hands out futures as `concurrent.futures` does."""
 
     def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
 
@@ -193,7 +193,7 @@ def sweep(
 
 @dataclass(frozen=True)
 class _Question:
-    """What is asked of every setting; it goes to the workers."""
+    """The question to every setting; it goes to the workers."""
 
     axes: dict[str, Any]
     fixed: dict[str, Any]
@@ -312,7 +312,7 @@ def _run(
                 if not under_way:
                     return
                 ended = wait(under_way, return_when=FIRST_COMPLETED).done
-                # Those that have failed last, so that whatever is finished is kept.
+                # Failed ones come last, so that all that is finished is kept.
                 for future in sorted(ended, key=lambda one: one.cancelled() or one.exception() is not None):
                     start = under_way.pop(future)
                     done[start] = future.result()

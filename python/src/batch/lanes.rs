@@ -75,7 +75,7 @@ impl Steps<'_> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Piece<'a> {
     pub(crate) steps: Steps<'a>,
-    /// What is added to the effort of all these steps, in place of what disturbs a lane.
+    /// Effort that is added in all these steps, in place of what disturbs a lane.
     pub(crate) effort: Option<&'a Rows<'a>>,
     /// Steps that have been taken, and how many more are taken now.
     pub(crate) done: u64,

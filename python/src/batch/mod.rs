@@ -197,7 +197,7 @@ impl Batch {
         })
     }
 
-    /// Where the controllers hold the arms: `positions` [rad] and `velocities` [rad/s] (zeros unless given).
+    /// Has the controllers hold the arms at `positions` [rad] and `velocities` [rad/s] (zeros unless given).
     #[pyo3(signature = (positions, velocities=None))]
     fn set_setpoint(
         &self,
@@ -362,7 +362,7 @@ impl Batch {
         self.windows.time.view.clone_ref(py)
     }
 
-    /// Which arms have left the finite numbers since their reset, (`n_arms`,); overwritten by the next call.
+    /// Arms that have left the finite numbers since their reset, (`n_arms`,); overwritten by the next call.
     #[getter]
     fn diverged(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.diverged.view.clone_ref(py)
@@ -374,7 +374,7 @@ impl Batch {
         for_either!(Either, &self.own, lanes => lanes::energies(&hold(py, lanes)).into_pyarray(py))
     }
 
-    /// Where the end effectors are [m], (`n_arms`, 2), in a fresh array.
+    /// Positions of the end effectors [m], (`n_arms`, 2), in a fresh array.
     #[getter]
     fn end_effector<'py>(&self, py: Python<'py>) -> PyResult<Held<'py, PyArray2<f64>>> {
         let flat = for_either!(Either, &self.own, lanes => lanes::end_effectors(&hold(py, lanes)));

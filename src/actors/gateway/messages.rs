@@ -154,7 +154,7 @@ impl Handled {
     }
 }
 
-/// Which topics and services clients have. From `rosapi`.
+/// Asks for the topics and services that clients have. From `rosapi`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Census")]
 pub struct TakeCensus;

@@ -31,7 +31,7 @@ use crate::record::RunSettings;
 pub struct Recorder<const N: usize> {
     arm: Recipient<Tell<N>>,
     registry: Recipient<Overhear>,
-    /// Where clients may have records made.
+    /// Folder in which clients may have records made.
     folder: Option<PathBuf>,
     settings: RunSettings,
     current: Option<Current>,

@@ -22,7 +22,7 @@ use crate::record::{Content, RecordEntry, RecordError, RunSettings, Scribe};
 /// The end of a record's file name.
 const EXTENSION: &str = "mcap";
 
-/// Where a record goes.
+/// Destination of a record.
 pub(super) struct TapeTarget {
     pub(super) path: PathBuf,
     /// Bytes after which it ends by itself, and other records beside it are counted; none for the operator's own.

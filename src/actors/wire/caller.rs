@@ -27,7 +27,7 @@ pub const SMALL_ANSWER: usize = 16 * 1024;
 pub const ROOM_TIME: Duration = Duration::from_secs(2);
 /// A call of one of the runtime's own services, as the registry has it.
 pub struct ServiceCall {
-    /// Which service.
+    /// The service that was called.
     pub service: Service,
     /// The caller's arguments, unread.
     pub arguments: Arguments,
@@ -49,7 +49,7 @@ pub struct TopicMessage {
     pub done: Done,
 }
 
-/// Where a response goes, and what it has to say of the call.
+/// Destination of a response, and what it has to say of the call.
 pub struct Address {
     service: Service,
     name: Box<str>,

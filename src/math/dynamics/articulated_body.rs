@@ -66,12 +66,7 @@ pub fn weightless_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    let mut turned = *q;
-    if let Some(first) = turned.first_mut() {
-        // A constant, whose sine and cosine the compiler takes.
-        *first = 0.0;
-    }
-    recursion::<N, false>(arm, &turned, qd, tau)
+    recursion::<N, false>(arm, q, qd, tau)
 }
 
 #[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
@@ -82,7 +77,11 @@ fn recursion<const N: usize, const WEIGHS: bool>(
     tau: &[f64; N],
 ) -> [f64; N] {
     let rods = &arm.rods;
-    let (sin, cos) = trig::sin_cos(q);
+    let (sin, cos) = if WEIGHS {
+        trig::sin_cos(q)
+    } else {
+        sin_cos_beyond_first(q)
+    };
     let mut rate = 0.0;
     let w: [f64; N] = std::array::from_fn(|i| {
         rate += qd[i];
@@ -130,6 +129,17 @@ fn recursion<const N: usize, const WEIGHS: bool>(
         inner = link;
         relative
     })
+}
+
+/// Sines and cosines of all angles but the first, for which those of 0 stand.
+#[inline(always)]
+fn sin_cos_beyond_first<const N: usize>(q: &[f64; N]) -> ([f64; N], [f64; N]) {
+    // The constant stands last, where the compiler takes its sine and cosine and finds the others side by side: with it
+    // in front a step of 3 links takes fewer instructions and half as long again.
+    let beyond = std::array::from_fn(|i| if i + 1 < N { q[i + 1] } else { 0.0 });
+    let (sin, cos) = trig::sin_cos(&beyond);
+    let from = |of: [f64; N]| std::array::from_fn(|i| of[(i + N - 1) % N]);
+    (from(sin), from(cos))
 }
 
 /// How the tip of a link accelerates across it: `t_y = free - along t_x - across p_y`.

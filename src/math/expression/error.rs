@@ -16,7 +16,7 @@ pub enum ExpressionError {
     /// A character that no token has.
     #[error("unrecognized character {found} at column {column}")]
     UnrecognizedCharacter {
-        /// Where it stands.
+        /// Its position.
         column: usize,
         /// The character.
         found: Found,
@@ -27,7 +27,7 @@ pub enum ExpressionError {
          the variable is t, the functions are sin, cos, tan, exp, sqrt, ln and abs"
     )]
     UnknownName {
-        /// Where it starts.
+        /// Its start.
         column: usize,
         /// The name.
         found: Found,
@@ -35,7 +35,7 @@ pub enum ExpressionError {
     /// A decimal point without a digit on either side, or an exponent without one.
     #[error("expected a digit at column {column}, after {found}")]
     ExpectedDigit {
-        /// Where the digit is missing.
+        /// Position of the missing digit.
         column: usize,
         /// The number as far as it goes.
         found: Found,
@@ -43,7 +43,7 @@ pub enum ExpressionError {
     /// Something else where a value must start.
     #[error("expected a number, t, a function, - or ( at column {column}, found {found}")]
     ExpectedOperand {
-        /// Where the value is missing.
+        /// Position of the missing value.
         column: usize,
         /// The text there.
         found: Found,
@@ -51,7 +51,7 @@ pub enum ExpressionError {
     /// Something else where only an operator or a closing parenthesis can follow.
     #[error("expected an operator at column {column}, found {found}")]
     ExpectedOperator {
-        /// Where the operator is missing.
+        /// Position of the missing operator.
         column: usize,
         /// The text there.
         found: Found,
@@ -61,7 +61,7 @@ pub enum ExpressionError {
     ExpectedArgument {
         /// The function.
         function: &'static str,
-        /// Where the parenthesis is missing.
+        /// Position of the missing parenthesis.
         column: usize,
         /// The text there.
         found: Found,
@@ -69,13 +69,13 @@ pub enum ExpressionError {
     /// A closing parenthesis too many.
     #[error("the ) at column {column} closes nothing")]
     Unopened {
-        /// Where it stands.
+        /// Its position.
         column: usize,
     },
     /// A closing parenthesis too few.
     #[error("the ( at column {column} is never closed")]
     Unclosed {
-        /// Where the innermost open one stands.
+        /// Position of the innermost open one.
         column: usize,
     },
 }

@@ -7,8 +7,8 @@ use glam::DVec2;
 
 /// The end effector's pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tip {
-    /// Where it is \[m\].
+pub struct EndEffector {
+    /// Its position \[m\].
     pub position: DVec2,
     /// Heading of the last link, `φₙ = q₁ + … + qₙ` \[rad\], not wrapped.
     pub orientation: f64,
@@ -16,15 +16,15 @@ pub struct Tip {
 
 /// The end effector's pose at joint angles `q` \[rad\], for links of `lengths` \[m\].
 #[must_use]
-pub fn forward<const N: usize>(lengths: &[f64; N], q: &[f64; N]) -> Tip {
+pub fn forward<const N: usize>(lengths: &[f64; N], q: &[f64; N]) -> EndEffector {
     let position = joints(lengths, q).last().copied().unwrap_or(DVec2::ZERO);
-    Tip {
+    EndEffector {
         position,
         orientation: q.iter().sum(),
     }
 }
 
-/// Where each link ends \[m\]; the last is the end effector.
+/// Positions of the links' ends \[m\]; the last is the end effector.
 #[must_use]
 pub fn joints<const N: usize>(lengths: &[f64; N], q: &[f64; N]) -> [DVec2; N] {
     let mut heading = DVec2::X;

@@ -157,7 +157,7 @@ impl Chain {
         }
     }
 
-    /// Where the wrist must be for the end effector to point along `phi`, and `phi`.
+    /// The place of the wrist with which the end effector points along `phi`, and `phi`.
     fn wrist_for(
         &self,
         phi: f64,
@@ -194,7 +194,7 @@ impl Chain {
         })
     }
 
-    /// Where the wrist must be for the admissible orientation nearest to the present one, and that orientation.
+    /// The place of the wrist for the admissible orientation nearest to the present one, and that orientation.
     fn nearest_wrist<const N: usize>(
         &self,
         end_effector: DVec2,

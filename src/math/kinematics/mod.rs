@@ -1,4 +1,4 @@
-//! Where the end effector is, and how the joints must stand to put it somewhere: forward and closed-form inverse
+//! The end effector's pose, and the joint positions that put it somewhere: forward and closed-form inverse
 //! kinematics.
 //!
 //! `x = Σ lᵢ cos φᵢ`, `y = Σ lᵢ sin φᵢ`, `φᵢ = q₁ + … + qᵢ`; angles in rad, counter-clockwise, each relative to the
@@ -21,7 +21,7 @@ use std::fmt;
 use glam::DVec2;
 
 pub use angle::{nearest_turn, turn, wrap};
-pub use forward::{Tip, forward, heading, joints};
+pub use forward::{EndEffector, forward, heading, joints};
 pub use inverse::{BOUNDARY, solve};
 
 /// A target of inverse kinematics.

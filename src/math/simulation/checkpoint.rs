@@ -14,7 +14,7 @@ pub struct Checkpoint<const N: usize> {
     pub arm: Arm<N>,
     /// The controller's gains.
     pub gains: Gains<N>,
-    /// Where the arm is to be held.
+    /// The setpoint at which the arm is to be held.
     pub setpoint: Setpoint<N>,
     /// Integral of the position error \[rad s\].
     pub integral: [f64; N],

@@ -20,7 +20,7 @@ pub enum ArmInput<const N: usize> {
     Gains(Gains<N>),
     /// The controller on or off.
     Enabled(bool),
-    /// Where the arm is to be held.
+    /// The setpoint at which the arm is to be held.
     Setpoint(Setpoint<N>),
     /// An effort that is added for a while.
     Disturbance {

@@ -64,7 +64,7 @@ pub enum Action {
     SendGoal {
         /// Names this request in the answer.
         ticket: u64,
-        /// Where to.
+        /// The target.
         target: Target,
         /// When it counts as reached.
         criteria: Criteria,

@@ -8,9 +8,9 @@ use super::entry::{Field, ServiceEntry, optional, required, service};
 use super::node::Node;
 use super::table::{fields, table};
 
-/// Where the questions stand.
+/// The questions' names begin with this.
 pub const PREFIX: &str = "/rosapi/";
-/// Where they stand too.
+/// Their other names begin with this.
 pub const PRIVATE_PREFIX: &str = "/rosapi_node/";
 
 table! {
@@ -141,7 +141,7 @@ table! {
         /// The simulation time.
         GetTime = question("/rosapi/get_time", "rosapi_msgs/srv/GetTime")
             .response(fields![required("time", "builtin_interfaces/msg/Time", "s, ns")]),
-        /// Which ROS this looks like.
+        /// The ROS that this looks like.
         GetRosVersion = question("/rosapi/get_ros_version", "rosapi_msgs/srv/GetROSVersion")
             .response(fields![
                 required("version", "uint8", ""),

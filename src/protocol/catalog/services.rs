@@ -130,7 +130,7 @@ table! {
         TrialSkip = service("/ik_trial/skip", "pendularm_interfaces/srv/TrialSkip", Node::IkTrial),
         /// Ends the trial.
         TrialStop = service("/ik_trial/stop", "pendularm_interfaces/srv/TrialStop", Node::IkTrial),
-        /// Which topic has the frames that web viewers want.
+        /// The topic that has the frames which web viewers want.
         RepublishTfs = service("/republish_tfs", "tf2_web_republisher/srv/RepublishTFs", Node::TfRepublisher)
             .request(fields![
                 optional("source_frames", "string[]", ""),

@@ -61,9 +61,9 @@ table! {
             required("desired_positions", "float64[]", "rad"),
             required("action_status", "string", ""),
         ]),
-        /// Where the links are, 60 Hz.
+        /// Poses of the links, 60 Hz.
         Tf = published("/tf", Node::ArmSim, "tf2_msgs/msg/TFMessage", &TRANSFORMS),
-        /// Where the end effector is on its link.
+        /// The end effector's pose on its link.
         TfStatic = published("/tf_static", Node::ArmSim, "tf2_msgs/msg/TFMessage", &TRANSFORMS)
             .latched(),
         /// Every frame as seen from the world, 30 Hz: for web viewers.

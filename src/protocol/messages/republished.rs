@@ -9,7 +9,7 @@ use super::scene::{
 };
 use crate::protocol::messages::Stamp;
 
-/// Where a frame is in the plane.
+/// Pose of a frame in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FramePose {
     /// \[m\].

@@ -39,7 +39,7 @@ pub struct TransformStamped {
     pub header: OwnedHeader,
     /// The frame.
     pub child_frame_id: String,
-    /// Where it is.
+    /// Its place.
     pub transform: Transform,
 }
 
@@ -96,11 +96,11 @@ pub struct LogMessage<'a> {
     pub name: &'a str,
     /// The event, in words.
     pub msg: &'a str,
-    /// Where in the source.
+    /// File of the source.
     pub file: &'a str,
     /// Empty.
     pub function: &'a str,
-    /// Where in the file.
+    /// Line in the file.
     pub line: u32,
 }
 

@@ -23,13 +23,13 @@ pub enum TrajectoryError {
     /// A field is absent.
     #[error("{field} is required")]
     Missing {
-        /// Where.
+        /// The field's path in the message.
         field: String,
     },
     /// A field is not what it has to be.
     #[error("{field} must be {expected}, got {found}")]
     Mistyped {
-        /// Where.
+        /// The field's path in the message.
         field: String,
         /// The kind of value that it has to be.
         expected: &'static str,
@@ -42,7 +42,7 @@ pub enum TrajectoryError {
     /// The positions are not one per joint.
     #[error("{field} must have {expected} entries, got {got}{}", lacking(.missing))]
     Length {
-        /// Where.
+        /// The field's path in the message.
         field: String,
         /// Joints of the arm.
         expected: usize,
@@ -54,7 +54,7 @@ pub enum TrajectoryError {
     /// A position is infinite or no number.
     #[error("{field} must be a finite number")]
     NotFinite {
-        /// Which entry.
+        /// The entry's path in the message.
         field: String,
     },
 }

@@ -110,12 +110,12 @@ pub enum Op {
     Pursue {
         /// Action name.
         action: String,
-        /// Which of them.
+        /// The op.
         pursuit: PursuerOp,
     },
     /// A piece of a longer frame.
     Fragment(Piece),
-    /// Which statuses the sender wants from now on, and how it wants to be told why a call failed.
+    /// Statuses that the sender wants from now on, and how it wants to be told why a call failed.
     SetLevel {
         /// The statuses.
         verbosity: Verbosity,

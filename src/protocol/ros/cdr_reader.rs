@@ -28,7 +28,7 @@ pub enum CdrError {
     /// A text that is not UTF-8, or has no NUL behind it.
     #[error("no text at byte {0}")]
     Text(
-        /// Where it begins.
+        /// Position of its first byte.
         usize,
     ),
     /// A type that is not known here.

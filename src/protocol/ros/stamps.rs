@@ -38,7 +38,7 @@ pub fn with_ros1_names(frame: &[u8]) -> Bytes {
 
 /// A stamp in a text.
 struct StampText<'a> {
-    /// Where it ends.
+    /// Its end in the text.
     end: usize,
     seconds: &'a [u8],
     nanoseconds: &'a [u8],

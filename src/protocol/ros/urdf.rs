@@ -1,7 +1,7 @@
 //! The arm as 3D tools draw it: URDF from lengths and masses.
 //!
-//! One link per rod, `link1` to `linkN`, `world` before the first and `hand` behind the last; joint `i` turns about z.
-//! At `q = 0` all lie along +x. Frames of the same names are what `/tf` moves.
+//! One link per rod, `link1` to `linkN`, `world` before the first and [`END_EFFECTOR`] behind the last; joint `i` turns
+//! about z. At `q = 0` all lie along +x. Frames of the same names are what `/tf` moves.
 //!
 //! **Invariant:** the inertia told is that of the dynamics: a thin uniform rod.
 

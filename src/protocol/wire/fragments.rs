@@ -28,11 +28,11 @@ pub const MIN_SIZE: usize = 64;
 /// A piece of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Piece {
-    /// Which message, as the sender names it (any JSON value's text).
+    /// The message, as the sender names it (any JSON value's text).
     pub id: String,
     /// The text.
     pub data: String,
-    /// Which piece, from 0.
+    /// The piece's number, from 0.
     pub num: usize,
     /// How many there are.
     pub total: usize,

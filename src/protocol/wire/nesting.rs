@@ -1,4 +1,4 @@
-//! Where one JSON object ends: the scan behind the [frame reader](super::frame).
+//! The end of one JSON object: the scan behind the [frame reader](super::frame).
 //!
 //! **Invariant:** the state after a byte depends on the bytes so far, not on how they were cut up.
 
@@ -15,7 +15,7 @@ pub(super) enum Event {
     TooDeep,
 }
 
-/// Where in an object the scan is: the brackets that are open, and whether it is inside a string.
+/// State of the scan in an object: the brackets that are open, and whether it is inside a string.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nesting {
     depth: usize,

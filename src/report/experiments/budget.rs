@@ -1,4 +1,4 @@
-//! Where an error comes from: truncation, rounding, and the effort held for a step.
+//! Origins of an error: truncation, rounding, and the effort held for a step.
 //!
 //! With `live` the live arm's steps in doubles, `exact` the same steps with 106 bits, `plant` the true motion under the
 //! effort that these steps hold, and `law` the true motion under the law at every instant:

@@ -9,7 +9,7 @@
 //! | aliased | the sampling: where a period falls on whole steps every step sees the same force |
 //! | growing | nothing, in parts of what it has grown to |
 //!
-//! Where a kink lies within its step decides about its error, so several kinks are tried and the mean of squares is
+//! The place of a kink within its step decides about its error, so several kinks are tried and the mean of squares is
 //! taken.
 //!
 //! **Invariant:** what is run is the service's own computation, expression and all.
@@ -45,7 +45,7 @@ pub struct Force {
     pub order: fn(Method) -> u32,
     /// The function for the service, with this `c`.
     function: fn(f64) -> String,
-    /// Where the particle is, from rest at 0, with this `c` \[m\].
+    /// Position of the particle, from rest at 0, with this `c` \[m\].
     exact: fn(f64, f64) -> f64,
     /// Whether `c` matters.
     varied: bool,

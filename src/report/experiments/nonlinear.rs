@@ -85,7 +85,7 @@ pub fn is_carried(start: &State<2>, method: Method, timestep: f64) -> bool {
 /// hanging pose to rest on the other side, and back.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PeriodicSwing {
-    /// Where it is at rest.
+    /// Its state at rest.
     pub start: State<2>,
     /// Its period \[s\].
     pub period: f64,

@@ -1,4 +1,4 @@
-//! Where explicit methods end: the cost of an error as the arm gets stiffer, beside two implicit methods.
+//! The limits of explicit methods: the cost of an error as the arm gets stiffer, beside two implicit methods.
 //!
 //! The arm is let go from a bent pose, with a brake at its elbow: an effort `-d q̇₂` at every instant. The stronger
 //! the brake, or the lighter the link that it brakes, the faster the elbow's own rate `d (M⁻¹)₂₂` beside that of the

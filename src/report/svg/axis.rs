@@ -70,7 +70,7 @@ impl Axis {
         }
     }
 
-    /// Where `value` lies: 0 at the start of the axis, 1 at its end.
+    /// The place of `value`: 0 at the start of the axis, 1 at its end.
     pub(crate) fn place(&self, value: f64) -> f64 {
         match self.scale {
             Scale::Log => (value / self.min).log10() / (self.max / self.min).log10(),

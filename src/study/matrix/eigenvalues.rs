@@ -29,8 +29,9 @@ impl Matrix {
         Hessenberg::new(&matrix).eigenvalues()
     }
 
-    /// A diagonal similarity, in powers of two and so exact, that makes rows and columns alike in size. Velocities beside
-    /// positions, or a tip of a milligram beside a link of a kilogram, would otherwise drown the small eigenvalues.
+    /// A diagonal similarity, in powers of two and so exact, that makes rows and columns alike in size. Velocities
+    /// beside positions, or an outer link of a milligram beside a link of a kilogram, would otherwise drown the small
+    /// eigenvalues.
     fn balance(&mut self) {
         let n = self.n;
         // Each pass at least halves some row or column by 5 %; a dozen passes settle what can be settled.

@@ -106,8 +106,8 @@ impl Matrix {
         self
     }
 
-    /// The solution `x` of `self · x = b`, by elimination with partial pivoting; `None` if the matrix is singular or `b` has
-    /// not n entries.
+    /// The solution `x` of `self · x = b`, by elimination with partial pivoting; `None` if the matrix is singular or
+    /// `b` has not n entries.
     #[must_use]
     pub fn solve(&self, b: &[f64]) -> Option<Vec<f64>> {
         let n = self.n;
@@ -236,7 +236,7 @@ mod tests {
         let matrix = Matrix::from_fn(3, |row, column| {
             [[0.0, 2.0, 1.0], [1.0, -1.0, 3.0], [4.0, 0.5, -2.0]][row][column]
         });
-        // Of x = (1, -2, 3): exact in a few units of rounding.
+        // The solution is (1, -2, 3), exact in a few units of rounding.
         let x = matrix.solve(&[-1.0, 12.0, -3.0]).unwrap();
         for (x, expected) in x.iter().zip([1.0, -2.0, 3.0]) {
             assert!((x - expected).abs() < 1e-14);

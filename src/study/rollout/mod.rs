@@ -1,10 +1,10 @@
 //! An offline run of the arm, sample by sample, with its error against a reference.
 //!
-//! The run is the live loop, [`Simulation`], from any state. Its reference obeys the very same control law, looked at on the
-//! same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what is
-//! left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost an
-//! error of first order that no method can mend.) A second reference, cut into other spans, says how far
-//! the first can be trusted: on a chaotic swing not beyond some twenty seconds.
+//! The run is the live loop, [`Simulation`], from any state. Its reference obeys the very same control law, looked at
+//! on the same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what
+//! is left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost
+//! an error of first order that no method can mend.) A second reference, cut into other spans, says how far the first
+//! can be trusted: on a chaotic swing not beyond some twenty seconds.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -37,7 +37,8 @@ pub struct Deviation {
     pub uncertainties: Vec<f64>,
 }
 
-/// How many times its uncertainty an error is at least: below that, how far the reference itself is off would show in it.
+/// How many times its uncertainty an error is at least: below that, how far the reference itself is off would show in
+/// it.
 const ABOVE_UNCERTAINTY: f64 = 4.0;
 
 impl Deviation {
@@ -116,7 +117,8 @@ impl<const N: usize> Rollout<N> {
         let bound = before.saturating_add(work.max(1));
         while !self.is_over() {
             if !self.is_behind() {
-                // To the next sample or, if a reference has to look at every step, so far that the work stays in bounds.
+                // To the next sample or, if a reference has to look at every step, so far that the work stays in
+                // bounds.
                 let ahead = self.next_sample().saturating_sub(self.simulation.steps());
                 let wanted = ahead.min(self.stride()).max(1);
                 let taken = self.simulation.advance(wanted);
@@ -256,7 +258,7 @@ impl<const N: usize> Rollout<N> {
         self.references.as_ref().map(|_| &self.deviation)
     }
 
-    /// Where the run left the finite numbers, if it did; the samples end before.
+    /// The place at which the run left the finite numbers, if it did; the samples end before.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.simulation.divergence()
@@ -300,7 +302,8 @@ impl<const N: usize> Default for Behind<N> {
 }
 
 impl<const N: usize> Reference<N> {
-    /// The run has gone on by `steps` steps of `timestep` \[s\]: one at a time if there is a law to obey, else all at once.
+    /// The run has gone on by `steps` steps of `timestep` \[s\]: one at a time if there is a law to obey, else all at
+    /// once.
     fn fall_behind(&mut self, timestep: f64, steps: u64) {
         if self.lost || steps == 0 {
             return;

@@ -18,7 +18,7 @@ pub const MAX_SAMPLES: u64 = 100_000;
 pub struct Plan<const N: usize> {
     /// The loop that the steps obey.
     pub control: ControlLoop<N>,
-    /// Where the arm starts.
+    /// The arm's state at the start.
     pub start: State<N>,
     /// How long \[s\]; the run ends with the last whole step within it.
     pub duration: f64,
@@ -78,7 +78,8 @@ pub enum RolloutError {
 }
 
 impl<const N: usize> Plan<N> {
-    /// How many whole steps the duration holds. A quotient that falls short of a whole number by rounding counts as that.
+    /// How many whole steps the duration holds. A quotient that falls short of a whole number by rounding counts as
+    /// that.
     ///
     /// # Errors
     /// The first value that is out of bounds.

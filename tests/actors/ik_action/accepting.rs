@@ -1,4 +1,4 @@
-//! What is accepted and what is rejected; what a new goal sets in motion.
+//! Goals that are accepted and goals that are rejected; what a new goal sets in motion.
 
 use super::*;
 
@@ -30,11 +30,12 @@ fn a_goal_is_answered_with_its_id_and_then_its_trajectory_goes_out() {
 #[test]
 fn goal_ids_are_unique() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
         let mut ids = std::collections::BTreeSet::new();
         for _ in 0..100 {
-            assert!(ids.insert(client.send_goal(elsewhere()).await));
-            client.refusal(SEND, json!({"x": 5, "y": 5})).await;
+            assert!(ids.insert(stage.send_goal(elsewhere()).await));
+            let refused = asked(&stage.action, to(5.0, 5.0)).await;
+            assert!(matches!(refused, Err(GoalRejected::Unsolved(_))));
         }
     });
 }
@@ -42,8 +43,8 @@ fn goal_ids_are_unique() {
 #[test]
 fn sending_a_goal_never_enables_the_controller() {
     in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.send_goal(elsewhere()).await;
+        let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
+        stage.send_goal(elsewhere()).await;
         pass(ms(1000)).await;
         let simulation = stage.simulation().await;
         assert!(!simulation.pid().is_enabled());
@@ -80,12 +81,12 @@ fn every_bad_field_is_named_and_the_values_are_empty() {
 #[test]
 fn null_in_an_optional_field_means_absent() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<3>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<3>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
-        client
-            .send_goal(json!({"x": 1, "y": 1, "phi": null, "epsilon": null, "success_hold": null}))
-            .await;
-        client.ask(CANCEL, json!({})).await;
+        let nulls = json!({"x": 1, "y": 1, "phi": null, "epsilon": null, "success_hold": null});
+        client.ask(SEND, nulls).await;
+        stage.cancel().await.unwrap();
+        client.settle().await;
         let result = &client.messages(RESULT)[0];
         assert_eq!(result["target"], json!({"x": 1.0, "y": 1.0}));
         client.refusal(SEND, json!({"x": null, "y": 1})).await;
@@ -95,13 +96,14 @@ fn null_in_an_optional_field_means_absent() {
 #[test]
 fn the_target_echoes_x_and_y_and_phi_where_one_was_asked_for() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<3>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<3>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
-        client
-            .send_goal(json!({"x": 1, "y": 0.5, "phi": 0.75}))
-            .await;
-        client.send_goal(json!({"x": 1, "y": 0.5})).await;
-        client.ask(CANCEL, json!({})).await;
+        let mut oriented = to(1.0, 0.5);
+        oriented.target.orientation = Some(0.75);
+        stage.send_goal(oriented).await;
+        stage.send_goal(to(1.0, 0.5)).await;
+        stage.cancel().await.unwrap();
+        client.settle().await;
         let targets: Vec<Value> = client
             .messages(RESULT)
             .iter()
@@ -120,12 +122,13 @@ fn the_target_echoes_x_and_y_and_phi_where_one_was_asked_for() {
 #[test]
 fn two_links_ignore_phi_in_a_goal_too() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
         client
-            .send_goal(json!({"x": 1, "y": 0.5, "phi": "north"}))
+            .ask(SEND, json!({"x": 1, "y": 0.5, "phi": "north"}))
             .await;
-        client.ask(CANCEL, json!({})).await;
+        stage.cancel().await.unwrap();
+        client.settle().await;
         let result = &client.messages(RESULT)[0];
         assert_eq!(result["target"], json!({"x": 1.0, "y": 0.5}));
     });
@@ -137,14 +140,13 @@ fn a_goals_joints_are_within_pi_of_the_present_positions() {
     in_virtual_time(async {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe("/joint_trajectory").await;
-        client.enable().await;
-        client.publish_trajectory(json!([14.0, -9.0])).await;
+        stage.enable().await;
+        stage.hold([14.0, -9.0]).await;
         pass(ms(8000)).await;
-        client.heard.clear();
         for (x, y) in [(1.0, 1.0), (-1.5, 0.1), (-1.5, -0.1), (0.0, -0.5)] {
             let present = stage.simulation().await.state().position;
             assert!(present[0] > 9.0 && present[1] < -5.0, "{present:?}");
-            client.send_goal(json!({"x": x, "y": y})).await;
+            stage.send_goal(to(x, y)).await;
             let trajectory = client.message("/joint_trajectory").await;
             let positions = numbers(&trajectory["points"][0]["positions"]);
             for (joint, present) in positions.iter().zip(present) {
@@ -161,13 +163,12 @@ fn a_rejected_goal_changes_nothing() {
         client.subscribe(RESULT).await;
         client.subscribe(FEEDBACK).await;
         client.subscribe("/joint_trajectory").await;
-        let goal_id = client.send_goal(elsewhere()).await;
-        client.message("/joint_trajectory").await;
+        let goal_id = stage.send_goal(elsewhere()).await;
         client.settle().await;
         let setpoint = *stage.simulation().await.pid().setpoint();
         client.heard.clear();
+        assert!(asked(&stage.action, to(2.1, 0.0)).await.is_err());
         for args in [
-            json!({"x": 2.1, "y": 0}),
             json!({"x": 1}),
             json!({"x": 1, "y": 0, "epsilon": -1}),
             json!({"x": 1, "y": 0, "success_hold": "long"}),

@@ -6,15 +6,17 @@ use super::*;
 #[test]
 fn a_preempting_goal_comes_after_the_old_result_and_before_its_own_trajectory() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         for topic in [RESULT, FEEDBACK, "/joint_trajectory"] {
             client.subscribe(topic).await;
         }
-        let old = client.send_goal(elsewhere()).await;
+        let old = stage.send_goal(elsewhere()).await;
         // Between two feedback messages.
         client.messages_for(ms(105), RESULT).await;
         client.heard.clear();
-        let new = client.send_goal(here(0.0)).await;
+        let at_once = json!({"x": 2, "y": 0, "epsilon": 0.1, "success_hold": 0});
+        let values = client.ask(SEND, at_once).await;
+        let new = values["goal_id"].as_str().unwrap().to_owned();
         client.messages_for(ms(100), RESULT).await;
         let expected = [
             format!("{RESULT} {old} preempted"),
@@ -25,7 +27,7 @@ fn a_preempting_goal_comes_after_the_old_result_and_before_its_own_trajectory() 
         ];
         assert_eq!(client.story(), expected);
         let old = &client.messages(RESULT)[0];
-        // The hand is at (2, 0), the old target at (1, 1).
+        // The end effector is at (2, 0), the old target at (1, 1).
         let distance = number(&old["final_distance"]);
         assert!((distance - std::f64::consts::SQRT_2).abs() < ROUNDING);
     });
@@ -36,15 +38,16 @@ fn a_preempting_goal_comes_after_the_old_result_and_before_its_own_trajectory() 
 #[test]
 fn a_goal_reached_in_the_instant_of_the_next_has_one_result_and_it_says_reached() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
         for _ in 0..10 {
-            let old = client.send_goal(here(0.25)).await;
+            let old = stage.send_goal(here(0.25)).await;
+            client.settle().await;
             pass(ms(253)).await;
             client.heard.clear();
-            client.send_goal(elsewhere()).await;
-            let expected = [format!("{RESULT} {old} reached"), SEND.to_owned()];
-            assert_eq!(client.story(), expected);
+            stage.send_goal(elsewhere()).await;
+            client.settle().await;
+            assert_eq!(client.story(), [format!("{RESULT} {old} reached")]);
             let more = client.messages_for(ms(100), RESULT).await;
             assert!(more.is_empty());
         }
@@ -56,24 +59,19 @@ fn every_goal_has_exactly_one_result() {
     in_virtual_time(async {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
-        let mut other = stage.connect();
         let mut sent = Vec::new();
-        // Goals of two clients, some reached, some replaced, some cancelled, some lost to a reset.
+        // Goals, some reached, some replaced, some cancelled, some lost to a reset.
         for round in 0_u64..60 {
-            sent.push(client.send_goal(here(0.02)).await);
+            sent.push(stage.send_goal(here(0.02)).await);
             pass(ms(round % 31)).await;
             match round % 4 {
-                0 => sent.push(other.send_goal(elsewhere()).await),
-                1 => {
-                    other.call(CANCEL, json!({})).await;
-                }
-                2 => {
-                    other.ask("/arm_sim/reset", json!({})).await;
-                }
+                0 => sent.push(stage.send_goal(elsewhere()).await),
+                1 => drop(stage.cancel().await),
+                2 => stage.reset().await,
                 _ => {}
             }
         }
-        client.call(CANCEL, json!({})).await;
+        let _ = stage.cancel().await;
         client.messages_for(ms(1000), RESULT).await;
         let results = client.messages(RESULT);
         let mut ended: Vec<&str> = results
@@ -99,11 +97,11 @@ fn what_one_connection_sends_takes_effect_in_order_without_waiting_for_answers()
         client.subscribe(RESULT).await;
         client.heard.clear();
         for frame in [
-            call(SEND, &elsewhere()),
-            call(SEND, &here(5.0)),
+            call(SEND, &elsewhere_as_args()),
+            call(SEND, &elsewhere_as_args()),
             call(CANCEL, &json!({})),
             call(CANCEL, &json!({})),
-            call(SEND, &elsewhere()),
+            call(SEND, &elsewhere_as_args()),
             call("/arm_sim/reset", &json!({})),
             call(CANCEL, &json!({})),
         ] {
@@ -136,10 +134,10 @@ fn what_one_connection_sends_takes_effect_in_order_without_waiting_for_answers()
 #[test]
 fn cancelling_publishes_the_result_and_then_answers_with_nothing() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
         for named in [false, true] {
-            let goal_id = client.send_goal(elsewhere()).await;
+            let goal_id = stage.send_goal(elsewhere()).await;
             client.heard.clear();
             let args = if named {
                 json!({"goal_id": goal_id})
@@ -156,32 +154,40 @@ fn cancelling_publishes_the_result_and_then_answers_with_nothing() {
 #[test]
 fn cancelling_without_an_active_goal_is_rejected() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        assert_eq!(client.refusal(CANCEL, json!({})).await, "no goal is active");
-        let goal_id = client.send_goal(elsewhere()).await;
-        client.ask(CANCEL, json!({})).await;
-        let again = client.refusal(CANCEL, json!({"goal_id": goal_id})).await;
-        assert_eq!(again, "no goal is active");
+        let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
+        assert_eq!(stage.cancel().await, Err(CancelRejected::NotActive));
+        let goal_id = Some(stage.send_goal(elsewhere()).await);
+        assert_eq!(stage.cancel().await, Ok(()));
+        let again = asked(&stage.action, CancelGoal { goal_id }).await;
+        assert_eq!(again, Err(CancelRejected::NotActive));
     });
 }
 
 #[test]
 fn cancelling_another_goal_or_a_malformed_id_is_rejected_without_side_effects() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
-        let old = client.send_goal(elsewhere()).await;
-        let active = client.send_goal(elsewhere()).await;
+        let old = stage.send_goal(elsewhere()).await;
+        let active = stage.send_goal(elsewhere()).await;
+        client.settle().await;
         client.heard.clear();
-        for goal_id in [json!(old), json!(""), json!(7), json!([active])] {
-            let response = client.call(CANCEL, json!({"goal_id": goal_id})).await;
+        for another in [&old, ""] {
+            let goal_id = Some(another.to_owned());
+            let refused = asked(&stage.action, CancelGoal { goal_id }).await;
+            let active = active.clone();
+            assert_eq!(refused, Err(CancelRejected::OtherGoal { active }));
+        }
+        for malformed in [json!(7), json!([active])] {
+            let response = client.call(CANCEL, json!({"goal_id": malformed})).await;
             assert_eq!(response["result"], false);
             assert_eq!(response["values"], json!({}));
             let why = response["status"].as_str().unwrap();
             assert!(why.starts_with("goal_id "), "{why}");
         }
         assert!(client.messages(RESULT).is_empty());
-        client.ask(CANCEL, json!({"goal_id": active})).await;
+        let goal_id = Some(active);
+        assert_eq!(asked(&stage.action, CancelGoal { goal_id }).await, Ok(()));
     });
 }
 
@@ -191,7 +197,8 @@ fn goals_outlive_the_client_that_made_them() {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(RESULT).await;
         let mut other = stage.connect();
-        let goal_id = other.send_goal(here(1.0)).await;
+        let goal = json!({"x": 2, "y": 0, "epsilon": 0.1, "success_hold": 1});
+        let goal_id = other.ask(SEND, goal).await["goal_id"].take();
         drop(other);
         let result = client.message(RESULT).await;
         assert_eq!(result["goal_id"], goal_id);
@@ -248,17 +255,7 @@ fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
         };
         let ik = Ik::<2>::new(silent.recipient()).start();
         let action = IkAction::new(ik.recipient(), tracker, noting.recipient()).start();
-        let goals = (0..3).map(|_| {
-            let goal = SendGoal {
-                target: Target {
-                    position: glam::DVec2::ONE,
-                    orientation: None,
-                },
-                criteria: Criteria::default(),
-                owner: None,
-            };
-            ask(&action.clone().recipient(), goal)
-        });
+        let goals = (0..3).map(|_| ask(&action.clone().recipient(), elsewhere()));
         for goal in goals.collect::<Vec<_>>() {
             goal.await.unwrap().unwrap();
         }

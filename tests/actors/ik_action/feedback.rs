@@ -5,10 +5,10 @@ use super::*;
 #[test]
 fn feedback_tells_goal_target_setpoint_distance_and_time() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(FEEDBACK).await;
         client.subscribe("/joint_trajectory").await;
-        let goal_id = client.send_goal(elsewhere()).await;
+        let goal_id = stage.send_goal(elsewhere()).await;
         let trajectory = client.message("/joint_trajectory").await;
         let feedback = client.message(FEEDBACK).await;
         assert_eq!(feedback.as_object().unwrap().len(), 5);
@@ -25,9 +25,9 @@ fn feedback_tells_goal_target_setpoint_distance_and_time() {
 #[test]
 fn feedback_comes_60_times_per_second_of_simulation_progress() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(FEEDBACK).await;
-        client.send_goal(elsewhere()).await;
+        stage.send_goal(elsewhere()).await;
         client.messages_for(ms(2000), FEEDBACK).await;
         client.settle().await;
         assert_eq!(client.messages(FEEDBACK).len(), 120);
@@ -47,12 +47,14 @@ fn feedback_comes_60_times_per_second_of_simulation_progress() {
 #[test]
 fn where_steps_are_longer_there_is_one_feedback_per_step() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client
-            .ask("/arm_sim/set_integrator", json!({"timestep": 0.1}))
-            .await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let longer = SetIntegrator {
+            timestep: Some(0.1),
+            ..SetIntegrator::default()
+        };
+        asked(&stage.arm, longer).await;
         client.subscribe(FEEDBACK).await;
-        client.send_goal(elsewhere()).await;
+        stage.send_goal(elsewhere()).await;
         client.messages_for(ms(2010), FEEDBACK).await;
         assert_eq!(client.messages(FEEDBACK).len(), 20);
     });
@@ -61,13 +63,14 @@ fn where_steps_are_longer_there_is_one_feedback_per_step() {
 #[test]
 fn without_an_active_goal_there_is_no_feedback() {
     in_virtual_time(async {
-        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(FEEDBACK).await;
         let before = client.messages_for(ms(1000), FEEDBACK).await;
         assert!(before.is_empty());
-        client.send_goal(elsewhere()).await;
+        stage.send_goal(elsewhere()).await;
         pass(ms(200)).await;
-        client.ask(CANCEL, json!({})).await;
+        stage.cancel().await.unwrap();
+        client.settle().await;
         client.heard.clear();
         let after = client.messages_for(ms(1000), FEEDBACK).await;
         assert!(after.is_empty());
@@ -80,9 +83,9 @@ fn a_trajectory_from_somebody_else_moves_the_setpoint_and_nothing_of_the_goal() 
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
         client.subscribe(FEEDBACK).await;
         client.subscribe(RESULT).await;
-        let goal_id = client.send_goal(elsewhere()).await;
+        let goal_id = stage.send_goal(elsewhere()).await;
         let before = client.message(FEEDBACK).await;
-        stage.connect().publish_trajectory(json!([0.25, 0.5])).await;
+        stage.hold([0.25, 0.5]).await;
         let setpoint = *stage.simulation().await.pid().setpoint();
         assert_eq!(setpoint.position, [0.25, 0.5]);
         client.heard.clear();
@@ -90,7 +93,7 @@ fn a_trajectory_from_somebody_else_moves_the_setpoint_and_nothing_of_the_goal() 
         assert_eq!(after["goal_id"], goal_id);
         assert_eq!(after["positions"], before["positions"]);
         assert!(client.messages(RESULT).is_empty());
-        client.ask(CANCEL, json!({"goal_id": goal_id})).await;
+        assert_eq!(stage.cancel().await, Ok(()));
     });
 }
 
@@ -99,15 +102,14 @@ fn a_trajectory_from_somebody_else_moves_the_setpoint_and_nothing_of_the_goal() 
 fn feedback_goes_to_whoever_subscribes_and_stops_with_the_subscription() {
     in_virtual_time(async {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.send_goal(elsewhere()).await;
+        stage.send_goal(elsewhere()).await;
         pass(ms(1000)).await;
-        let mut other = stage.connect();
-        other.subscribe(FEEDBACK).await;
-        let first = other.message(FEEDBACK).await;
+        client.subscribe(FEEDBACK).await;
+        let first = client.message(FEEDBACK).await;
         assert!(number(&first["elapsed"]) > 1.0 - STEP);
-        other.unsubscribe(FEEDBACK).await;
-        other.heard.clear();
-        let after = other.messages_for(ms(500), FEEDBACK).await;
+        client.unsubscribe(FEEDBACK).await;
+        client.heard.clear();
+        let after = client.messages_for(ms(500), FEEDBACK).await;
         assert!(after.is_empty());
     });
 }
@@ -142,16 +144,7 @@ fn nothing_is_encoded_for_a_topic_that_nobody_wants() {
             for topic in [Topic::IkFeedback, Topic::IkResult] {
                 action.send(Interest { topic, wanted }).await.unwrap();
             }
-            let goal = SendGoal {
-                target: Target {
-                    position: glam::DVec2::ONE,
-                    orientation: None,
-                },
-                criteria: Criteria::default(),
-                owner: None,
-            };
-            let answer = ask(&action.clone().recipient(), goal).await;
-            let goal_id = answer.unwrap().unwrap();
+            let goal_id = asked(&action, elsewhere()).await.unwrap();
             let number: u64 = goal_id.strip_prefix("goal-").unwrap().parse().unwrap();
             for outcome in [None, Some(Outcome::Reached)] {
                 let judged = GoalJudged {

@@ -1,8 +1,11 @@
 //! Goals from end to end, in virtual time: what is accepted, what is said in which order, and when a goal is reached,
 //! counted in steps.
 //!
-//! Many of these tests let the arm float: without gravity, and with the controller off, it stays at q = 0, the hand of
-//! two links of 1 m at exactly (2, 0). A goal there has been reached on time if it has been reached to the step.
+//! Goals are sent as another node sends them. A client's calls are here where the order of responses and messages is
+//! meant, or what is made of their fields.
+//!
+//! Many of these tests let the arm float: without gravity, and with the controller off, it stays at q = 0, the end
+//! effector of two links of 1 m at exactly (2, 0). A goal there has been reached on time if it has been reached to the step.
 
 mod accepting;
 mod ending;
@@ -12,14 +15,19 @@ mod reset;
 use std::time::Duration;
 
 use crate::stage::{
-    Client, Published, SilentArm, Stage, in_virtual_time, ms, number, numbers, pass,
+    Published, SilentArm, Stage, asked, in_virtual_time, ms, number, numbers, pass,
 };
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
-use pendularm::actors::arm::ik_action::{GoalTracker, IkAction, SendGoal};
-use pendularm::actors::arm::sim::{ArmPose, CommandGoal, GoalJudged, TrackGoal, Tracking};
+use pendularm::actors::arm::ik_action::{
+    CancelGoal, CancelRejected, GoalRejected, GoalTracker, IkAction, SendGoal,
+};
+use pendularm::actors::arm::sim::{
+    ArmPose, CommandGoal, GoalJudged, SetIntegrator, TrackGoal, Tracking,
+};
 use pendularm::actors::node::{Interest, Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};
+use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::{Target, forward};
 use pendularm::protocol::catalog::Topic;
 use serde_json::{Value, json};
@@ -35,13 +43,37 @@ const STEP: f64 = 0.001;
 /// Simulation times are differences of products of steps and timestep: a few units in the last place of 100 s.
 const ROUNDING: f64 = 1e-12;
 
-/// A goal where the floating arm's hand is, held so long \[s\].
-fn here(success_hold: f64) -> Value {
-    json!({"x": 2, "y": 0, "epsilon": 0.1, "success_hold": success_hold})
+/// A goal with the usual criteria.
+fn to<const N: usize>(x: f64, y: f64) -> SendGoal<N> {
+    SendGoal {
+        target: Target {
+            position: glam::dvec2(x, y),
+            orientation: None,
+        },
+        criteria: Criteria::default(),
+        owner: None,
+    }
+}
+
+/// A goal where the floating arm's end effector is, held so long \[s\].
+fn here(success_hold: f64) -> SendGoal<2> {
+    let criteria = Criteria {
+        epsilon: 0.1,
+        success_hold,
+    };
+    SendGoal {
+        criteria,
+        ..to(2.0, 0.0)
+    }
 }
 
 /// A goal that the floating arm does not come near.
-fn elsewhere() -> Value {
+fn elsewhere() -> SendGoal<2> {
+    to(1.0, 1.0)
+}
+
+/// The same, as a client has it.
+fn elsewhere_as_args() -> Value {
     json!({"x": 1, "y": 1})
 }
 

@@ -9,8 +9,8 @@ fn a_reset_preempts_the_goal_before_it_is_answered() {
         client.subscribe(RESULT).await;
         client.subscribe(FEEDBACK).await;
         for paused in [false, true] {
-            client.ask("/arm_sim/pause", json!({"data": paused})).await;
-            let goal_id = client.send_goal(elsewhere()).await;
+            stage.pause(paused).await;
+            let goal_id = stage.send_goal(elsewhere()).await;
             client.settle().await;
             client.heard.clear();
             let pose = client.ask("/arm_sim/reset", json!({})).await;
@@ -54,7 +54,7 @@ impl Handler<GoalJudged<2>> for Owner {
 #[test]
 fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
     in_virtual_time(async {
-        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
         let (sender, mut news) = unbounded_channel();
         let owner = Owner(sender).start();
         let announce = |number| {
@@ -71,7 +71,7 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
             positions: [0.0, 1.5],
         };
         announce(1).await.unwrap();
-        client.ask("/arm_sim/reset", json!({})).await;
+        stage.reset().await;
         assert_eq!(news.recv().await.unwrap().outcome, Some(Outcome::Preempted));
         stage.arm.send(command(1)).await.unwrap();
         let setpoint = *stage.simulation().await.pid().setpoint();
@@ -117,14 +117,14 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
 }
 
 /// Euler with a timestep of half a second, at the default gains: each step multiplies the error by more than 100.
-async fn diverge(stage: &Stage<2>, client: &mut Client) {
-    client
-        .ask(
-            "/arm_sim/set_integrator",
-            json!({"method": "euler", "timestep": 0.5}),
-        )
-        .await;
-    client.enable().await;
+async fn diverge(stage: &Stage<2>) {
+    let unstable = SetIntegrator {
+        method: Some(Method::Euler),
+        timestep: Some(0.5),
+        ..SetIntegrator::default()
+    };
+    asked(&stage.arm, unstable).await;
+    stage.enable().await;
     while stage.simulation().await.divergence().is_none() {
         pass(ms(500)).await;
     }
@@ -137,17 +137,19 @@ fn while_diverged_a_goal_stays_active_until_the_reset() {
         let mut client = stage.connect();
         client.subscribe(RESULT).await;
         client.subscribe(FEEDBACK).await;
-        let goal_id = client.send_goal(elsewhere()).await;
-        diverge(&stage, &mut client).await;
+        let goal_id = stage.send_goal(elsewhere()).await;
+        diverge(&stage).await;
         client.settle().await;
         client.heard.clear();
         let meanwhile = client.messages_for(Duration::from_secs(60), FEEDBACK);
         assert!(meanwhile.await.is_empty(), "its clock stands");
         assert!(client.messages(RESULT).is_empty());
         // A goal that comes now is taken, and as active.
-        let later = client.send_goal(elsewhere()).await;
+        let later = stage.send_goal(elsewhere()).await;
+        client.settle().await;
         assert_eq!(client.messages(RESULT)[0]["goal_id"], goal_id);
-        client.ask("/arm_sim/reset", json!({})).await;
+        stage.reset().await;
+        client.settle().await;
         assert_eq!(client.messages(RESULT)[1]["goal_id"], later);
         assert_eq!(client.messages(RESULT)[1]["outcome"], "preempted");
     });

@@ -1,12 +1,12 @@
-//! Time: how long a trial lasts, and what counts within it.
+//! Time: how long a trial lasts, and the targets that count within it.
 
 use super::*;
 
 #[test]
 fn when_its_duration_is_over_the_trial_ends_and_abandons_its_target() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, hard(2.5)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(2.5)).await;
         client.messages_for(ms(2499), STATUS).await;
         assert_eq!(client.messages(STATUS).pop().unwrap()["running"], true);
         client.heard.clear();
@@ -24,15 +24,15 @@ fn when_its_duration_is_over_the_trial_ends_and_abandons_its_target() {
 #[test]
 fn a_duration_is_simulation_time_and_does_not_pass_while_the_arm_is_paused() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, hard(1.0)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(1.0)).await;
         pass(ms(995)).await;
-        client.ask("/arm_sim/pause", json!({"data": true})).await;
+        stage.pause(true).await;
         client.messages_for(ms(60_000), STATUS).await;
         let paused = client.messages(STATUS).pop().unwrap();
         assert_eq!(paused["running"], true);
         assert!((number(&paused["elapsed"]) - 0.995).abs() < ROUNDING);
-        client.ask("/arm_sim/pause", json!({"data": false})).await;
+        stage.pause(false).await;
         client.messages_for(ms(50), STATUS).await;
         assert_eq!(client.messages(STATUS).pop().unwrap()["running"], false);
     });
@@ -44,9 +44,9 @@ fn what_is_reached_within_the_duration_counts_and_what_is_reached_after_it_does_
     in_virtual_time(async {
         for offset in 0..17 {
             for (duration, count) in [(0.1005, 0), (0.1015, 1), (0.11, 1)] {
-                let (_stage, mut client) = floating_and_watched().await;
+                let (stage, mut client) = floating_and_watched().await;
                 pass(ms(offset)).await;
-                client.ask(START, easy(duration, 0.1)).await;
+                begin(&stage.trial, easy(duration, 0.1)).await;
                 client.messages_for(ms(300), STATUS).await;
                 let end = client.messages(STATUS).pop().unwrap();
                 assert_eq!(end["running"], false);
@@ -59,12 +59,13 @@ fn what_is_reached_within_the_duration_counts_and_what_is_reached_after_it_does_
 #[test]
 fn the_clock_never_runs_backwards_and_a_reset_adds_nothing() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, hard(10.0)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(10.0)).await;
         let mut last = 0.0;
         for _ in 0..5 {
             client.messages_for(ms(730), STATUS).await;
-            client.ask("/arm_sim/reset", json!({})).await;
+            stage.reset().await;
+            client.settle().await;
             for status in client.messages(STATUS) {
                 let elapsed = number(&status["elapsed"]);
                 assert!(elapsed >= last);
@@ -73,7 +74,7 @@ fn the_clock_never_runs_backwards_and_a_reset_adds_nothing() {
             client.heard.clear();
         }
         // 3.65 s of simulation time have passed, of which a reset may have cut off an unfinished step each.
-        client.ask(STOP, json!({})).await;
+        asked(&stage.trial, StopTrial).await.unwrap();
         let elapsed = number(&client.message(STATUS).await["elapsed"]);
         assert!(
             (3.645 - ROUNDING..=3.65 + ROUNDING).contains(&elapsed),
@@ -86,9 +87,9 @@ fn the_clock_never_runs_backwards_and_a_reset_adds_nothing() {
 #[test]
 fn a_trial_may_last_longer_than_any_timer() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        let values = client.ask(START, hard(1e300)).await;
-        assert_eq!(values["duration"], 1e300);
-        client.ask(STOP, json!({})).await;
+        let (stage, _client) = floating_and_watched().await;
+        let settings = begin(&stage.trial, hard(1e300)).await;
+        assert_eq!(settings.duration, 1e300);
+        assert_eq!(asked(&stage.trial, StopTrial).await, Ok(()));
     });
 }

@@ -1,7 +1,10 @@
-//! Trials from end to end, in virtual time: what is sampled, counted and reported, and what happens when others meddle.
+//! Trials from end to end, in virtual time: targets sampled, counted and reported, also when others meddle.
+//!
+//! The node is asked as another node asks it. A client's calls are here where the order of responses is meant, or what
+//! is made of their fields.
 //!
 //! Where the arm floats, at rest and weightless, and epsilon is as large as the world, every target is reached at once:
-//! after one step that finds the hand there, and `success_hold` more. Then counts and times can be told beforehand.
+//! after one step that finds the end effector there, and `success_hold` more. Then counts and times can be told beforehand.
 
 mod duration;
 mod others;
@@ -13,16 +16,21 @@ mod whole;
 use std::sync::atomic::Ordering;
 
 use crate::stage::{
-    Client, Published, SilentArm, Stage, connect, counting_wake_ups, in_virtual_time, ms, number,
-    pass,
+    Client, Published, SilentArm, Stage, asked, connect, counting_wake_ups, in_virtual_time, ms,
+    number, pass,
 };
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
-use pendularm::actors::arm::ik_action::IkAction;
-use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial, StartTrial};
+use pendularm::actors::arm::ik_action::{CancelGoal, IkAction, SendGoal};
+use pendularm::actors::arm::ik_trial::{
+    GoalClient, IkTrial, NotStarted, SkipTarget, StartTrial, StopTrial,
+};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
-use pendularm::actors::node::{Interest, Publish, ask};
+use pendularm::actors::node::{Interest, Publish};
+use pendularm::math::goal::Criteria;
+use pendularm::math::kinematics::Target;
 use pendularm::math::pid::Gains;
+use pendularm::math::trial::{Changes, Rejection, Settings};
 use pendularm::protocol::catalog::Topic;
 use serde_json::{Value, json};
 use tokio::sync::mpsc::unbounded_channel;
@@ -39,13 +47,43 @@ const CANCEL: &str = "/ik_action/cancel_goal";
 const ROUNDING: f64 = 1e-12;
 
 /// Targets that a floating arm reaches after 1 ms and `success_hold`.
-fn easy(duration: f64, success_hold: f64) -> Value {
-    json!({"duration": duration, "epsilon": 1e6, "success_hold": success_hold})
+fn easy(duration: f64, success_hold: f64) -> StartTrial {
+    start(duration, 1e6, success_hold)
 }
 
 /// Targets that a floating arm never reaches.
-fn hard(duration: f64) -> Value {
-    json!({"duration": duration, "epsilon": 1e-9, "success_hold": 0})
+fn hard(duration: f64) -> StartTrial {
+    start(duration, 1e-9, 0.0)
+}
+
+fn start(duration: f64, epsilon: f64, success_hold: f64) -> StartTrial {
+    StartTrial {
+        changes: Changes {
+            duration: Some(duration),
+            epsilon: Some(epsilon),
+            success_hold: Some(success_hold),
+        },
+        ..StartTrial::default()
+    }
+}
+
+/// A goal of somebody else, which a floating arm never reaches.
+fn theirs() -> SendGoal<2> {
+    SendGoal {
+        target: Target {
+            position: glam::DVec2::ONE,
+            orientation: None,
+        },
+        criteria: Criteria::default(),
+        owner: None,
+    }
+}
+
+/// Starts a trial that must start, and gives the settings in force.
+async fn begin<const N: usize>(trial: &Addr<IkTrial<N>>, question: StartTrial) -> Settings {
+    let terms = asked(trial, question).await;
+    assert_eq!(terms.outcome, Ok(()));
+    terms.settings
 }
 
 /// The latest status, once all that is under way has arrived.
@@ -61,7 +99,7 @@ async fn floating_and_watched() -> (Stage<2>, Client) {
     (stage, client)
 }
 
-/// What is left when nothing is pursued any more.
+/// Asserts that nothing is pursued any more.
 fn assert_nothing_in_flight(status: &Value) {
     for field in ["target", "error", "desired_positions"] {
         assert_eq!(status[field], Value::Null, "{field}");

@@ -1,4 +1,4 @@
-//! What becomes of a trial when somebody else acts on goals.
+//! Trials while somebody else acts on goals.
 
 use super::*;
 
@@ -6,20 +6,19 @@ use super::*;
 #[test]
 fn a_trial_whose_goal_is_preempted_by_somebody_else_shows_that_and_waits() {
     in_virtual_time(async {
-        for (service, args) in [
-            (SEND, json!({"x": 1, "y": 1, "success_hold": 0.2})),
-            (CANCEL, json!({})),
-            ("/arm_sim/reset", json!({})),
-        ] {
+        for way in ["a goal of its own", "a cancellation", "a reset"] {
             let (stage, mut client) = floating_and_watched().await;
-            client.ask(START, hard(60.0)).await;
+            begin(&stage.trial, hard(60.0)).await;
             let before = status(&mut client).await;
             assert_eq!(before["action_status"], "active");
             client.heard.clear();
-            let mut other = stage.connect();
-            other.ask(service, args).await;
+            match way {
+                "a reset" => stage.reset().await,
+                "a cancellation" => stage.cancel().await.unwrap(),
+                _ => drop(stage.send_goal(theirs()).await),
+            }
             for after in client.messages_for(ms(2000), STATUS).await {
-                assert_eq!(after["running"], true);
+                assert_eq!(after["running"], true, "{way}");
                 assert_eq!(after["action_status"], "preempted");
                 assert_eq!(after["target"], before["target"]);
                 assert_eq!(after["error"], Value::Null);
@@ -33,22 +32,23 @@ fn a_trial_whose_goal_is_preempted_by_somebody_else_shows_that_and_waits() {
 #[test]
 fn a_trial_that_waits_goes_on_with_skip_and_anew_with_start_and_ends_with_stop_or_by_itself() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, hard(5.0)).await;
-        client.ask(CANCEL, json!({})).await;
+        let (stage, mut client) = floating_and_watched().await;
+        let trial = &stage.trial;
+        begin(trial, hard(5.0)).await;
+        stage.cancel().await.unwrap();
         assert_eq!(status(&mut client).await["action_status"], "preempted");
-        client.ask(SKIP, json!({})).await;
+        asked(trial, SkipTarget).await.unwrap();
         assert_eq!(status(&mut client).await["action_status"], "active");
-        client.ask(CANCEL, json!({})).await;
-        client.ask(START, json!({})).await;
+        stage.cancel().await.unwrap();
+        begin(trial, StartTrial::default()).await;
         let afresh = status(&mut client).await;
         assert_eq!(afresh["action_status"], "active");
         assert!(number(&afresh["elapsed"]) < 0.11);
-        client.ask(CANCEL, json!({})).await;
-        client.ask(STOP, json!({})).await;
+        stage.cancel().await.unwrap();
+        asked(trial, StopTrial).await.unwrap();
         assert_nothing_in_flight(&status(&mut client).await);
-        client.ask(START, json!({})).await;
-        client.ask(CANCEL, json!({})).await;
+        begin(trial, StartTrial::default()).await;
+        stage.cancel().await.unwrap();
         client.messages_for(ms(5000), STATUS).await;
         let end = status(&mut client).await;
         assert_eq!(end["running"], false);
@@ -61,21 +61,29 @@ fn a_trial_that_waits_goes_on_with_skip_and_anew_with_start_and_ends_with_stop_o
 fn a_trial_cancels_no_goal_but_its_own() {
     in_virtual_time(async {
         let (stage, mut client) = floating_and_watched().await;
-        let mut other = stage.connect();
-        for end in [STOP, SKIP, START] {
-            client.ask(START, hard(60.0)).await;
-            let goal_id = other.send_goal(json!({"x": 1, "y": 1})).await;
+        let trial = &stage.trial;
+        for end in ["stop", "skip", "start"] {
+            begin(trial, hard(60.0)).await;
+            let goal_id = stage.send_goal(theirs()).await;
             client.settle().await;
             client.heard.clear();
-            client.ask(end, json!({})).await;
-            let theirs: Vec<Value> = client.messages(RESULT);
-            if end == STOP {
-                assert!(theirs.is_empty());
-                other.ask(CANCEL, json!({"goal_id": goal_id})).await;
+            match end {
+                "stop" => asked(trial, StopTrial).await.unwrap(),
+                "skip" => asked(trial, SkipTarget).await.unwrap(),
+                _ => {
+                    begin(trial, StartTrial::default()).await;
+                }
+            }
+            client.settle().await;
+            let ended: Vec<Value> = client.messages(RESULT);
+            if end == "stop" {
+                assert!(ended.is_empty());
+                let goal_id = Some(goal_id);
+                assert_eq!(asked(&stage.action, CancelGoal { goal_id }).await, Ok(()));
             } else {
                 // A new target of the trial preempts any goal, as one of anybody else would.
-                assert_eq!(theirs.len(), 1);
-                assert_eq!(theirs[0]["goal_id"], goal_id);
+                assert_eq!(ended.len(), 1);
+                assert_eq!(ended[0]["goal_id"], goal_id);
             }
         }
     });
@@ -86,7 +94,8 @@ fn trials_outlive_the_client_that_started_them() {
     in_virtual_time(async {
         let (stage, mut client) = floating_and_watched().await;
         let mut other = stage.connect();
-        other.ask(START, easy(2.0, 0.1)).await;
+        let easy = json!({"duration": 2, "epsilon": 1e6, "success_hold": 0.1});
+        other.ask(START, easy).await;
         drop(other);
         client.messages_for(ms(2100), STATUS).await;
         let end = client.messages(STATUS).pop().unwrap();

@@ -1,4 +1,4 @@
-//! A trial between an arm and an `ik_action` that do what a test needs: what meets on its way elsewhere by chance.
+//! A trial between an arm and an `ik_action` that do what a test needs: here messages cross that elsewhere do by chance.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,7 +14,7 @@ use tokio::time::Instant;
 
 use super::*;
 
-/// What the stand-ins share with the test.
+/// The part of the stand-ins, shared with the test.
 #[derive(Default)]
 struct Script {
     lengths: [f64; 2],
@@ -93,7 +93,7 @@ impl Handler<Settle> for StandIn {
 }
 
 /// A trial between stand-ins, and a client that watches it.
-async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Client, Instant) {
+async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, Client, Instant) {
     let gauges = std::sync::Arc::default();
     let registry = Registry::new(std::sync::Arc::clone(&gauges)).start();
     let born = Instant::now();
@@ -115,7 +115,7 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Client, Instant) {
     registry.send(Attach(nodes)).await.unwrap();
     let mut client = connect(&registry, &gauges);
     client.subscribe(STATUS).await;
-    (client, born)
+    (trial, client, born)
 }
 
 /// The arm says that the goal was reached at 0.101 s, then that it is 0.11 s. The word about the goal goes by way of
@@ -127,8 +127,8 @@ fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
             lengths: [1.0, 1.0],
             ..Script::default()
         }));
-        let (mut client, _) = between_stand_ins(&script).await;
-        client.ask(START, easy(0.11, 0.1)).await;
+        let (trial, mut client, _) = between_stand_ins(&script).await;
+        begin(&trial, easy(0.11, 0.1)).await;
         script.borrow_mut().news.push(GoalNews {
             goal_id: "goal-1".to_owned(),
             distance: 0.0,
@@ -156,8 +156,8 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
             refusals: 0,
             ..Script::default()
         }));
-        let (mut client, born) = between_stand_ins(&script).await;
-        client.ask(START, hard(60.0)).await;
+        let (trial, mut client, born) = between_stand_ins(&script).await;
+        begin(&trial, hard(60.0)).await;
         script.borrow_mut().lengths = [1e-3, 1e-3];
         script.borrow_mut().refusals = 3;
         // The goal was reached while the lengths were the old ones.

@@ -34,7 +34,8 @@ fn start_with_an_invalid_field_is_rejected_and_changes_nothing_a_running_trial_i
         let quiet = client.messages_for(ms(500), STATUS).await;
         assert!(quiet.is_empty(), "no trial exists");
 
-        let values = client.ask(START, hard(50.0)).await;
+        let hard = json!({"duration": 50, "epsilon": 1e-9, "success_hold": 0});
+        let values = client.ask(START, hard).await;
         let before = status(&mut client).await;
         for (args, field) in [
             (json!({"duration": 5, "epsilon": -1}), "epsilon"),
@@ -58,30 +59,25 @@ fn start_with_an_invalid_field_is_rejected_and_changes_nothing_a_running_trial_i
 #[test]
 fn start_without_any_reachable_target_is_rejected_and_says_so() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client
-            .ask(
-                "/arm_sim/set_params",
-                json!({"lengths": [1.5e308, 1.5e308]}),
-            )
-            .await;
-        let response = client.call(START, json!({"duration": 5})).await;
-        assert_eq!(response["result"], false, "{response}");
-        assert!(response["status"].as_str().unwrap().contains("target"));
-        assert_eq!(response["values"]["duration"], 60.0, "nothing has changed");
+        let (stage, _client) = floating_and_watched().await;
+        stage.set_lengths([1.5e308; 2]).await;
+        let terms = asked(&stage.trial, hard(5.0)).await;
+        assert_eq!(terms.outcome, Err(NotStarted::Refused(Rejection::NoTarget)));
+        assert_eq!(terms.settings, Settings::default(), "nothing has changed");
     });
 }
 
 #[test]
 fn start_begins_afresh_and_cancels_the_goal_that_was_left_over() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, easy(60.0, 0.1)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, easy(60.0, 0.1)).await;
         client.messages_for(ms(1000), STATUS).await;
         let before = status(&mut client).await;
         assert!(number(&before["targets_reached"]) > 5.0);
         client.heard.clear();
-        client.ask(START, hard(60.0)).await;
+        begin(&stage.trial, hard(60.0)).await;
+        client.settle().await;
         let results = client.messages(RESULT);
         assert_eq!(results.len(), 1);
         assert_eq!(results[0]["outcome"], "preempted");
@@ -97,12 +93,13 @@ fn start_begins_afresh_and_cancels_the_goal_that_was_left_over() {
 fn the_goal_is_under_way_when_start_is_answered_and_what_follows_finds_it() {
     in_virtual_time(async {
         let (_stage, mut client) = floating_and_watched().await;
-        for (service, args) in [(START, hard(60.0)), (CANCEL, json!({})), (SKIP, json!({}))] {
+        let hard = json!({"duration": 60, "epsilon": 1e-9, "success_hold": 0});
+        for (service, args) in [(START, hard), (CANCEL, json!({})), (SKIP, json!({}))] {
             client
                 .send(&json!({"op": "call_service", "service": service, "args": args}))
                 .await;
         }
-        client.send_goal(json!({"x": 1, "y": 1})).await;
+        client.ask(SEND, json!({"x": 1, "y": 1})).await;
         let results: Vec<bool> = client
             .heard
             .iter()
@@ -116,28 +113,30 @@ fn the_goal_is_under_way_when_start_is_answered_and_what_follows_finds_it() {
 #[test]
 fn skip_and_stop_are_rejected_when_no_trial_runs() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
+        let (stage, mut client) = floating_and_watched().await;
         for service in [SKIP, STOP] {
             let response = client.call(service, json!({})).await;
             assert_eq!(response["result"], false);
             assert_eq!(response["values"], json!({}));
             assert_eq!(response["status"], "no trial is running");
         }
-        client.ask(START, easy(0.5, 0.1)).await;
+        begin(&stage.trial, easy(0.5, 0.1)).await;
         pass(ms(501)).await;
-        client.refusal(SKIP, json!({})).await;
-        client.refusal(STOP, json!({})).await;
+        let refused = Err(Rejection::NotRunning);
+        assert_eq!(asked(&stage.trial, SkipTarget).await, refused);
+        assert_eq!(asked(&stage.trial, StopTrial).await, refused);
     });
 }
 
 #[test]
 fn skip_abandons_the_target_uncounted_and_goes_for_another_at_once() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, hard(60.0)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(60.0)).await;
         let before = status(&mut client).await;
         client.heard.clear();
-        assert_eq!(client.ask(SKIP, json!({})).await, json!({}));
+        assert_eq!(asked(&stage.trial, SkipTarget).await, Ok(()));
+        client.settle().await;
         let results = client.messages(RESULT);
         assert_eq!(results.len(), 1);
         assert_eq!(results[0]["outcome"], "preempted");
@@ -153,14 +152,15 @@ fn skip_abandons_the_target_uncounted_and_goes_for_another_at_once() {
 #[test]
 fn stop_ends_the_trial_and_leaves_nothing_in_flight() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, hard(60.0)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(60.0)).await;
         let before = status(&mut client).await;
         assert!(before["error"].is_number());
         client.heard.clear();
-        assert_eq!(client.ask(STOP, json!({})).await, json!({}));
+        assert_eq!(asked(&stage.trial, StopTrial).await, Ok(()));
+        client.settle().await;
         assert_eq!(client.messages(RESULT).len(), 1);
-        client.refusal(CANCEL, json!({})).await;
+        assert!(stage.cancel().await.is_err(), "no goal is left");
         for after in client.messages_for(ms(1000), STATUS).await {
             assert_eq!(after["running"], false);
             assert_nothing_in_flight(&after);

@@ -5,9 +5,9 @@ use super::*;
 #[test]
 fn status_shows_the_trial_and_the_goal_that_it_tracks() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
+        let (stage, mut client) = floating_and_watched().await;
         client.subscribe("/ik_action/feedback").await;
-        client.ask(START, hard(60.0)).await;
+        begin(&stage.trial, hard(60.0)).await;
         let status = status(&mut client).await;
         assert_eq!(status.as_object().unwrap().len(), 8);
         assert_eq!(status["running"], true);
@@ -26,11 +26,11 @@ fn status_shows_the_trial_and_the_goal_that_it_tracks() {
 #[test]
 fn status_comes_at_10_hz_from_the_first_start_on_also_when_the_trial_is_over_or_the_arm_paused() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
+        let (stage, mut client) = floating_and_watched().await;
         let before = client.messages_for(ms(1000), STATUS).await;
         assert!(before.is_empty(), "no trial exists yet");
-        client.ask(START, hard(60.0)).await;
-        // What changes at the start is reported at once; from then on nothing does.
+        begin(&stage.trial, hard(60.0)).await;
+        // The changes at the start are reported at once; from then on nothing changes.
         client.messages_for(ms(50), STATUS).await;
         for _ in 0..3 {
             let statuses = client.messages_for(ms(2000), STATUS).await;
@@ -40,9 +40,9 @@ fn status_comes_at_10_hz_from_the_first_start_on_also_when_the_trial_is_over_or_
                 assert!((gap - 0.1).abs() < ROUNDING, "the clock is the present one");
             }
         }
-        client.ask("/arm_sim/pause", json!({"data": true})).await;
+        stage.pause(true).await;
         assert_eq!(client.messages_for(ms(2000), STATUS).await.len(), 20);
-        client.ask(STOP, json!({})).await;
+        asked(&stage.trial, StopTrial).await.unwrap();
         client.messages_for(ms(1), STATUS).await;
         assert_eq!(client.messages_for(ms(2000), STATUS).await.len(), 20);
     });
@@ -51,12 +51,12 @@ fn status_comes_at_10_hz_from_the_first_start_on_also_when_the_trial_is_over_or_
 #[test]
 fn status_comes_at_every_change_too() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, easy(10.0, 0.04)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, easy(10.0, 0.04)).await;
         client.messages_for(ms(60), STATUS).await;
-        client.ask(SKIP, json!({})).await;
-        client.ask(CANCEL, json!({})).await;
-        client.ask(STOP, json!({})).await;
+        asked(&stage.trial, SkipTarget).await.unwrap();
+        stage.cancel().await.unwrap();
+        asked(&stage.trial, StopTrial).await.unwrap();
         client.messages_for(ms(1), STATUS).await;
         let story: Vec<String> = client
             .messages(STATUS)
@@ -87,7 +87,7 @@ fn status_comes_at_every_change_too() {
 fn status_goes_to_whoever_subscribes_while_they_do() {
     in_virtual_time(async {
         let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
-        client.ask(START, hard(60.0)).await;
+        begin(&stage.trial, hard(60.0)).await;
         pass(ms(1000)).await;
         client.subscribe(STATUS).await;
         assert_eq!(client.messages_for(ms(1050), STATUS).await.len(), 10);
@@ -120,8 +120,7 @@ fn no_status_is_encoded_while_nobody_wants_it() {
         for (wanted, expected) in [(false, 0), (true, 2), (false, 0)] {
             let topic = Topic::TrialStatus;
             trial.send(Interest { topic, wanted }).await.unwrap();
-            let started = ask(&trial.clone().recipient(), StartTrial::default()).await;
-            assert_eq!(started.unwrap().outcome, Ok(()));
+            begin(&trial, StartTrial::default()).await;
             // The accepted goal, and one message of the 10 Hz.
             pass(ms(150)).await;
             let mut statuses = 0;
@@ -142,10 +141,10 @@ fn nothing_ticks_while_no_goal_is_active_no_trial_runs_and_nobody_watches() {
         let mut nodes = Nodes::default();
         let arm = SilentArm.start();
         let tracker = SilentArm::tracker(&arm);
-        crate::stage::start_goal_nodes::<2>(&registry, arm.recipient(), tracker, 1, &mut nodes);
+        let (action, trial) =
+            crate::stage::start_goal_nodes::<2>(&registry, arm.recipient(), tracker, 1, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
         let mut client = connect(&registry, &gauges);
-        let mut other = connect(&registry, &gauges);
         client.ask("/ik/solve", json!({"x": 1, "y": 1})).await;
         let an_hour = || async {
             let before = sleeps.load(Ordering::Relaxed);
@@ -155,17 +154,17 @@ fn nothing_ticks_while_no_goal_is_active_no_trial_runs_and_nobody_watches() {
         let quiet = 0..100;
 
         assert!(quiet.contains(&an_hour().await), "at first");
-        client.send_goal(json!({"x": 1, "y": 1})).await;
+        asked(&action, theirs()).await.unwrap();
         assert!(quiet.contains(&an_hour().await), "the arm is silent");
-        client.ask(START, hard(1e9)).await;
+        begin(&trial, hard(1e9)).await;
         assert!(quiet.contains(&an_hour().await), "a trial, unwatched");
-        client.ask(STOP, json!({})).await;
+        asked(&trial, StopTrial).await.unwrap();
         assert!(quiet.contains(&an_hour().await), "after the trial");
-        other.subscribe(STATUS).await;
-        let listening = async { other.messages_for(ms(3_600_000), STATUS).await.len() };
+        client.subscribe(STATUS).await;
+        let listening = async { client.messages_for(ms(3_600_000), STATUS).await.len() };
         let (awake, heard) = tokio::join!(an_hour(), listening);
         assert!(awake >= 36_000 && heard >= 35_999, "{awake}, {heard}");
-        drop(other);
+        drop(client);
         pass(ms(1000)).await;
         assert!(quiet.contains(&an_hour().await), "the watcher is gone");
     });

@@ -9,8 +9,8 @@ where
     let stage = Stage::<N>::start().await;
     let mut client = stage.connect();
     client.subscribe(STATUS).await;
-    client.enable().await;
-    client.ask(START, json!({})).await;
+    stage.enable().await;
+    begin(&stage.trial, StartTrial::default()).await;
     let end = client
         .next_where(|frame| frame["topic"] == STATUS && frame["msg"]["running"] == false)
         .await;
@@ -40,7 +40,7 @@ async fn targets_of(seed: u64) -> Vec<Value> {
     let stage = Stage::<3>::with_seed(seed).await;
     let mut client = stage.connect();
     client.subscribe(STATUS).await;
-    client.ask(START, easy(1.0, 0.01)).await;
+    begin(&stage.trial, easy(1.0, 0.01)).await;
     client.messages_for(ms(1100), STATUS).await;
     client
         .messages(STATUS)
@@ -63,11 +63,11 @@ fn a_seed_makes_the_targets_repeatable() {
 #[test]
 fn targets_are_reachable_at_any_lengths_also_when_these_change_during_the_trial() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        client.ask(START, easy(60.0, 0.0)).await;
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, easy(60.0, 0.0)).await;
         for lengths in [[1e-3, 1e3], [5.0, 1e-6], [2.0, 2.0], [1e-5, 1e-5]] {
-            let args = json!({"lengths": lengths});
-            client.ask("/arm_sim/set_params", args).await;
+            stage.set_lengths(lengths).await;
+            client.settle().await;
             let before = client.messages(STATUS).len();
             client.messages_for(ms(500), STATUS).await;
             let statuses = client.messages(STATUS).split_off(before);

@@ -1,4 +1,4 @@
-// What the clients share: where the runtime is, and promises with a limit.
+// Parts that the clients share: where the runtime is, and promises with a limit.
 export const address = process.argv[2];
 export const url = `ws://${address}`;
 const PATIENCE_MS = 30_000;

@@ -1,4 +1,4 @@
-// What Lichtblick's rosbridge connection is made of, unmodified: its client, its parser, its CDR reader.
+// The parts of Lichtblick's rosbridge connection, unmodified: its client, its parser, its CDR reader.
 import { createRequire } from "node:module";
 import { check, run, url, within } from "./common.mjs";
 

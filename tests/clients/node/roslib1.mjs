@@ -46,7 +46,7 @@ async function overWebSocket() {
   check(end.goal_id === goal_id && end.outcome === "reached", "reached");
 }
 
-/** What ros3d shows an arm by: as roslib has it by default, and by the service. */
+/** The frames by which ros3d shows an arm: as roslib has it by default, and by the service. */
 async function viewer(options) {
   const ros = await connect({ url, ...options });
   const tf = new ROSLIB.TFClient({ ros, fixedFrame: "/world", rate: 30 });

@@ -1,4 +1,4 @@
-//! What an expression may be, what it is worth, how many nodes it has and how it is printed.
+//! Expressions that are accepted: their values, how many nodes they have and how they are printed.
 //!
 //! **Invariant:** nothing here is rejected.
 

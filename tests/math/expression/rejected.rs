@@ -1,4 +1,4 @@
-//! What an expression may not be, and what its author is told.
+//! Expressions that are rejected, and the reasons that their authors hear.
 //!
 //! **Invariant:** nothing here is accepted, and every message is checked, its column included.
 

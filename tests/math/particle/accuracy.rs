@@ -1,4 +1,4 @@
-//! What the positions and velocities must be.
+//! Positions and velocities as they must be.
 //!
 //! **Invariant:** a tolerance counts roundings; none allows for truncation.
 

@@ -1,4 +1,4 @@
-//! What is refused, and what the sender is told.
+//! Requests that are refused, and the reasons that the sender hears.
 //!
 //! **Invariant:** each limit is tried from both sides.
 

@@ -21,13 +21,13 @@ use crate::target::Target;
 const CALLS: Duration = Duration::from_millis(10);
 /// Between two messages of a server that has no arm: the period of `/joint_states`.
 const MESSAGES: Duration = Duration::from_micros(16_667);
-/// What is watched where there is no arm.
+/// The topic that is watched on a server without an arm.
 const TOPIC: &str = "/healthy";
 
-/// What they had.
+/// The healthy clients' calls and messages, and their delays.
 pub struct Health {
     pub asked: usize,
-    /// Of the calls that were answered \[ms\], in rising order.
+    /// Delays of the calls that were answered \[ms\], in rising order.
     pub delays: Vec<f64>,
     /// Between two messages, and from the last to the end \[ms\].
     pub longest_gap: f64,

@@ -27,7 +27,7 @@ pub struct Visits {
     pub served: usize,
     /// The longest of those that were served \[ms\].
     pub longest: f64,
-    /// What the first that was not served met.
+    /// The fault of the first newcomer that was not served.
     pub fault: Option<String>,
 }
 

@@ -8,13 +8,13 @@ use pendularm_benches::attack::stage::Deeds;
 
 use crate::healthy::Health;
 
-/// What must hold.
+/// Bounds that must hold.
 pub struct Bars {
     /// For 99 of 100 calls \[ms\].
     p99: f64,
     /// Between two messages of `/joint_states` \[ms\].
     gap: f64,
-    /// Of resident memory \[MB\].
+    /// Peak of resident memory \[MB\].
     peak: f64,
     /// From SIGTERM to the end.
     end: Duration,
@@ -57,7 +57,7 @@ impl fmt::Display for Bars {
     }
 }
 
-/// What an attack came to.
+/// The outcome of an attack.
 pub struct Row {
     pub name: String,
     pub health: Health,

@@ -42,7 +42,7 @@ pub struct Scene {
     pub pace: Pace,
 }
 
-/// What a scene came to.
+/// The outcome of a scene.
 pub struct Outcome {
     pub seconds: f64,
     pub deliveries: u64,
@@ -61,7 +61,7 @@ struct Link {
     topic: usize,
     /// The beginning of an event whose end has not come.
     unread: Vec<u8>,
-    /// What the socket has not taken yet.
+    /// Bytes that the socket has not taken yet.
     unsent: Vec<u8>,
     ready: bool,
     received: u64,

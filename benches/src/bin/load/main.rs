@@ -20,7 +20,7 @@ use pendularm_benches::protocol::Protocol;
 /// How often the arm publishes, and so everybody here that does not flood.
 const RATE: Pace = Pace::Rate(60.0);
 
-/// What is played. The last of the fan-outs is that of the arm's own topic.
+/// The scenes that are played. The last of the fan-outs is that of the arm's own topic.
 const SCENES: [Scene; 8] = [
     Scene {
         name: "60 Hz to 1",
@@ -76,7 +76,7 @@ const SCENES: [Scene; 8] = [
 struct Plan {
     rounds: usize,
     seconds: f64,
-    /// Of a run with probes beside it.
+    /// Length of a run with probes beside it \[s\].
     probed_seconds: f64,
     bars: bool,
 }
@@ -89,7 +89,7 @@ struct Server {
     pid: u32,
 }
 
-/// What a server did in a scene.
+/// The work of a server in a scene.
 #[derive(Default)]
 pub struct Played {
     /// Round by round.

@@ -1,4 +1,4 @@
-//! What somebody else sees of a server under load: the time of a light request, and whether the arm keeps its time.
+//! A server under load as somebody else sees it: the time of a light request, and whether the arm keeps its time.
 //!
 //! **Invariant:** each probe has a connection and a thread of its own, and asks little.
 

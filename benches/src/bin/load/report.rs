@@ -7,9 +7,9 @@ use crate::fleet::{Pace, Scene};
 use crate::message::Template;
 use pendularm_benches::protocol::Protocol;
 
-/// Of the processor time of the better peer, for a delivery.
+/// Largest processor time for a delivery, as a share of the better peer's.
 const MOST_OF_PEER: f64 = 1.0;
-/// Of simulation time by wall time from 1.
+/// Largest drift of simulation time by wall time from 1.
 const MOST_DRIFT: f64 = 0.001;
 /// For 99 of 100 calls \[ms\].
 const MOST_DELAY: f64 = 5.0;

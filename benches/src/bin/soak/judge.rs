@@ -49,7 +49,7 @@ pub struct Gap {
     pub at: Instant,
     /// From one message to the next.
     pub length: f64,
-    /// What the machine was late by: the most of what the controls were, and for how long threads waited for a processor.
+    /// Lateness of the machine itself: the most of what the controls were late by, and for how long threads waited for a processor.
     pub machine: f64,
     /// For how long the program ran.
     pub ran: f64,
@@ -164,11 +164,11 @@ pub struct Rate {
     pub ratio: f64,
     /// The runs, and the ratio of the one that is farthest off.
     pub runs: usize,
-    /// That ratio.
+    /// The largest such ratio.
     pub worst: f64,
     /// Gaps of [`STALL`] and more, at which runs are cut, and the simulation time that was lost at them \[s\].
     pub stalls: usize,
-    /// That time.
+    /// The time that was lost so.
     pub lost: f64,
 }
 

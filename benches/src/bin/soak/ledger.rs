@@ -1,4 +1,4 @@
-//! Which calls a client has asked and what must come back; each response settles exactly one of them.
+//! Calls that a client has asked and what must come back; each response settles exactly one of them.
 //!
 //! **Invariant:** a response is right only for the call whose id it carries, once, with that call's service and content.
 

@@ -39,7 +39,7 @@ pub struct Seen {
     pub ran: f64,
 }
 
-/// What the healthy threads saw.
+/// Everything that the healthy threads saw.
 #[derive(Default)]
 pub struct Record {
     /// Messages of `/joint_states`, in the order in which they came.
@@ -50,7 +50,7 @@ pub struct Record {
     pub woken: Vec<(Instant, f64)>,
     /// When each call of the healthy caller was answered, and how long that took \[s\].
     pub calls: Vec<(Instant, f64)>,
-    /// What was wrong.
+    /// The faults that were found.
     pub faults: Vec<String>,
 }
 

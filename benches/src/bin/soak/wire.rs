@@ -23,7 +23,7 @@ use crate::world::{Fault, PATIENCE, World};
 /// Bytes that are read at a time.
 const CHUNK: usize = 16 * 1024;
 
-/// Which door the client came through.
+/// The door that the client came through.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Door {
     /// One JSON object per line.

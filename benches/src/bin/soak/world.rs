@@ -22,7 +22,7 @@ pub fn is_wanted(name: &str) -> bool {
 /// Something that must not happen, as one client saw it.
 #[derive(Debug)]
 pub struct Fault {
-    /// Which client.
+    /// The client's number.
     pub client: String,
     /// The fault itself.
     pub what: String,
@@ -49,7 +49,7 @@ impl Fault {
 
 /// Shared by every client; one thread, so plain cells do.
 pub struct World {
-    /// Where the program listens.
+    /// Address that the program listens on.
     pub address: SocketAddr,
     counts: RefCell<BTreeMap<&'static str, u64>>,
     faults: RefCell<Vec<Fault>>,

@@ -25,7 +25,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 /// Go there. The answer is the goal's id, given before its trajectory goes out.
 #[derive(Clone)]
 pub struct SendGoal<const N: usize> {
-    /// Where to.
+    /// The target.
     pub target: Target,
     /// When it counts as reached.
     pub criteria: Criteria,

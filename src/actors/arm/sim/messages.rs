@@ -18,7 +18,7 @@ use crate::study::control_loop::ControlLoop;
 #[rtype(result = "f64")]
 pub struct SimulationTime;
 
-/// Which simulation an offline observer would have to run to get the present state. From tests and tools.
+/// Asks for the simulation that an offline observer would have to run to get the present state. From tests and tools.
 #[derive(Message)]
 #[rtype(result = "Snapshot<N>")]
 pub struct TakeSnapshot<const N: usize>;
@@ -37,7 +37,7 @@ pub struct ArmSettings<const N: usize>;
 pub struct Present<const N: usize> {
     /// The loop, with the gains as they are set, whether the controller is on or off.
     pub control: ControlLoop<N>,
-    /// Where the arm is and how it moves.
+    /// The arm's positions and velocities.
     pub state: State<N>,
 }
 
@@ -59,7 +59,7 @@ pub struct RefuseSteps(pub &'static str);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
-/// Where the arm is now. From `ik` and `ik_trial`, at every request that depends on it.
+/// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Pose<N>")]
 pub struct ArmPose<const N: usize>;
@@ -82,7 +82,7 @@ pub struct Pose<const N: usize> {
 pub struct TrackGoal<const N: usize> {
     /// Names the goal between `ik_action` and the arm; each is used once.
     pub number: u64,
-    /// Where the end effector should be \[m\].
+    /// The target of the end effector \[m\].
     pub target: DVec2,
     /// When it counts as there.
     pub criteria: Criteria,

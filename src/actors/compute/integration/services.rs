@@ -18,9 +18,9 @@ use crate::protocol::wire::streamed::StreamedResponse;
 pub struct IntegrationStep {
     /// Its acceleration as a formula \[m/s²\], of t in s.
     pub function: Option<String>,
-    /// Where it starts \[m\].
+    /// Initial position \[m\].
     pub x0: Option<f64>,
-    /// How fast \[m/s\]; 0 if it is not said.
+    /// Initial velocity \[m/s\]; 0 unless said.
     pub xdot0: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub dt: Option<f64>,
@@ -91,7 +91,7 @@ pub struct SamplesWriter {
     entry: usize,
 }
 
-/// Which of the three arrays is being written.
+/// The one of the three arrays that is being written.
 #[derive(Clone, Copy)]
 enum Array {
     Times,

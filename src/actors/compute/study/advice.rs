@@ -24,7 +24,7 @@ use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
 // ---- question -------------------------------------------------------------------------------------------------------
 
 /// Looks for gains by which every move settles in time, with a margin of stability.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SuggestGains<const N: usize> {
     /// Time in which every move is to settle \[s\], greater than 0.
     pub settling_time: Option<f64>,
@@ -71,9 +71,9 @@ pub struct PlanRun<const N: usize> {
     pub duration: Option<f64>,
     /// Whether the gains that are set control the arm where the question has none.
     pub servo: bool,
-    /// Where it starts \[rad\].
+    /// Initial positions \[rad\].
     pub q0: Option<[f64; N]>,
-    /// How fast \[rad/s\].
+    /// Initial velocities \[rad/s\].
     pub qdot0: Option<[f64; N]>,
     /// Parameters of the arm that are to be others.
     pub params: Option<SetParams<N>>,

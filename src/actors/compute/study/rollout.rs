@@ -29,11 +29,11 @@ use crate::study::rollout::{Deviation, MAX_SAMPLES, Plan, Rollout, RolloutError}
 // ---- question -------------------------------------------------------------------------------------------------------
 
 /// Runs the arm offline.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct RunOffline<const N: usize> {
-    /// Where it starts \[rad\]; 0 if it is not said.
+    /// Initial positions \[rad\]; 0 unless said.
     pub q0: Option<[f64; N]>,
-    /// How fast \[rad/s\]; 0 if it is not said.
+    /// Initial velocities \[rad/s\]; 0 unless said.
     pub qdot0: Option<[f64; N]>,
     /// How long \[s\], greater than 0.
     pub duration: Option<f64>,
@@ -123,7 +123,7 @@ pub struct RolloutWriter<const N: usize> {
     run: Rollout<N>,
     took: Duration,
     writer: StreamedResponse,
-    /// Which of the arrays is being written.
+    /// Index of the array that is being written.
     column: usize,
     /// Its next entry.
     entry: usize,

@@ -27,7 +27,7 @@ use crate::study::stability::{ADVISED_PART, LimitSearch, Limits};
 // ---- question -------------------------------------------------------------------------------------------------------
 
 /// Predicts the largest stable timesteps of a control loop.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct PredictStability<const N: usize> {
     /// The method that takes the steps.
     pub method: Option<Method>,

@@ -53,8 +53,8 @@ async fn tend<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
     }
 }
 
-/// Waits until there is something to write, or nothing more will be. Both are looked at here: the news of it may have come
-/// while the transport had something to say.
+/// Waits until there is something to write, or nothing more will be. Both are looked at here: the news of it may have
+/// come while the transport had something to say.
 async fn wait(shared: &Shared) {
     let outgoing = &shared.outgoing;
     let news = outgoing.news(|| !outgoing.is_empty() || shared.is_done());

@@ -1,4 +1,4 @@
-//! Which topics and services clients have, kept in order of their names, so that telling it costs no search.
+//! Topics and services that clients have, kept in order of their names, so that telling them costs no search.
 //!
 //! **Invariant:** a topic stands here as long as a client advertises it or subscribes to it, and no longer.
 

@@ -66,7 +66,7 @@ pub(super) struct Client {
     pub(super) provided: HashMap<Box<str>, Share>,
     /// Actions.
     pub(super) pursued: HashMap<Box<str>, Share>,
-    /// Which statuses it wants.
+    /// Statuses that it wants.
     pub(super) verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
     pub(super) answered: Option<oneshot::Sender<()>>,

@@ -35,7 +35,7 @@ pub(super) struct Subscriber {
     pub(super) outlet: Recipient<Deliver>,
     /// The encoding that its subscriptions come to.
     pub(super) encoding: Encoding,
-    /// Where some of its messages are held back or left out: how many of the newest are kept.
+    /// Number of the newest messages that are kept, if some of them are held back or left out.
     pub(super) newest: Option<usize>,
 }
 

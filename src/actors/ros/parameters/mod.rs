@@ -16,7 +16,7 @@ use crate::protocol::ros::parameters::Parameter;
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// Which parameters there are; answered by those that are meant.
+/// Asks for the parameters that there are; answered by those that are meant.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListParameters {
     /// Names, or what they begin with up to a full stop; none for all.

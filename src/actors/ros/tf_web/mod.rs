@@ -37,7 +37,7 @@ const NOT_ACTIVE: &str = "id must be that of a goal of this connection";
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
-/// Which topic has the frames. From clients, by `/republish_tfs`.
+/// Asks for the topic that has the frames. From clients, by `/republish_tfs`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RepublishTfs;
 

@@ -46,7 +46,7 @@ enum Within {
 #[derive(Debug)]
 pub struct FrameReader {
     buffer: Vec<u8>,
-    /// Where the present frame starts in the buffer. What is before it has been handed out or skipped.
+    /// Start of the present frame in the buffer. Bytes before it have been handed out or skipped.
     start: usize,
     /// How far the buffer has been scanned.
     at: usize,

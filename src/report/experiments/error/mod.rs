@@ -75,7 +75,7 @@ pub const REACH_GAINS: Gains<2> = Gains {
     kd: [30.0, 12.0],
 };
 
-/// Where the reach goes, from the starting pose.
+/// Target of the reach, from the starting pose.
 pub const REACH_SETPOINT: Setpoint<2> = Setpoint {
     position: [0.8, -0.6],
     velocity: [0.0; 2],

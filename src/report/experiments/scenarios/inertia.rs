@@ -84,7 +84,7 @@ pub(super) const SCENES: [Scenario; 11] = [
         expected: "at most 2.5 digits lost; limits 1.649e-5 s (Runge-Kutta 4) and 1.166e-5 s (Verlet); Runge-Kutta 4 \
                    swings on at 1.6e-5 s and flies apart at 2e-5 s",
         slow: false,
-        check: heavy_tip_stretched,
+        check: heavy_link_stretched,
     },
     Scenario {
         id: "S23",
@@ -164,7 +164,7 @@ fn heavy_outer_link(mass: f64) -> Observation {
     )
 }
 
-fn heavy_tip_stretched() -> Observation {
+fn heavy_link_stretched() -> Observation {
     let Some(arm) = arm([1.0, 1.0, 1e9], 9.81) else {
         return verdict(false, "no such arm".to_owned());
     };

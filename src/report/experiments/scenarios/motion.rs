@@ -143,18 +143,11 @@ fn upright() -> Observation {
             .ln()
             / h;
         holds &= (rate / predicted - 1.0).abs() < 2e-3;
-        holds &= (predicted / unstable - 1.0).abs() < 2.0 * (unstable * h).powi(order(method));
+        holds &= (predicted / unstable - 1.0).abs()
+            < 2.0 * (unstable * h).powi(method.order().cast_signed());
         observed.push(format!("{method} {rate:.5}"));
     }
     verdict(holds, observed.join(", "))
-}
-
-fn order(method: Method) -> i32 {
-    match method {
-        Method::Euler => 1,
-        Method::Midpoint | Method::Verlet => 2,
-        Method::Rk4 => 4,
-    }
 }
 
 fn regular_swing() -> Observation {

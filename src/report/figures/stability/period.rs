@@ -104,7 +104,7 @@ const LOOKS: [(&str, Marker); 3] = [
 /// Control periods near the limit that are measured too, as parts of it.
 const AROUND: [f64; 6] = [0.985, 0.995, 1.005, 1.015, 1.03, 1.045];
 
-/// Which of three turns the dots of so many steps per period take.
+/// The one of three turns that the dots of so many steps per period take.
 fn turn_of(substeps: u32) -> u32 {
     match substeps {
         1 => 0,

@@ -84,7 +84,7 @@ impl<const N: usize> Tracked<N> {
     }
 }
 
-/// Where the end effector is \[m\], with the lengths as they are now.
+/// Position of the end effector \[m\], with the lengths as they are now.
 fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
     forward(simulation.arm().lengths(), &simulation.state().position).position
 }
