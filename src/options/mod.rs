@@ -21,6 +21,8 @@ mod web;
 use std::ffi::OsString;
 use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 
+#[cfg(feature = "record")]
+use clap::ArgMatches;
 use clap::builder::{OsStringValueParser, StyledStr};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Arg, Command};
@@ -210,7 +212,7 @@ impl Options {
             Ok(matches) => matches,
             Err(error) => return explained(&error),
         };
-        if let Some((name, given)) = matches.subcommand() {
+        if let Some((name, subcommand)) = matches.subcommand() {
             // An option of serving means nothing to a subcommand.
             if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
                 return Err(UsageError::UnknownArgument {
@@ -219,19 +221,48 @@ impl Options {
             }
             return match name {
                 #[cfg(feature = "report")]
-                report::NAME => Ok(Parsed::Report(report::read(given))),
+                report::NAME => Ok(Parsed::Report(report::read(subcommand))),
                 #[cfg(feature = "record")]
-                record::REPLAY => Ok(Parsed::Replay(record::read(given))),
-                _ => plan::read(given).map(Parsed::Plan),
+                record::REPLAY => Self::of_replay(subcommand, environment),
+                _ => plan::read(subcommand).map(Parsed::Plan),
             };
         }
         let given = |setting: &LaunchOption| given(setting, &matches, &environment);
+        Self::read(given).map(Parsed::Serve)
+    }
+
+    /// A record to be replayed, or to be served in the arm's place.
+    #[cfg(feature = "record")]
+    fn of_replay(
+        matches: &ArgMatches,
+        environment: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<Parsed, UsageError> {
+        let replay = record::read(matches);
+        let mut of_serving = SETTINGS.iter().filter(|one| record::is_of_replay(one));
+        if matches.get_flag(record::SERVE) {
+            let given = |setting: &LaunchOption| {
+                let is_ours = record::is_of_replay(setting);
+                is_ours.then(|| given(setting, matches, &environment))?
+            };
+            let mut options = Self::read(given)?;
+            options.record.replay = Some(replay.file);
+            return Ok(Parsed::Serve(options));
+        }
+        match of_serving.find(|one| matches.contains_id(one.option)) {
+            Some(stray) => Err(UsageError::UnknownArgument {
+                argument: format!("--{} without --{}", stray.option, record::SERVE),
+            }),
+            None => Ok(Parsed::Replay(replay)),
+        }
+    }
+
+    fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Result<Self, UsageError> {
         let token = given(&TOKEN).map(read_token).transpose()?;
         let bind = given(&BIND)
             .map(|bind| read_bind(bind, token.is_some()))
             .transpose()?
             .unwrap_or(DEFAULT_BIND);
-        Ok(Parsed::Serve(Self {
+        Ok(Self {
             links: given(&LINKS)
                 .map(read_links)
                 .transpose()?
@@ -245,16 +276,33 @@ impl Options {
                 .unwrap_or(LevelFilter::INFO),
             token,
             #[cfg(feature = "record")]
-            record: RecordOptions::read(given),
+            record: RecordOptions::read(&given),
             #[cfg(feature = "web")]
-            web: WebOptions::read(given)?,
-        }))
+            web: WebOptions::read(&given)?,
+        })
     }
 }
 
 /// The command line as `clap` is to read it. The values stay unread, and the variables unknown to it.
 fn command() -> Command {
-    let options = SETTINGS.iter().map(|setting| {
+    let command = Command::new(env!("CARGO_PKG_NAME"))
+        .version(BUILD)
+        .about(env!("CARGO_PKG_DESCRIPTION"))
+        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
+        .args(arguments(|_| true))
+        .disable_help_subcommand(true)
+        .subcommand(plan::command());
+    #[cfg(feature = "report")]
+    let command = command.subcommand(report::command());
+    #[cfg(feature = "record")]
+    let command = command.subcommand(record::command(arguments(record::is_of_replay)));
+    command
+}
+
+/// The options of serving as `clap` is to read them, as far as they are `chosen`.
+fn arguments(chosen: fn(&LaunchOption) -> bool) -> impl Iterator<Item = Arg> {
+    let chosen = SETTINGS.iter().filter(move |setting| chosen(setting));
+    chosen.map(|setting| {
         let LaunchOption {
             option,
             variable,
@@ -277,19 +325,7 @@ fn command() -> Command {
         } else {
             arg
         }
-    });
-    let command = Command::new(env!("CARGO_PKG_NAME"))
-        .version(BUILD)
-        .about(env!("CARGO_PKG_DESCRIPTION"))
-        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
-        .args(options)
-        .disable_help_subcommand(true)
-        .subcommand(plan::command());
-    #[cfg(feature = "report")]
-    let command = command.subcommand(report::command());
-    #[cfg(feature = "record")]
-    let command = command.subcommand(record::command());
-    command
+    })
 }
 
 /// Turns what `clap` reports into what we say: a text that was asked for, or a refusal on one line.
