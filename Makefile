@@ -5,11 +5,11 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-16s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 build: ## Build the program (release); needs no network once the dependencies are there
 	@echo "make build: $(TARGET_DIR)/release/pendularm"
@@ -77,6 +77,7 @@ lint: ## Check formatting and lints; any warning fails
 	$(CARGO) fmt --check --all
 	$(CARGO) fmt --check --manifest-path fuzz/Cargo.toml
 	$(CARGO) fmt --check --manifest-path python/Cargo.toml
+	$(CARGO) fmt --check --manifest-path ros2/Cargo.toml
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
@@ -110,6 +111,15 @@ wheel: build ## Build the Python wheel with the program in it: python/target/whe
 
 test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" picks tests
 	@bash scripts/test-python.sh $(ARGS)
+
+ros2: ## Join a running arm to a ROS 2 graph, on Zenoh; ARGS="--connect 127.0.0.1:9095 --domain 0 --namespace /left"
+	@echo "make ros2: a build of some minutes the first time; then in the foreground until SIGINT"
+	$(CARGO) build --release --locked --manifest-path ros2/Cargo.toml --target-dir "$(TARGET_DIR)/ros2"
+	@exec "$(TARGET_DIR)/ros2/release/pendularm-ros2" $(ARGS)
+
+test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router and ROS 2 nodes from PyPI
+	@echo "make test-ros2: needs python3, and a network the first time"
+	@bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
 mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"

@@ -68,7 +68,7 @@ else
 fi
 
 # The roslibrust client in tests/clients is left out: it stands for somebody else's program, and has what that has.
-for package in . benches fuzz python; do
+for package in . benches fuzz python ros2; do
     [ -e "$package/Cargo.lock" ] || continue
     say "$package/Cargo.lock: ${checks[*]} (cargo-deny $version)"
     "${deny[@]}" --manifest-path "$package/Cargo.toml" --all-features --locked --log-level error \

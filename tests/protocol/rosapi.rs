@@ -458,6 +458,18 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
         "rcl_interfaces/msg/SetParametersResult",
         "tf2_web_republisher/msg/TFSubscriptionFeedback",
         "tf2_web_republisher/msg/TFSubscriptionGoal",
+        "action_msgs/msg/GoalInfo",
+        "action_msgs/msg/GoalStatus",
+        "action_msgs/msg/GoalStatusArray",
+        "control_msgs/msg/JointComponentTolerance",
+        "geometry_msgs/msg/Twist",
+        "pendularm_interfaces/msg/CriticalMode",
+        "pendularm_interfaces/msg/Gains",
+        "pendularm_interfaces/msg/Params",
+        "service_msgs/msg/ServiceEventInfo",
+        "trajectory_msgs/msg/MultiDOFJointTrajectory",
+        "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",
+        "unique_identifier_msgs/msg/UUID",
     ];
     let actions = Action::ALL.map(Action::type_name);
     let mut expected: Vec<&str> = topics

@@ -1,6 +1,7 @@
 //! `/joint_trajectory_controller/follow_joint_trajectory`, as a planner's client uses it.
 
 use crate::common::{Client, Runtime};
+use pendularm::protocol::catalog::Action;
 use pendularm::protocol::op::follow::MAX_POINTS;
 use serde_json::{Value, json};
 
@@ -57,6 +58,9 @@ fn a_path_is_followed_to_its_end_with_feedback_on_the_way() {
         "path_tolerance": [{"name": "joint1", "position": 1.0, "velocity": -1, "acceleration": 0}],
         "goal_tolerance": [{"name": "joint1", "position": 0.02}, {"name": "joint2", "position": 0.02}],
         "goal_time_tolerance": {"secs": 10, "nsecs": 0},
+        "multi_dof_trajectory": {"joint_names": [], "points": []},
+        "component_path_tolerance": [],
+        "component_goal_tolerance": [],
     });
     client.send(&goal("plan", &args));
     let end = result(&mut client);
@@ -73,6 +77,9 @@ fn a_path_is_followed_to_its_end_with_feedback_on_the_way() {
     assert!(feedback.len() > 10, "{}", feedback.len());
     for one in &feedback {
         let values = &one["values"];
+        for field in Action::FollowJointTrajectory.feedback_fields() {
+            assert!(values.get(field.name).is_some(), "{}: {values}", field.name);
+        }
         for joint in 0..2 {
             let of = |part: &str| values[part]["positions"][joint].as_f64().unwrap();
             assert!((of("desired") - of("actual") - of("error")).abs() < 1e-12);

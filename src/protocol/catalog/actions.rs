@@ -3,10 +3,10 @@
 //! **Invariant:** an action has the fields of the services and topics that do the same, where there are such; others
 //! have those of ROS 2.
 
-use super::entry::{Field, optional, required};
+use super::entry::{Field, Type, message, optional, required};
 use super::node::Node;
 use super::services::{Service, WISH};
-use super::table::table;
+use super::table::{fields, table};
 use super::topics::{TRANSFORMS, Topic};
 use crate::protocol::names;
 
@@ -18,41 +18,48 @@ table! {
             name: "/ik_action",
             type_name: "pendularm_interfaces/action/MoveTo",
             owner: Node::IkAction,
-            goal: Service::SendGoal.fields(),
-            result: Topic::IkResult.fields(),
-            feedback: Topic::IkFeedback.fields(),
+            goal: message("pendularm_interfaces/action/MoveTo_Goal", Service::SendGoal.fields()),
+            result: message("pendularm_interfaces/action/MoveTo_Result", Topic::IkResult.fields()),
+            feedback: message("pendularm_interfaces/action/MoveTo_Feedback", Topic::IkFeedback.fields()),
         },
         /// Frames for web viewers, as feedback.
         TfSubscription = ActionEntry {
             name: "/tf2_web_republisher",
             type_name: "tf2_web_republisher_interfaces/action/TFSubscription",
             owner: Node::TfRepublisher,
-            goal: &WISH,
-            result: &[],
-            feedback: &TRANSFORMS,
+            goal: message("tf2_web_republisher_interfaces/action/TFSubscription_Goal", &WISH),
+            result: message("tf2_web_republisher_interfaces/action/TFSubscription_Result", &[]),
+            feedback: message("tf2_web_republisher_interfaces/action/TFSubscription_Feedback", &TRANSFORMS),
         },
         /// Leads the arm along a path.
         FollowJointTrajectory = ActionEntry {
             name: "/joint_trajectory_controller/follow_joint_trajectory",
             type_name: "control_msgs/action/FollowJointTrajectory",
             owner: Node::JointTrajectoryController,
-            goal: &[
+            goal: message("control_msgs/action/FollowJointTrajectory_Goal", fields![
                 required("trajectory", "trajectory_msgs/msg/JointTrajectory", ""),
+                optional("multi_dof_trajectory", "trajectory_msgs/msg/MultiDOFJointTrajectory", ""),
                 optional("path_tolerance", "control_msgs/msg/JointTolerance[]", ""),
+                optional("component_path_tolerance", "control_msgs/msg/JointComponentTolerance[]", ""),
                 optional("goal_tolerance", "control_msgs/msg/JointTolerance[]", ""),
+                optional("component_goal_tolerance", "control_msgs/msg/JointComponentTolerance[]", ""),
                 optional("goal_time_tolerance", "builtin_interfaces/msg/Duration", "s, ns"),
-            ],
-            result: &[
+            ]),
+            result: message("control_msgs/action/FollowJointTrajectory_Result", fields![
                 required("error_code", "int32", ""),
                 required("error_string", "string", ""),
-            ],
-            feedback: &[
+            ]),
+            feedback: message("control_msgs/action/FollowJointTrajectory_Feedback", fields![
                 required("header", "std_msgs/msg/Header", ""),
                 required("joint_names", "string[]", ""),
                 required("desired", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("actual", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("error", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
-            ],
+                required("multi_dof_joint_names", "string[]", ""),
+                required("multi_dof_desired", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
+                required("multi_dof_actual", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
+                required("multi_dof_error", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
+            ]),
         },
     }
 }
@@ -61,9 +68,9 @@ pub(super) struct ActionEntry {
     name: &'static str,
     type_name: &'static str,
     owner: Node,
-    goal: &'static [Field],
-    result: &'static [Field],
-    feedback: &'static [Field],
+    goal: Type,
+    result: Type,
+    feedback: Type,
 }
 
 impl Action {
@@ -98,21 +105,28 @@ impl Action {
         matches!(self, Self::FollowJointTrajectory)
     }
 
+    /// The types of a goal, a result and feedback.
+    #[must_use]
+    pub const fn parts(self) -> [Type; 3] {
+        let entry = self.entry();
+        [entry.goal, entry.result, entry.feedback]
+    }
+
     /// The fields of a goal.
     #[must_use]
     pub const fn goal_fields(self) -> &'static [Field] {
-        self.entry().goal
+        self.entry().goal.fields
     }
 
     /// The fields of a result.
     #[must_use]
     pub const fn result_fields(self) -> &'static [Field] {
-        self.entry().result
+        self.entry().result.fields
     }
 
     /// The fields of feedback.
     #[must_use]
     pub const fn feedback_fields(self) -> &'static [Field] {
-        self.entry().feedback
+        self.entry().feedback.fields
     }
 }

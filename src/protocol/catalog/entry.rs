@@ -23,16 +23,22 @@ pub struct Field {
 pub enum Count {
     /// Once.
     One,
-    /// Any number of times: `float64[]`.
+    /// Any number of times, perhaps up to a bound: `float64[]`, `float64[<=3]`.
     Any,
+    /// So many times: `uint8[16]`.
+    Exactly(usize),
 }
 
 impl Field {
     /// The field's type without brackets, and how often it is there.
     #[must_use]
     pub fn element(&self) -> (&'static str, Count) {
-        match self.kind.strip_suffix("[]") {
-            Some(kind) => (kind, Count::Any),
+        let array = self.kind.strip_suffix(']');
+        match array.and_then(|kind| kind.rsplit_once('[')) {
+            Some((kind, count)) => match count.parse() {
+                Ok(count) => (kind, Count::Exactly(count)),
+                Err(_) => (kind, Count::Any),
+            },
             None => (self.kind, Count::One),
         }
     }

@@ -11,6 +11,7 @@ mod entry;
 mod node;
 mod parameter_types;
 pub mod playback;
+mod ros2_types;
 pub mod rosapi;
 mod services;
 mod table;

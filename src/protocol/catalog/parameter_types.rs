@@ -39,10 +39,10 @@ pub(super) const TYPES: [Type; 7] = [
             required("dynamic_typing", "bool", ""),
             required(
                 "floating_point_range",
-                "rcl_interfaces/msg/FloatingPointRange[]",
+                "rcl_interfaces/msg/FloatingPointRange[<=1]",
                 "",
             ),
-            required("integer_range", "rcl_interfaces/msg/IntegerRange[]", ""),
+            required("integer_range", "rcl_interfaces/msg/IntegerRange[<=1]", ""),
         ],
     ),
     message(

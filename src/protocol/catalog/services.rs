@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** a service that a client can call is a row here, and a row that no node serves does not compile.
 
-use super::entry::{Field, ServiceEntry, optional, required, service};
+use super::entry::{Field, ServiceEntry, Type, message, optional, required, service};
 use super::node::Node;
 use super::playback::Playback;
 use super::rosapi::Rosapi;
@@ -308,6 +308,13 @@ const CRITICAL: [Field; 3] = [
     required("growth_per_step", "float64", ""),
     required("frequency", "float64", "Hz"),
     required("joint", "int64", ""),
+];
+
+/// The types that are inside requests and responses alone.
+pub(super) const TYPES: [Type; 3] = [
+    message(GAINS_TYPE, &GAINS),
+    message(PARAMS_TYPE, &PARAMS),
+    message(CRITICAL_TYPE, &CRITICAL),
 ];
 
 impl Field {

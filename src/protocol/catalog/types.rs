@@ -5,9 +5,9 @@
 
 pub use super::entry::{Constant, Count, Type};
 use super::entry::{Field, byte, message, required};
-use super::parameter_types;
 use super::services::WISH;
 use super::topics::{TRANSFORMS, Topic};
+use super::{Action, parameter_types, ros2_types, services};
 use crate::protocol::names;
 
 /// Stands between the definitions of a type and of the types in it: 80 of these in a line.
@@ -16,13 +16,20 @@ const SEPARATOR: &str = "=";
 /// All message types: those of the topics, then those inside.
 pub fn all() -> impl Iterator<Item = Type> {
     let topics = Topic::ALL.into_iter().map(Topic::message);
-    topics.chain(PARTS).chain(parameter_types::TYPES)
+    topics
+        .chain(PARTS)
+        .chain(services::TYPES)
+        .chain(parameter_types::TYPES)
+        .chain(ros2_types::TYPES)
 }
 
-/// The type of that name; its middle part may be left out.
+/// The type of that name, which may be that of an action's goal, result or feedback too; its middle part may be left
+/// out.
 #[must_use]
 pub fn find(name: &str) -> Option<Type> {
-    all().find(|one| names::same_type(one.name, name))
+    let parts = Action::ALL.into_iter().flat_map(Action::parts);
+    let mut all = all().chain(parts);
+    all.find(|one| names::same_type(one.name, name))
 }
 
 /// `first`, and every type inside it, each once, in the order of first mention.

@@ -137,7 +137,7 @@ fn message(out: &mut Vec<u8>, one: Type, msg: &Value) {
         let inner = cdr::message_type(kind);
         match count {
             Count::One => single(out, kind, inner, value),
-            Count::Any => many(out, kind, inner, value),
+            Count::Any | Count::Exactly(_) => many(out, kind, inner, value),
         }
     }
 }

@@ -50,6 +50,12 @@ impl Writer {
                         self.single(kind, inner, entry);
                     }
                 }
+                // Without a count in front: the type has it.
+                Count::Exactly(count) => {
+                    for at in 0..count {
+                        self.single(kind, inner, value.get(at).unwrap_or(&ABSENT));
+                    }
+                }
             }
         }
     }
@@ -69,6 +75,14 @@ impl Writer {
             "bool" => self.aligned([u8::from(value.as_bool().unwrap_or_default())]),
             "byte" | "uint8" | "char" => {
                 self.aligned([u8::try_from(unsigned()).unwrap_or(u8::MAX)]);
+            }
+            "int8" => {
+                let number = i8::try_from(signed()).unwrap_or_default();
+                self.aligned(number.to_le_bytes());
+            }
+            "uint16" => {
+                let number = u16::try_from(unsigned()).unwrap_or(u16::MAX);
+                self.aligned(number.to_le_bytes());
             }
             "int32" => {
                 let number = i32::try_from(signed()).unwrap_or_default();
@@ -138,6 +152,23 @@ mod tests {
         expected.extend(f64::NAN.to_le_bytes());
         expected.extend([0, 0, 0, 0]);
         assert_eq!(encode(one, &msg), expected);
+    }
+
+    /// Written out by hand: no count in front of the 16 bytes, a byte with a sign behind them.
+    #[test]
+    fn an_array_of_a_fixed_length_has_no_count() {
+        let one = types::find("action_msgs/msg/GoalStatus").unwrap();
+        let uuid: Vec<u8> = (1..=16).collect();
+        let info = json!({"goal_id": {"uuid": uuid}, "stamp": {"sec": 3, "nanosec": 4}});
+        let msg = json!({"goal_info": info, "status": -1});
+        let expected = [&HEADER[..], &uuid, &[3, 0, 0, 0, 4, 0, 0, 0, 255]].concat();
+        assert_eq!(encode(one, &msg), expected);
+        let cut = json!({"goal_info": {"goal_id": {"uuid": [7]}}});
+        assert_eq!(
+            encode(one, &cut)[4..8],
+            [7, 0, 0, 0],
+            "what is not there is 0"
+        );
     }
 
     #[test]

@@ -70,6 +70,10 @@ impl<'a> CdrReader<'a> {
                     let entries = (0..count).map(|_| self.single(kind, inner));
                     Value::Array(entries.collect::<Result<_, _>>()?)
                 }
+                Count::Exactly(count) => {
+                    let entries = (0..count).map(|_| self.single(kind, inner));
+                    Value::Array(entries.collect::<Result<_, _>>()?)
+                }
             };
             members.insert(field.name.to_owned(), value);
         }
@@ -80,6 +84,8 @@ impl<'a> CdrReader<'a> {
         Ok(match kind {
             "bool" => (u8::from_le_bytes(self.aligned()?) != 0).into(),
             "byte" | "uint8" | "char" => u8::from_le_bytes(self.aligned()?).into(),
+            "int8" => i8::from_le_bytes(self.aligned()?).into(),
+            "uint16" => u16::from_le_bytes(self.aligned()?).into(),
             "int32" => i32::from_le_bytes(self.aligned()?).into(),
             "uint32" => u32::from_le_bytes(self.aligned()?).into(),
             "int64" => i64::from_le_bytes(self.aligned()?).into(),
@@ -139,6 +145,14 @@ mod tests {
         assert_eq!(read, msg);
         assert_eq!(cdr::encode(one, &read), bytes);
         assert!(read["position"][1].as_f64().unwrap().is_sign_negative());
+        let one = types::find("action_msgs/msg/GoalStatusArray").unwrap();
+        let info = json!({"goal_id": {"uuid": (0..16).collect::<Vec<_>>()}, "stamp": {"sec": 1, "nanosec": 2}});
+        let msg = json!({"status_list": [{"goal_info": info, "status": -4}, {"goal_info": info, "status": 5}]});
+        assert_eq!(decode(one, &cdr::encode(one, &msg)).unwrap(), msg);
+        let one = types::find("control_msgs/msg/JointComponentTolerance").unwrap();
+        let msg = json!({"joint_name": "joint1", "component": 65_535, "position": 1.5, "velocity": -1.0,
+            "acceleration": 0.0});
+        assert_eq!(decode(one, &cdr::encode(one, &msg)).unwrap(), msg);
         let one = types::find("diagnostic_msgs/msg/DiagnosticArray").unwrap();
         let msg = json!({"header": {"stamp": {"sec": 3, "nanosec": 0}, "frame_id": ""}, "status": [{"level": 2,
             "name": "\u{e9}", "message": "", "hardware_id": "", "values": [{"key": "a", "value": "b"}]}]});

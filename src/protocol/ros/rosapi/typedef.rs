@@ -21,7 +21,7 @@ pub struct TypeDef {
     pub fieldnames: Vec<&'static str>,
     /// Their types, without brackets.
     pub fieldtypes: Vec<String>,
-    /// -1 for one value, 0 for any number.
+    /// -1 for one value, 0 for any number, or how many there are.
     pub fieldarraylen: Vec<i32>,
     /// A value that each may have.
     pub examples: Vec<&'static str>,
@@ -107,7 +107,11 @@ impl TypeDef {
                 .map(|(kind, _)| names::short_type(kind))
                 .collect(),
             fieldarraylen: elements()
-                .map(|(_, count)| if count == Count::One { -1 } else { 0 })
+                .map(|(_, count)| match count {
+                    Count::One => -1,
+                    Count::Any => 0,
+                    Count::Exactly(count) => i32::try_from(count).unwrap_or(i32::MAX),
+                })
                 .collect(),
             examples: elements()
                 .map(|(kind, count)| example(kind, count))
@@ -121,7 +125,7 @@ impl TypeDef {
 /// A value of that type, as JSON text.
 fn example(kind: &str, count: Count) -> &'static str {
     match (count, kind) {
-        (Count::Any, _) => "[]",
+        (Count::Any | Count::Exactly(_), _) => "[]",
         (_, "string") => "",
         (_, "bool") => "false",
         (_, "float64" | "float32") => "0.0",

@@ -1,0 +1,268 @@
+//! The arm's side: one rosbridge connection, with the topics that are wanted and the calls that wait.
+//!
+//! **Invariant:** whoever asks is answered, at the latest when the connection ends.
+
+use std::collections::HashMap;
+use std::time::Duration;
+
+use actix::prelude::*;
+use serde_json::{Value, json};
+use tokio::sync::{mpsc, oneshot};
+
+use super::link::{self, Came, Ended};
+use super::{
+    Answer, ArmNews, Ask, Cancel, GoalEvent, GoalNews, Heard, Listen, MAILBOX, Pursue, Tell,
+};
+use crate::report::{self, Repeated};
+
+/// Pause between two tries to connect.
+const RETRY: Duration = Duration::from_secs(1);
+/// Calls that may wait for their answers.
+const MAX_CALLS: usize = 1024;
+
+/// The arm's side.
+pub struct Gateway {
+    address: String,
+    token: Option<String>,
+    graph: Recipient<ArmNews>,
+    /// Which connection this is, from 1.
+    link: u64,
+    outgoing: Option<mpsc::Sender<String>>,
+    listeners: HashMap<&'static str, Recipient<Heard>>,
+    calls: HashMap<u64, oneshot::Sender<Result<Answer, String>>>,
+    last_call: u64,
+    goals: HashMap<String, Recipient<GoalNews>>,
+    complaint: Repeated,
+}
+
+impl Gateway {
+    /// A gateway to the arm at that address, which tells the graph when the arm comes and goes.
+    #[must_use]
+    pub fn new(address: String, token: Option<String>, graph: Recipient<ArmNews>) -> Self {
+        Self {
+            address,
+            token,
+            graph,
+            link: 0,
+            outgoing: None,
+            listeners: HashMap::new(),
+            calls: HashMap::new(),
+            last_call: 0,
+            goals: HashMap::new(),
+            complaint: Repeated::default(),
+        }
+    }
+
+    fn connect(&mut self, ctx: &mut Context<Self>) {
+        self.link += 1;
+        let opening = link::open(
+            self.link,
+            self.address.clone(),
+            self.token.clone(),
+            ctx.address(),
+        );
+        let opened = opening
+            .into_actor(self)
+            .map(|opened, gateway, ctx| match opened {
+                Ok(outgoing) => {
+                    gateway.outgoing = Some(outgoing);
+                    gateway.complaint.clear();
+                    gateway.graph.do_send(ArmNews::Here);
+                }
+                Err(why) => {
+                    let line = format!("no arm at {} yet: {why}", gateway.address);
+                    gateway.complaint.say(line);
+                    ctx.run_later(RETRY, Self::connect);
+                }
+            });
+        ctx.spawn(opened);
+    }
+
+    /// Puts a frame into the queue; the error says why it can't.
+    fn write(&self, frame: &Value) -> Result<(), String> {
+        let outgoing = self.outgoing.as_ref().ok_or("the arm is not there")?;
+        let sent = outgoing.try_send(format!("{frame}\n"));
+        sent.map_err(|_| "the arm takes nothing more".to_owned())
+    }
+
+    fn answered(&mut self, mut frame: Value) {
+        let id = frame.get("id").and_then(Value::as_u64);
+        let Some(waiting) = id.and_then(|id| self.calls.remove(&id)) else {
+            return;
+        };
+        let answer = Answer {
+            values: frame.get_mut("values").map(Value::take).unwrap_or_default(),
+            is_success: frame.get("result") == Some(&Value::Bool(true)),
+            status: text(&frame, "status").to_owned(),
+        };
+        // Who asked may have gone meanwhile.
+        let _ = waiting.send(Ok(answer));
+    }
+}
+
+impl Gateway {
+    /// Tells who sent a goal how it goes, or how it ended.
+    fn tell_of_goal(&mut self, mut frame: Value, is_end: bool) {
+        let id = text(&frame, "id").to_owned();
+        let values = frame.get_mut("values").map(Value::take).unwrap_or_default();
+        let status = frame.get("status").and_then(Value::as_i64);
+        let to = if is_end {
+            self.goals.remove(&id)
+        } else {
+            self.goals.get(&id).cloned()
+        };
+        let Some(to) = to else { return };
+        let what = if is_end {
+            let status = status.and_then(|status| i8::try_from(status).ok());
+            GoalEvent::End(status.unwrap_or_default(), values)
+        } else {
+            GoalEvent::Feedback(values)
+        };
+        if to.try_send(GoalNews { id, what }).is_err() {
+            report::say("what the arm says of a goal was dropped: its action is busy");
+        }
+    }
+}
+
+impl Actor for Gateway {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Self::Context) {
+        ctx.set_mailbox_capacity(MAILBOX);
+        self.connect(ctx);
+    }
+}
+
+impl Handler<Came> for Gateway {
+    type Result = ();
+
+    fn handle(&mut self, Came { link, mut frame }: Came, _: &mut Self::Context) {
+        if link != self.link {
+            return;
+        }
+        match text(&frame, "op") {
+            "publish" => {
+                let listener = self.listeners.get(text(&frame, "topic"));
+                let msg = frame.get_mut("msg").map(Value::take);
+                if let (Some(listener), Some(msg)) = (listener, msg)
+                    && listener.try_send(Heard(msg)).is_err()
+                {
+                    report::say("a message of the arm's was dropped: its publisher is busy");
+                }
+            }
+            "service_response" => self.answered(frame),
+            "action_feedback" => self.tell_of_goal(frame, false),
+            "action_result" => self.tell_of_goal(frame, true),
+            "status" if matches!(text(&frame, "level"), "error" | "warning") => {
+                report::say(&format!("the arm says: {}", text(&frame, "msg")));
+            }
+            _ => {}
+        }
+    }
+}
+
+impl Handler<Ended> for Gateway {
+    type Result = ();
+
+    fn handle(&mut self, Ended { link, why }: Ended, ctx: &mut Self::Context) {
+        if link != self.link {
+            return;
+        }
+        report::say(&format!("the arm at {} has gone: {why}", self.address));
+        self.outgoing = None;
+        self.listeners.clear();
+        // Dropped, each says so to whoever waits.
+        self.calls.clear();
+        self.goals.clear();
+        self.graph.do_send(ArmNews::Gone);
+        ctx.run_later(RETRY, Self::connect);
+    }
+}
+
+impl Handler<Listen> for Gateway {
+    type Result = ();
+
+    fn handle(&mut self, Listen { topic, to }: Listen, _: &mut Self::Context) {
+        let op = match to {
+            Some(to) => {
+                self.listeners.insert(topic, to);
+                "subscribe"
+            }
+            None => {
+                self.listeners.remove(topic);
+                "unsubscribe"
+            }
+        };
+        // An arm that has gone takes its topics along, and they are asked for again when it is back.
+        let _ = self.write(&json!({"op": op, "topic": topic}));
+    }
+}
+
+impl Handler<Tell> for Gateway {
+    type Result = ();
+
+    fn handle(&mut self, Tell { topic, msg }: Tell, _: &mut Self::Context) {
+        if let Err(why) = self.write(&json!({"op": "publish", "topic": topic, "msg": msg})) {
+            report::say(&format!("{topic}: a message was dropped: {why}"));
+        }
+    }
+}
+
+impl Handler<Pursue> for Gateway {
+    type Result = Result<(), String>;
+
+    fn handle(&mut self, pursue: Pursue, _: &mut Self::Context) -> Self::Result {
+        let Pursue {
+            action,
+            id,
+            goal,
+            to,
+        } = pursue;
+        let (name, kind) = (action.name(), action.type_name());
+        self.write(
+            &json!({"op": "send_action_goal", "id": id, "action": name, "action_type": kind,
+            "args": goal, "feedback": true}),
+        )?;
+        self.goals.insert(id, to);
+        Ok(())
+    }
+}
+
+impl Handler<Cancel> for Gateway {
+    type Result = ();
+
+    fn handle(&mut self, Cancel { action, id }: Cancel, _: &mut Self::Context) {
+        let name = action.name();
+        // If the arm has gone, so has the goal.
+        let _ = self.write(&json!({"op": "cancel_action_goal", "id": id, "action": name}));
+    }
+}
+
+impl Handler<Ask> for Gateway {
+    type Result = ResponseFuture<Result<Answer, String>>;
+
+    fn handle(&mut self, Ask { service, args }: Ask, _: &mut Self::Context) -> Self::Result {
+        self.last_call += 1;
+        let id = self.last_call;
+        let call = json!({"op": "call_service", "id": id, "service": service, "args": args});
+        let written = if self.calls.len() < MAX_CALLS {
+            self.write(&call)
+        } else {
+            Err("too many calls wait".to_owned())
+        };
+        let (sender, receiver) = oneshot::channel();
+        if written.is_ok() {
+            self.calls.insert(id, sender);
+        }
+        Box::pin(async move {
+            written?;
+            let answer = receiver.await;
+            answer.unwrap_or_else(|_| Err("the arm has gone".to_owned()))
+        })
+    }
+}
+
+/// A member that is a text; empty if there is none.
+fn text<'a>(frame: &'a Value, name: &str) -> &'a str {
+    frame.get(name).and_then(Value::as_str).unwrap_or_default()
+}

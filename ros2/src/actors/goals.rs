@@ -1,0 +1,328 @@
+//! The goals of one action: which are there, how they stand, and who waits for them. Pure: `R` is a request.
+//!
+//! **Invariant:** no more than [`MAX_GOALS`] are kept; the oldest that has ended makes room.
+
+use std::collections::VecDeque;
+use std::time::{SystemTime, UNIX_EPOCH};
+
+use serde_json::{Value, json};
+
+/// Goals that are kept: those that have ended too, for who asks late how.
+pub const MAX_GOALS: usize = 64;
+/// Requests that may wait for the end of one goal.
+const MAX_WAITING: usize = 16;
+/// In front of a goal's id where the arm sees it.
+const PREFIX: &str = "ros2-";
+
+/// The states of `action_msgs/msg/GoalStatus` that are not the arm's to tell.
+const ACCEPTED: i8 = 1;
+const EXECUTING: i8 = 2;
+const CANCELING: i8 = 3;
+
+/// The codes of `action_msgs/srv/CancelGoal`.
+const DONE: i8 = 0;
+const UNKNOWN_GOAL: i8 = 2;
+const GOAL_ENDED: i8 = 3;
+
+/// A goal's id.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GoalId([u8; 16]);
+
+/// A time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Stamp {
+    sec: i64,
+    nanosec: u64,
+}
+
+/// A goal.
+#[derive(Debug)]
+pub struct Goal<R> {
+    id: GoalId,
+    /// When it came.
+    pub stamp: Stamp,
+    status: i8,
+    /// Who sent it, until the arm has said something of it.
+    pub asked: Option<R>,
+    /// Who waits for its end.
+    pub waiting: Vec<R>,
+    result: Option<Value>,
+}
+
+/// The goals, oldest first.
+#[derive(Debug)]
+pub struct Goals<R>(VecDeque<Goal<R>>);
+
+impl<R> Default for Goals<R> {
+    fn default() -> Self {
+        Self(VecDeque::new())
+    }
+}
+
+impl GoalId {
+    /// The member `goal_id` of a message.
+    #[must_use]
+    pub fn read(message: &Value) -> Option<Self> {
+        let numbers = message.pointer("/goal_id/uuid")?.as_array()?;
+        let byte = |number: &Value| number.as_u64().and_then(|number| u8::try_from(number).ok());
+        let bytes: Vec<u8> = numbers.iter().map(byte).collect::<Option<_>>()?;
+        bytes.try_into().ok().map(Self)
+    }
+
+    /// The same as a member of a message.
+    #[must_use]
+    pub fn json(self) -> Value {
+        json!({"uuid": self.0})
+    }
+
+    /// The id by which the arm knows the goal.
+    #[must_use]
+    pub fn text(self) -> String {
+        let hex = self.0.iter().map(|byte| format!("{byte:02x}"));
+        PREFIX.chars().map(String::from).chain(hex).collect()
+    }
+
+    /// The goal that the arm knows by that id.
+    #[must_use]
+    pub fn of_text(text: &str) -> Option<Self> {
+        let number = u128::from_str_radix(text.strip_prefix(PREFIX)?, 16).ok()?;
+        Some(Self(number.to_be_bytes()))
+    }
+
+    fn is_zero(self) -> bool {
+        self.0 == [0; 16]
+    }
+}
+
+impl Stamp {
+    const ZERO: Self = Self { sec: 0, nanosec: 0 };
+
+    /// The time now.
+    #[must_use]
+    pub fn now() -> Self {
+        let since = SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .unwrap_or_default();
+        Self {
+            sec: i64::try_from(since.as_secs()).unwrap_or(i64::MAX),
+            nanosec: since.subsec_nanos().into(),
+        }
+    }
+
+    /// The member `stamp` of a message.
+    #[must_use]
+    pub fn read(message: &Value) -> Self {
+        let part = |name: &str| message.pointer("/stamp").and_then(|stamp| stamp.get(name));
+        Self {
+            sec: part("sec").and_then(Value::as_i64).unwrap_or_default(),
+            nanosec: part("nanosec").and_then(Value::as_u64).unwrap_or_default(),
+        }
+    }
+
+    /// The same as a member of a message.
+    #[must_use]
+    pub fn json(self) -> Value {
+        json!({"sec": self.sec, "nanosec": self.nanosec})
+    }
+}
+
+impl<R> Goals<R> {
+    fn get(&mut self, id: GoalId) -> Option<&mut Goal<R>> {
+        self.0.iter_mut().find(|goal| goal.id == id)
+    }
+
+    /// A goal has come; its request comes back if it can't be taken.
+    ///
+    /// # Errors
+    /// If there is a goal of that id, or no room for another.
+    pub fn begin(&mut self, id: GoalId, asked: R) -> Result<(), R> {
+        if self.get(id).is_some() {
+            return Err(asked);
+        }
+        if self.0.len() >= MAX_GOALS {
+            let ended = self.0.iter().position(|goal| goal.result.is_some());
+            match ended {
+                Some(at) => drop(self.0.remove(at)),
+                None => return Err(asked),
+            }
+        }
+        self.0.push_back(Goal {
+            id,
+            stamp: Stamp::now(),
+            status: ACCEPTED,
+            asked: Some(asked),
+            waiting: Vec::new(),
+            result: None,
+        });
+        Ok(())
+    }
+
+    /// The arm pursues it: who sent it may hear so, once.
+    pub fn accept(&mut self, id: GoalId) -> Option<(R, Stamp)> {
+        let goal = self.get(id)?;
+        let asked = goal.asked.take()?;
+        goal.status = EXECUTING;
+        Some((asked, goal.stamp))
+    }
+
+    /// The arm never pursued it.
+    pub fn remove(&mut self, id: GoalId) -> Option<Goal<R>> {
+        let at = self.0.iter().position(|goal| goal.id == id)?;
+        self.0.remove(at)
+    }
+
+    /// It has ended: those who wait for that.
+    pub fn end(&mut self, id: GoalId, status: i8, result: Value) -> Vec<R> {
+        let Some(goal) = self.get(id) else {
+            return Vec::new();
+        };
+        goal.status = status;
+        goal.result = Some(result);
+        std::mem::take(&mut goal.waiting)
+    }
+
+    /// Somebody waits for its end.
+    ///
+    /// # Errors
+    /// The request, if it has not to wait: with the result, or with none if there is no such goal or no room.
+    pub fn wait(&mut self, id: GoalId, request: R) -> Result<(), (R, Option<&Value>)> {
+        match self.0.iter_mut().find(|goal| goal.id == id) {
+            None => Err((request, None)),
+            Some(goal) if goal.result.is_some() => Err((request, goal.result.as_ref())),
+            Some(goal) if goal.waiting.len() >= MAX_WAITING => Err((request, None)),
+            Some(goal) => {
+                goal.waiting.push(request);
+                Ok(())
+            }
+        }
+    }
+
+    /// The goals that a request to cancel means, and its code. Without an id it means all up to a time, and without that
+    /// all.
+    pub fn cancel(&mut self, id: GoalId, until: Stamp) -> (i8, Vec<GoalId>) {
+        if !id.is_zero() && self.get(id).is_none() {
+            return (UNKNOWN_GOAL, Vec::new());
+        }
+        let is_meant = |goal: &Goal<R>| {
+            let in_time = goal.stamp <= until || (id.is_zero() && until == Stamp::ZERO);
+            goal.id == id || (in_time && (id.is_zero() || until != Stamp::ZERO))
+        };
+        let meant = self.0.iter_mut().filter(|goal| is_meant(goal));
+        let running: Vec<_> = meant.filter(|goal| goal.result.is_none()).collect();
+        if running.is_empty() && !id.is_zero() {
+            return (GOAL_ENDED, Vec::new());
+        }
+        let cancelled = running.into_iter().map(|goal| {
+            goal.status = CANCELING;
+            goal.id
+        });
+        (DONE, cancelled.collect())
+    }
+
+    /// A goal as `action_msgs/msg/GoalInfo`.
+    pub fn info(&mut self, id: GoalId) -> Value {
+        let stamp = self.get(id).map_or(Stamp::ZERO, |goal| goal.stamp);
+        json!({"goal_id": id.json(), "stamp": stamp.json()})
+    }
+
+    /// All as `action_msgs/msg/GoalStatusArray`, but for those of which the arm has not said anything.
+    #[must_use]
+    pub fn status(&self) -> Value {
+        let known = self.0.iter().filter(|goal| goal.asked.is_none());
+        let list: Vec<Value> = known
+            .map(|goal| {
+                let info = json!({"goal_id": goal.id.json(), "stamp": goal.stamp.json()});
+                json!({"goal_info": info, "status": goal.status})
+            })
+            .collect();
+        json!({"status_list": list})
+    }
+
+    /// Everybody who waits for anything.
+    pub fn drain(&mut self) -> Vec<R> {
+        let goals = self.0.drain(..);
+        goals
+            .flat_map(|goal| goal.asked.into_iter().chain(goal.waiting))
+            .collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn id(number: u8) -> GoalId {
+        GoalId([number; 16])
+    }
+
+    fn running(count: u8) -> Goals<u8> {
+        let mut goals = Goals::default();
+        for number in 1..=count {
+            goals.begin(id(number), number).unwrap();
+            goals.accept(id(number)).unwrap();
+        }
+        goals
+    }
+
+    #[test]
+    fn an_id_is_the_same_in_messages_and_at_the_arm() {
+        let one = GoalId([0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 255]);
+        assert_eq!(GoalId::of_text(&one.text()), Some(one));
+        assert_eq!(GoalId::read(&json!({"goal_id": one.json()})), Some(one));
+        assert_eq!(GoalId::of_text("trial-1"), None);
+        assert_eq!(GoalId::read(&json!({"goal_id": {"uuid": [1]}})), None);
+    }
+
+    #[test]
+    fn a_goal_is_accepted_once_and_its_end_is_told_to_all_who_wait() {
+        let mut goals = Goals::default();
+        goals.begin(id(1), 'a').unwrap();
+        assert_eq!(goals.begin(id(1), 'b'), Err('b'), "that id is taken");
+        assert_eq!(goals.status(), json!({"status_list": []}), "not yet");
+        assert_eq!(goals.accept(id(1)).unwrap().0, 'a');
+        assert_eq!(goals.accept(id(1)), None);
+        goals.wait(id(1), 'c').unwrap();
+        goals.wait(id(1), 'd').unwrap();
+        assert_eq!(goals.end(id(1), 4, json!("done")), ['c', 'd']);
+        assert_eq!(goals.wait(id(1), 'e'), Err(('e', Some(&json!("done")))));
+        assert_eq!(goals.wait(id(2), 'f'), Err(('f', None)));
+        assert_eq!(goals.status()["status_list"][0]["status"], 4);
+    }
+
+    #[test]
+    fn cancelling_means_one_goal_or_all_or_all_up_to_a_time() {
+        let mut goals = running(3);
+        let never = Stamp::ZERO;
+        assert_eq!(goals.cancel(id(2), never), (DONE, vec![id(2)]));
+        assert_eq!(goals.cancel(id(9), never), (UNKNOWN_GOAL, vec![]));
+        goals.end(id(1), 4, json!({}));
+        assert_eq!(goals.cancel(id(1), never), (GOAL_ENDED, vec![]));
+        assert_eq!(goals.cancel(id(0), never), (DONE, vec![id(2), id(3)]));
+        let early = Stamp { sec: 1, nanosec: 0 };
+        assert_eq!(goals.cancel(id(0), early), (DONE, vec![]));
+        assert_eq!(
+            goals.cancel(id(0), Stamp::now()),
+            (DONE, vec![id(2), id(3)])
+        );
+        assert_eq!(goals.status()["status_list"][1]["status"], CANCELING);
+    }
+
+    #[test]
+    fn the_oldest_that_has_ended_makes_room() {
+        let count = u8::try_from(MAX_GOALS).unwrap();
+        let mut goals = running(count);
+        assert_eq!(goals.begin(id(200), 200), Err(200), "all are running");
+        goals.end(id(3), 4, json!({}));
+        goals.begin(id(200), 200).unwrap();
+        assert_eq!(goals.0.len(), MAX_GOALS);
+        assert!(goals.get(id(3)).is_none());
+    }
+
+    #[test]
+    fn nobody_is_forgotten_when_the_arm_goes() {
+        let mut goals = running(1);
+        goals.begin(id(2), 20).unwrap();
+        goals.wait(id(1), 10).unwrap();
+        assert_eq!(goals.drain(), [10, 20]);
+    }
+}

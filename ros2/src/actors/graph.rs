@@ -1,0 +1,321 @@
+//! The Zenoh session, and what of the arm stands in the graph.
+//!
+//! **Invariant:** the graph shows the arm's nodes, topics and services while the arm answers, and not otherwise.
+
+use std::rc::Rc;
+use std::time::Duration;
+
+use actix::prelude::*;
+use pendularm::protocol::catalog::types;
+use pendularm::protocol::catalog::{Action, Direction, Node, Rosapi, Service, Topic};
+use serde_json::json;
+use tokio::sync::oneshot;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::sample::SampleKind;
+use zenoh::session::TransportEvent;
+use zenoh::{Config, Session, Wait};
+
+use super::action::ActionBridge;
+use super::gateway::Gateway;
+use super::publisher::Publisher;
+use super::service::ServiceBridge;
+use super::subscription::Subscription;
+use super::{ArmNews, Leave};
+use crate::convention::hash::type_hash;
+use crate::convention::{EndpointKind, GraphNode, Named, Place, Seat};
+use crate::interfaces::{ActionInterface, ServiceInterface};
+use crate::options::Options;
+use crate::report::{self, Repeated};
+
+/// Pause between two tries to find the router.
+const RETRY: Duration = Duration::from_secs(1);
+
+/// The graph's side.
+pub struct Graph {
+    options: Options,
+    services: Vec<(Service, Rc<ServiceInterface>)>,
+    actions: Vec<(Action, Rc<ActionInterface>)>,
+    session: Option<Session>,
+    /// There while the arm answers.
+    gateway: Option<Addr<Gateway>>,
+    is_arm_here: bool,
+    nodes: Vec<LivelinessToken>,
+    bridges: Vec<Recipient<Leave>>,
+    /// The last number that an endpoint has had. None is used again: the one before may still be going.
+    last_seat: usize,
+    complaint: Repeated,
+}
+
+/// The router's connection came or went.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct RouterNews {
+    is_here: bool,
+}
+
+impl Graph {
+    /// The graph's side of what was asked for.
+    #[must_use]
+    pub fn new(options: Options) -> Self {
+        let rosapi = Rosapi::ALL.into_iter().map(Service::Rosapi);
+        let services = Service::ALL.into_iter().chain(rosapi);
+        let interface = |service: Service| {
+            ServiceInterface::of_catalogue(
+                service.type_name(),
+                service.fields(),
+                service.response_fields(),
+            )
+        };
+        Self {
+            options,
+            services: services
+                .map(|service| (service, Rc::new(interface(service))))
+                .collect(),
+            actions: Action::ALL
+                .into_iter()
+                .map(|action| (action, Rc::new(ActionInterface::of_catalogue(action))))
+                .collect(),
+            session: None,
+            gateway: None,
+            is_arm_here: false,
+            nodes: Vec::new(),
+            bridges: Vec::new(),
+            // Behind the numbers of the nodes.
+            last_seat: Node::ALL.len(),
+            complaint: Repeated::default(),
+        }
+    }
+
+    /// Looks for the router, on a thread of its own.
+    fn open(&mut self, ctx: &mut Context<Self>) {
+        let config = match config(&self.options.router) {
+            Ok(config) => config,
+            Err(error) => {
+                report::say(&format!("--router {}: {error}", self.options.router));
+                std::process::exit(2);
+            }
+        };
+        let (sender, receiver) = oneshot::channel();
+        let news = ctx.address().recipient();
+        std::thread::spawn(move || sender.send(open_session(config, news)));
+        let opened = receiver.into_actor(self).map(|opened, graph, ctx| {
+            match opened {
+                Ok(Ok(session)) => graph.opened(session),
+                Ok(Err(_)) | Err(_) => {
+                    let router = &graph.options.router;
+                    graph.complaint.say(format!("no router at {router} yet"));
+                    ctx.run_later(RETRY, Self::open);
+                }
+            };
+        });
+        ctx.spawn(opened);
+    }
+
+    fn opened(&mut self, session: Session) {
+        self.session = Some(session);
+        self.join();
+    }
+
+    /// Puts the arm into the graph, if both are there.
+    fn join(&mut self) {
+        if !self.is_arm_here || !self.bridges.is_empty() {
+            return;
+        }
+        if let Err(error) = self.try_join() {
+            report::say(&format!("not all of the arm could join: {error}"));
+        }
+    }
+
+    fn try_join(&mut self) -> zenoh::Result<()> {
+        let (Some(session), Some(gateway)) = (&self.session, &self.gateway) else {
+            return Ok(());
+        };
+        let place = Place {
+            domain: self.options.domain,
+            namespace: self.options.namespace.clone(),
+            zid: session.zid().to_string(),
+        };
+        let mut seats = Seats {
+            place,
+            last: self.last_seat,
+        };
+        for node in Node::ALL {
+            let token = seats.place.node_token(graph_node(node));
+            self.nodes
+                .push(session.liveliness().declare_token(token).wait()?);
+        }
+        for topic in Topic::ALL {
+            let Some(one) = types::find(topic.type_name()) else {
+                continue;
+            };
+            let hash = type_hash(one, &[]);
+            let kind = match topic.direction() {
+                Direction::Subscribed => EndpointKind::Subscription,
+                Direction::Published if topic.is_latched() => EndpointKind::LatchedPublisher,
+                Direction::Published => EndpointKind::Publisher,
+            };
+            let seat = seats.next(topic.owner(), kind, topic.name(), one.name, &hash);
+            let gateway = gateway.clone();
+            self.bridges.push(match topic.direction() {
+                Direction::Published => {
+                    Publisher::join(session, topic, one, seat, gateway)?.recipient()
+                }
+                Direction::Subscribed => {
+                    Subscription::join(session, topic, one, seat, gateway)?.recipient()
+                }
+            });
+        }
+        for (service, interface) in &self.services {
+            let seat = seats.service(service.owner(), service.name(), interface);
+            let interface = Rc::clone(interface);
+            let bridge = ServiceBridge::join(session, *service, interface, seat, gateway.clone())?;
+            self.bridges.push(bridge.recipient());
+        }
+        for (action, interface) in &self.actions {
+            let interface = Rc::clone(interface);
+            let bridge =
+                ActionBridge::join(session, *action, interface, &mut seats, gateway.clone())?;
+            self.bridges.push(bridge.recipient());
+        }
+        self.last_seat = seats.last;
+        self.say_joined();
+        Ok(())
+    }
+
+    fn say_joined(&self) {
+        let published = |topic: &Topic| topic.direction() == Direction::Published;
+        let out = Topic::ALL.iter().filter(|topic| published(topic)).count();
+        report::say(&format!(
+            "the arm at {} is in domain {} as {}: {} nodes, {out} topics out, {} in, {} services, {} actions",
+            self.options.connect,
+            self.options.domain,
+            match self.options.namespace.as_str() {
+                "" => "/",
+                namespace => namespace,
+            },
+            Node::ALL.len(),
+            Topic::ALL.len() - out,
+            self.services.len(),
+            self.actions.len()
+        ));
+    }
+
+    fn leave(&mut self) {
+        for bridge in self.bridges.drain(..) {
+            bridge.do_send(Leave);
+        }
+        self.nodes.clear();
+    }
+}
+
+impl Actor for Graph {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Self::Context) {
+        let connect = self.options.connect.clone();
+        let token = self.options.token.take();
+        let gateway = Gateway::new(connect, token, ctx.address().recipient());
+        self.gateway = Some(gateway.start());
+        self.open(ctx);
+    }
+}
+
+impl Handler<ArmNews> for Graph {
+    type Result = ();
+
+    fn handle(&mut self, news: ArmNews, _: &mut Self::Context) {
+        self.is_arm_here = news == ArmNews::Here;
+        match news {
+            ArmNews::Here => self.join(),
+            ArmNews::Gone => self.leave(),
+        }
+    }
+}
+
+impl Handler<RouterNews> for Graph {
+    type Result = ();
+
+    fn handle(&mut self, RouterNews { is_here }: RouterNews, _: &mut Self::Context) {
+        let router = &self.options.router;
+        // Zenoh finds the way back by itself, and declares everything again.
+        if is_here {
+            report::say(&format!("the router at {router} is here"));
+        } else {
+            report::say(&format!("the router at {router} has gone; looking for it"));
+        }
+    }
+}
+
+/// Hands out places in the graph, each under a number of its own.
+pub(super) struct Seats {
+    place: Place,
+    last: usize,
+}
+
+impl Seats {
+    /// The next place, for a topic.
+    pub(super) fn next(
+        &mut self,
+        owner: Node,
+        kind: EndpointKind,
+        name: &str,
+        type_name: &str,
+        hash: &str,
+    ) -> Seat {
+        self.last += 1;
+        let of = Named {
+            name,
+            type_name,
+            hash,
+        };
+        self.place.seat(graph_node(owner), self.last, kind, of)
+    }
+
+    /// The next place, for a service.
+    pub(super) fn service(
+        &mut self,
+        owner: Node,
+        name: &str,
+        interface: &ServiceInterface,
+    ) -> Seat {
+        let kind = EndpointKind::Service;
+        self.next(owner, kind, name, interface.name, &interface.hash)
+    }
+}
+
+/// A node as the graph has it.
+fn graph_node(node: Node) -> GraphNode {
+    let id = Node::ALL.iter().position(|one| *one == node);
+    GraphNode {
+        id: id.unwrap_or_default(),
+        name: node.name(),
+    }
+}
+
+/// Opens a session, and has told when the router comes and goes. Zenoh waits here, and refuses to do so on a thread of an
+/// asynchronous runtime.
+fn open_session(config: Config, news: Recipient<RouterNews>) -> zenoh::Result<Session> {
+    let session = zenoh::open(config).wait()?;
+    let info = session.info();
+    let listener = info.transport_events_listener().history(true);
+    let tell = move |event: TransportEvent| {
+        news.do_send(RouterNews {
+            is_here: event.kind() == SampleKind::Put,
+        });
+    };
+    listener.callback(tell).background().wait()?;
+    Ok(session)
+}
+
+/// A session that connects to the router and to nothing else: it neither listens nor looks around.
+fn config(router: &str) -> zenoh::Result<Config> {
+    let config = json!({
+        "mode": "client",
+        "connect": {"endpoints": [router]},
+        "listen": {"endpoints": []},
+        "scouting": {"multicast": {"enabled": false}, "gossip": {"enabled": false}},
+        // Latched messages are kept by their time.
+        "timestamping": {"enabled": true},
+    });
+    Config::from_json5(&config.to_string())
+}

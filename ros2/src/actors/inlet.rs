@@ -1,0 +1,80 @@
+//! A service in the graph: requests in, replies out.
+//!
+//! **Invariant:** a request that is taken is replied to: with a response, or with an error that says why there is none.
+
+use pendularm::protocol::ros::{cdr, cdr_reader};
+use serde_json::Value;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::query::{Query, Queryable};
+use zenoh::{Session, Wait};
+
+use crate::convention::Seat;
+use crate::convention::attachment::Attachment;
+use crate::interfaces::ServiceInterface;
+use crate::report;
+
+/// A service in the graph, for as long as this is there.
+pub(super) struct Inlet {
+    _queryable: Queryable<()>,
+    _token: LivelinessToken,
+}
+
+impl Inlet {
+    /// A service there. `take` gets every request, and gives it back if there is no room for it.
+    pub(super) fn new(
+        session: &Session,
+        seat: Seat,
+        take: impl Fn(Request) -> Option<Request> + Send + Sync + 'static,
+    ) -> zenoh::Result<Self> {
+        let take = move |query| {
+            if let Some(Request(query)) = take(Request(query)) {
+                refuse(&query, "too many requests wait");
+            }
+        };
+        let queryable = session.declare_queryable(seat.key).complete(true);
+        Ok(Self {
+            _queryable: queryable.callback(take).wait()?,
+            _token: session.liveliness().declare_token(seat.token).wait()?,
+        })
+    }
+}
+
+/// A request.
+pub(super) struct Request(Query);
+
+impl Request {
+    /// Its fields.
+    pub(super) fn read(&self, interface: &ServiceInterface) -> Result<Value, String> {
+        let bytes = self.0.payload().map(|payload| payload.to_bytes());
+        let read = cdr_reader::decode(interface.request, &bytes.unwrap_or_default());
+        read.map_err(|why| why.to_string())
+    }
+
+    /// Replies with a response, under the number and the id of who asked.
+    pub(super) fn respond(self, interface: &ServiceInterface, response: &Value) {
+        let Self(query) = self;
+        let asked = query
+            .attachment()
+            .and_then(|bytes| Attachment::read(&bytes.to_bytes()));
+        let Some(asked) = asked else {
+            return refuse(&query, "a request needs an attachment");
+        };
+        let attachment = Attachment::now(asked.sequence, asked.gid).bytes();
+        let payload = cdr::encode(interface.response, response);
+        let reply = query.reply(query.key_expr(), payload);
+        if let Err(error) = reply.attachment(attachment).wait() {
+            report::say(&format!("{}: {error}", query.key_expr()));
+        }
+    }
+
+    /// Replies with a reason, which clients of ROS 2 log.
+    pub(super) fn refuse(self, why: &str) {
+        refuse(&self.0, why);
+    }
+}
+
+fn refuse(query: &Query, why: &str) {
+    if let Err(error) = query.reply_err(why).wait() {
+        report::say(&format!("{}: {error}", query.key_expr()));
+    }
+}

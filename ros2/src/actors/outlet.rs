@@ -1,0 +1,93 @@
+//! A publisher in the graph: bytes out, numbered.
+//!
+//! **Invariant:** the numbers of one publisher's messages begin with 1, and none is missing.
+
+use std::time::Duration;
+
+use zenoh::liveliness::LivelinessToken;
+use zenoh::matching::MatchingListener;
+use zenoh::{Session, Wait};
+use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
+
+use crate::convention::attachment::{Attachment, GID};
+use crate::convention::{Seat, gid};
+use crate::report;
+
+/// How often a latched topic says which message was its last, if there was a new one: as `rmw_zenoh` does.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+
+/// The parts of a publisher that live and end together.
+struct Parts {
+    publisher: AdvancedPublisher<'static>,
+    _token: LivelinessToken,
+    #[allow(dead_code, reason = "it lives as long as this")]
+    watched: Option<MatchingListener<()>>,
+}
+
+/// A publisher in the graph.
+pub(super) struct Outlet {
+    /// There until it is dropped.
+    parts: Option<Parts>,
+    key: String,
+    gid: [u8; GID],
+    sequence: i64,
+}
+
+impl Outlet {
+    /// A publisher there. A latched one gives its last message to whoever comes late.
+    pub(super) fn new(session: &Session, seat: Seat, is_latched: bool) -> zenoh::Result<Self> {
+        let gid = gid(&seat.token);
+        let builder = session.declare_publisher(seat.key.clone()).advanced();
+        let builder = if is_latched {
+            builder
+                .publisher_detection()
+                .cache(CacheConfig::default().max_samples(1))
+                .sample_miss_detection(MissDetectionConfig::default().sporadic_heartbeat(HEARTBEAT))
+        } else {
+            builder
+        };
+        let parts = Parts {
+            publisher: builder.wait()?,
+            _token: session.liveliness().declare_token(seat.token).wait()?,
+            watched: None,
+        };
+        Ok(Self {
+            parts: Some(parts),
+            key: seat.key,
+            gid,
+            sequence: 0,
+        })
+    }
+
+    /// Tells whether somebody wants the messages, whenever that changes.
+    pub(super) fn watch(
+        &mut self,
+        tell: impl Fn(bool) + Send + Sync + 'static,
+    ) -> zenoh::Result<()> {
+        if let Some(parts) = &mut self.parts {
+            let tell = move |status: zenoh::matching::MatchingStatus| tell(status.matching());
+            let listener = parts.publisher.matching_listener().callback(tell);
+            parts.watched = Some(listener.wait()?);
+        }
+        Ok(())
+    }
+
+    /// Publishes a message.
+    pub(super) fn put(&mut self, payload: Vec<u8>) {
+        let Some(parts) = &self.parts else { return };
+        self.sequence += 1;
+        let attachment = Attachment::now(self.sequence, self.gid).bytes();
+        let put = parts.publisher.put(payload).attachment(attachment);
+        if let Err(error) = put.wait() {
+            report::say(&format!("{}: {error}", self.key));
+        }
+    }
+}
+
+impl Drop for Outlet {
+    fn drop(&mut self) {
+        // Zenoh waits for the heartbeat's task to end, which it refuses to do on a thread of an asynchronous runtime.
+        let parts = self.parts.take();
+        std::thread::spawn(move || drop(parts));
+    }
+}

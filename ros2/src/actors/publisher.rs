@@ -1,0 +1,97 @@
+//! A topic of the arm's in the graph: JSON in, CDR out.
+//!
+//! **Invariant:** the arm is asked for a topic's messages only while somebody in the graph wants them, or if who comes
+//! late gets the last one.
+
+use actix::prelude::*;
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::catalog::types::Type;
+use pendularm::protocol::ros::cdr;
+use zenoh::Session;
+
+use super::gateway::Gateway;
+use super::outlet::Outlet;
+use super::{Heard, Leave, Listen, MAILBOX};
+use crate::convention::Seat;
+
+/// A topic in the graph.
+pub struct Publisher {
+    topic: Topic,
+    one: Type,
+    outlet: Outlet,
+    gateway: Addr<Gateway>,
+}
+
+/// Somebody in the graph wants the topic, or nobody any longer.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Watched(bool);
+
+impl Publisher {
+    /// Starts it there.
+    ///
+    /// # Errors
+    /// If Zenoh refuses.
+    pub fn join(
+        session: &Session,
+        topic: Topic,
+        one: Type,
+        seat: Seat,
+        gateway: Addr<Gateway>,
+    ) -> zenoh::Result<Addr<Self>> {
+        let mut context = Context::new();
+        context.set_mailbox_capacity(MAILBOX);
+        let mut outlet = Outlet::new(session, seat, topic.is_latched())?;
+        if !topic.is_latched() {
+            let address: Addr<Self> = context.address();
+            outlet.watch(move |is_wanted| address.do_send(Watched(is_wanted)))?;
+        }
+        Ok(context.run(Self {
+            topic,
+            one,
+            outlet,
+            gateway,
+        }))
+    }
+
+    fn listen(&self, is_wanted: bool, ctx: &Context<Self>) {
+        self.gateway.do_send(Listen {
+            topic: self.topic.name(),
+            to: is_wanted.then(|| ctx.address().recipient()),
+        });
+    }
+}
+
+impl Actor for Publisher {
+    type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Self::Context) {
+        if self.topic.is_latched() {
+            self.listen(true, ctx);
+        }
+    }
+}
+
+impl Handler<Watched> for Publisher {
+    type Result = ();
+
+    fn handle(&mut self, Watched(is_wanted): Watched, ctx: &mut Self::Context) {
+        self.listen(is_wanted, ctx);
+    }
+}
+
+impl Handler<Heard> for Publisher {
+    type Result = ();
+
+    fn handle(&mut self, Heard(msg): Heard, _: &mut Self::Context) {
+        self.outlet.put(cdr::encode(self.one, &msg));
+    }
+}
+
+impl Handler<Leave> for Publisher {
+    type Result = ();
+
+    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
+        ctx.stop();
+    }
+}

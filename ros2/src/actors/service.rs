@@ -1,0 +1,108 @@
+//! A service of the arm's in the graph: a request is a call, and its answer the response.
+//!
+//! **Invariant:** every request is answered, also when the arm goes while it waits.
+
+use std::rc::Rc;
+
+use actix::prelude::*;
+use pendularm::protocol::catalog::Service;
+use zenoh::Session;
+
+use super::gateway::Gateway;
+use super::inlet::{Inlet, Request};
+use super::{Answer, Ask, Leave, MAILBOX};
+use crate::convention::Seat;
+use crate::interfaces::ServiceInterface;
+use crate::translation;
+
+/// A service in the graph.
+pub struct ServiceBridge {
+    service: Service,
+    interface: Rc<ServiceInterface>,
+    gateway: Addr<Gateway>,
+    _inlet: Inlet,
+}
+
+/// Somebody asks.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Requested(Request);
+
+impl ServiceBridge {
+    /// Starts it there.
+    ///
+    /// # Errors
+    /// If Zenoh refuses.
+    pub fn join(
+        session: &Session,
+        service: Service,
+        interface: Rc<ServiceInterface>,
+        seat: Seat,
+        gateway: Addr<Gateway>,
+    ) -> zenoh::Result<Addr<Self>> {
+        let mut context = Context::new();
+        context.set_mailbox_capacity(MAILBOX);
+        let address: Addr<Self> = context.address();
+        let inlet = Inlet::new(session, seat, move |request| {
+            let sent = address.try_send(Requested(request));
+            sent.err().map(|error| error.into_inner().0)
+        })?;
+        Ok(context.run(Self {
+            service,
+            interface,
+            gateway,
+            _inlet: inlet,
+        }))
+    }
+}
+
+impl Actor for ServiceBridge {
+    type Context = Context<Self>;
+}
+
+impl Handler<Requested> for ServiceBridge {
+    type Result = ();
+
+    fn handle(&mut self, Requested(request): Requested, _: &mut Self::Context) {
+        let mut read = match request.read(&self.interface) {
+            Ok(read) => read,
+            Err(why) => return request.refuse(&why),
+        };
+        let asked = self.gateway.send(Ask {
+            service: self.service.name(),
+            args: translation::arguments(self.service.fields(), &mut read),
+        });
+        let interface = Rc::clone(&self.interface);
+        // Not the actor's: it is answered when the actor has gone, too.
+        actix_rt::spawn(async move {
+            match asked.await {
+                Ok(Ok(answer)) => reply(request, &interface, answer),
+                Ok(Err(why)) => request.refuse(&why),
+                Err(error) => request.refuse(&error.to_string()),
+            }
+        });
+    }
+}
+
+impl Handler<Leave> for ServiceBridge {
+    type Result = ();
+
+    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
+        ctx.stop();
+    }
+}
+
+/// Replies with the arm's answer.
+fn reply(request: Request, interface: &ServiceInterface, answer: Answer) {
+    let Answer {
+        values,
+        is_success,
+        status,
+    } = answer;
+    if is_success || interface.tells_outcome() {
+        let response = translation::response(interface, values, is_success, &status);
+        request.respond(interface, &response);
+    } else {
+        request.refuse(&status);
+    }
+}

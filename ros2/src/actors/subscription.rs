@@ -1,0 +1,93 @@
+//! A topic that the arm takes: CDR in, JSON out.
+//!
+//! **Invariant:** bytes that are no message of the type are dropped, and it is said why.
+
+use actix::prelude::*;
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::catalog::types::Type;
+use pendularm::protocol::ros::cdr_reader;
+use zenoh::liveliness::LivelinessToken;
+use zenoh::pubsub::Subscriber;
+use zenoh::sample::Sample;
+use zenoh::{Session, Wait};
+
+use super::gateway::Gateway;
+use super::{Leave, MAILBOX, Tell};
+use crate::convention::Seat;
+use crate::report::{self, Repeated};
+
+/// A topic that the arm takes.
+pub struct Subscription {
+    topic: Topic,
+    one: Type,
+    gateway: Addr<Gateway>,
+    complaint: Repeated,
+    _subscriber: Subscriber<()>,
+    _token: LivelinessToken,
+}
+
+/// A message of somebody's in the graph.
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Taken(Sample);
+
+impl Subscription {
+    /// Starts it: messages come under `key`, and the graph knows it by `token`.
+    ///
+    /// # Errors
+    /// If Zenoh refuses.
+    pub fn join(
+        session: &Session,
+        topic: Topic,
+        one: Type,
+        seat: Seat,
+        gateway: Addr<Gateway>,
+    ) -> zenoh::Result<Addr<Self>> {
+        let mut context = Context::new();
+        context.set_mailbox_capacity(MAILBOX);
+        let address: Addr<Self> = context.address();
+        let take = move |sample| {
+            if address.try_send(Taken(sample)).is_err() {
+                report::say(&format!(
+                    "{}: a message was dropped: too many wait",
+                    topic.name()
+                ));
+            }
+        };
+        let subscriber = session.declare_subscriber(seat.key).callback(take).wait()?;
+        Ok(context.run(Self {
+            topic,
+            one,
+            gateway,
+            complaint: Repeated::default(),
+            _subscriber: subscriber,
+            _token: session.liveliness().declare_token(seat.token).wait()?,
+        }))
+    }
+}
+
+impl Actor for Subscription {
+    type Context = Context<Self>;
+}
+
+impl Handler<Taken> for Subscription {
+    type Result = ();
+
+    fn handle(&mut self, Taken(sample): Taken, _: &mut Self::Context) {
+        let topic = self.topic.name();
+        match cdr_reader::decode(self.one, &sample.payload().to_bytes()) {
+            Ok(msg) => self.gateway.do_send(Tell { topic, msg }),
+            Err(why) => self
+                .complaint
+                .say(format!("{topic}: a message was dropped: {why}")),
+        }
+    }
+}
+
+impl Handler<Leave> for Subscription {
+    type Result = ();
+
+    fn handle(&mut self, _: Leave, ctx: &mut Self::Context) {
+        ctx.stop();
+    }
+}

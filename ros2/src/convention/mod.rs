@@ -1,0 +1,231 @@
+//! The wire conventions of `rmw_zenoh` (ROS 2 Jazzy): names, tokens, attachments, type hashes. Pure.
+//!
+//! **Invariant:** names stand here as ROS 2 has them on Zenoh, and nowhere else.
+
+pub mod attachment;
+pub mod hash;
+
+use twox_hash::XxHash3_128;
+
+/// How many messages a peer's queue keeps, which the graph shows.
+const DEPTH: usize = 10;
+
+/// Where everything stands: a domain, a namespace in it, and the session that it belongs to.
+#[derive(Debug, Clone)]
+pub struct Place {
+    /// The ROS domain.
+    pub domain: u32,
+    /// Empty, or a namespace with a slash in front: `/left`.
+    pub namespace: String,
+    /// The Zenoh session's id.
+    pub zid: String,
+}
+
+/// A kind of endpoint.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EndpointKind {
+    /// A publisher.
+    Publisher,
+    /// A publisher whose last message a new subscription gets.
+    LatchedPublisher,
+    /// A subscription.
+    Subscription,
+    /// A service.
+    Service,
+}
+
+impl EndpointKind {
+    const fn code(self) -> &'static str {
+        match self {
+            Self::Publisher | Self::LatchedPublisher => "MP",
+            Self::Subscription => "MS",
+            Self::Service => "SS",
+        }
+    }
+
+    /// Reliability, durability, history and depth, deadline, lifespan, liveliness: empty is the default.
+    fn qos(self) -> String {
+        match self {
+            Self::LatchedPublisher => ":1:,1:,:,:,,".to_owned(),
+            _ => format!("::,{DEPTH}:,:,:,,"),
+        }
+    }
+}
+
+/// A topic or service with its type.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Named<'a> {
+    /// Its name without a namespace: `/joint_states`.
+    pub name: &'a str,
+    /// Its type: `sensor_msgs/msg/JointState`.
+    pub type_name: &'a str,
+    /// The type's hash.
+    pub hash: &'a str,
+}
+
+/// Where an endpoint stands: the key expression of what it sends or takes, and the token by which the graph knows it.
+#[derive(Debug, Clone)]
+pub struct Seat {
+    /// The key expression.
+    pub key: String,
+    /// The token.
+    pub token: String,
+}
+
+/// A node in the graph.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct GraphNode {
+    /// Its number in the session.
+    pub id: usize,
+    /// Its name.
+    pub name: &'static str,
+}
+
+impl Place {
+    /// The name with the namespace in front.
+    fn full_name(&self, name: &str) -> String {
+        format!("{}{name}", self.namespace)
+    }
+
+    /// The key expression of a topic's messages or a service's requests.
+    fn key(&self, of: Named<'_>) -> String {
+        let full = self.full_name(of.name);
+        let name = full.trim_matches('/');
+        format!(
+            "{}/{name}/{}/{}",
+            self.domain,
+            dds_type(of.type_name),
+            of.hash
+        )
+    }
+
+    /// The token by which the graph knows a node.
+    #[must_use]
+    pub fn node_token(&self, node: GraphNode) -> String {
+        self.token_head(node, node.id, "NN")
+    }
+
+    /// The token by which the graph knows an endpoint of a node.
+    fn token(&self, node: GraphNode, id: usize, kind: EndpointKind, of: Named<'_>) -> String {
+        format!(
+            "{}/{}/{}/{}/{}",
+            self.token_head(node, id, kind.code()),
+            mangled(&self.full_name(of.name)),
+            dds_type(of.type_name),
+            of.hash,
+            kind.qos()
+        )
+    }
+
+    /// Where an endpoint of a node stands.
+    #[must_use]
+    pub fn seat(&self, node: GraphNode, id: usize, kind: EndpointKind, of: Named<'_>) -> Seat {
+        Seat {
+            key: self.key(of),
+            token: self.token(node, id, kind, of),
+        }
+    }
+
+    /// All up to the node's name; the enclave is empty.
+    fn token_head(&self, node: GraphNode, id: usize, code: &str) -> String {
+        format!(
+            "@ros2_lv/{}/{}/{}/{id}/{code}/%/{}/{}",
+            self.domain,
+            self.zid,
+            node.id,
+            mangled(&self.namespace),
+            node.name
+        )
+    }
+}
+
+/// The id of an endpoint, by which its messages are known to come from it.
+#[must_use]
+pub fn gid(token: &str) -> [u8; attachment::GID] {
+    // The lower half comes first.
+    XxHash3_128::oneshot(token.as_bytes()).to_le_bytes()
+}
+
+/// The name of a type as DDS has it: `sensor_msgs::msg::dds_::JointState_`.
+fn dds_type(name: &str) -> String {
+    match name.rsplit_once('/') {
+        Some((package, last)) => format!("{}::dds_::{last}_", package.replace('/', "::")),
+        None => format!("{name}_"),
+    }
+}
+
+/// A name as one part of a key expression.
+fn mangled(name: &str) -> String {
+    match name {
+        "" => "%".to_owned(),
+        name => name.replace('/', "%"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STRING: Named<'_> = Named {
+        name: "/chatter",
+        type_name: "std_msgs/msg/String",
+        hash: "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    };
+    const TALKER: GraphNode = GraphNode {
+        id: 0,
+        name: "talker",
+    };
+
+    fn place(namespace: &str) -> Place {
+        Place {
+            domain: 2,
+            namespace: namespace.to_owned(),
+            zid: "8b20917502ee955ac4476e0266340d5c".to_owned(),
+        }
+    }
+
+    /// The examples of `rmw_zenoh`'s design document, but for the depth of the queue.
+    #[test]
+    fn names_are_those_of_the_design_document() {
+        let here = place("");
+        let hash = STRING.hash;
+        assert_eq!(
+            here.key(STRING),
+            format!("2/chatter/std_msgs::msg::dds_::String_/{hash}")
+        );
+        assert_eq!(
+            here.node_token(TALKER),
+            "@ros2_lv/2/8b20917502ee955ac4476e0266340d5c/0/0/NN/%/%/talker"
+        );
+        assert_eq!(
+            here.token(TALKER, 10, EndpointKind::Publisher, STRING),
+            format!(
+                "@ros2_lv/2/8b20917502ee955ac4476e0266340d5c/0/10/MP/%/%/talker/%chatter/std_msgs::msg::dds_::String_/\
+                 {hash}/::,10:,:,:,,"
+            )
+        );
+    }
+
+    #[test]
+    fn a_namespace_is_in_front_of_the_name_and_beside_the_node() {
+        let left = place("/robots/left");
+        assert!(left.key(STRING).starts_with("2/robots/left/chatter/"));
+        let token = left.token(TALKER, 3, EndpointKind::Service, STRING);
+        assert!(
+            token.contains("/0/3/SS/%/%robots%left/talker/%robots%left%chatter/"),
+            "{token}"
+        );
+        let latched = left.token(TALKER, 3, EndpointKind::LatchedPublisher, STRING);
+        assert!(latched.ends_with("/:1:,1:,:,:,,"), "{latched}");
+    }
+
+    /// `xxhash.xxh3_128(b"talker")` of the Python package xxhash, its bytes reversed.
+    #[test]
+    fn a_gid_is_the_hash_of_the_token_with_its_lower_half_first() {
+        let hex: String = gid("talker")
+            .iter()
+            .map(|byte| format!("{byte:02x}"))
+            .collect();
+        assert_eq!(hex, "3e9b3d2ef749af1720f58afb5a119735");
+    }
+}

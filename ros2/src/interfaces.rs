@@ -1,0 +1,236 @@
+//! The types of the graph, made of the catalogue's: those of messages as they are, and the parts of which ROS 2 makes
+//! services and actions.
+//!
+//! A call that the arm refuses has no answer in ROS 2. So the services that are this project's own answer `success` and
+//! `message` too, behind the fields of the catalogue.
+//!
+//! **Invariant:** what is written by a type here has that type's hash.
+
+use pendularm::protocol::catalog::types::Type;
+use pendularm::protocol::catalog::{Action, Field};
+
+use crate::convention::hash::type_hash;
+
+/// Where this project's own types are.
+const OURS: &str = "pendularm_interfaces/";
+/// The field that ROS 2 puts into a type without any, which DDS does not know.
+const NOTHING: [Field; 1] = [field("structure_needs_at_least_one_member", "uint8")];
+/// How a call went.
+const OUTCOME: [Field; 2] = [field("success", "bool"), field("message", "string")];
+
+/// A service's type.
+#[derive(Debug, Clone)]
+pub struct ServiceInterface {
+    /// Its name: `pendularm_interfaces/srv/Pause`.
+    pub name: &'static str,
+    /// A request.
+    pub request: Type,
+    /// A response.
+    pub response: Type,
+    /// Its hash.
+    pub hash: String,
+}
+
+const fn field(name: &'static str, kind: &'static str) -> Field {
+    Field {
+        name,
+        kind,
+        unit: "",
+        required: true,
+    }
+}
+
+impl ServiceInterface {
+    /// The type of one of the arm's services.
+    #[must_use]
+    pub fn of_catalogue(name: &'static str, request: &'static [Field], response: &[Field]) -> Self {
+        let mut response = response.to_vec();
+        if name.starts_with(OURS) {
+            response.extend(OUTCOME);
+        }
+        Self::new(name, request, &response)
+    }
+
+    /// A type of those fields, in a request and in a response.
+    #[must_use]
+    pub fn new(name: &'static str, request: &[Field], response: &[Field]) -> Self {
+        Self::with(name, request, response, &[])
+    }
+
+    /// The same with types inside of which the catalogue has another shape.
+    fn with(name: &'static str, request: &[Field], response: &[Field], inside: &[Type]) -> Self {
+        let request = structure(format!("{name}_Request"), request);
+        let response = structure(format!("{name}_Response"), response);
+        let up_to_one = |one: Type| kept(format!("{}[<=1]", one.name));
+        let event = structure(
+            format!("{name}_Event"),
+            &[
+                field("info", "service_msgs/msg/ServiceEventInfo"),
+                field("request", up_to_one(request)),
+                field("response", up_to_one(response)),
+            ],
+        );
+        let whole = structure(
+            name.to_owned(),
+            &[
+                field("request_message", request.name),
+                field("response_message", response.name),
+                field("event_message", event.name),
+            ],
+        );
+        let beside = [&[request, response, event], inside].concat();
+        let hash = type_hash(whole, &beside);
+        Self {
+            name,
+            request,
+            response,
+            hash,
+        }
+    }
+
+    /// Whether a response says how the call went.
+    #[must_use]
+    pub fn tells_outcome(&self) -> bool {
+        self.response.fields.ends_with(&OUTCOME)
+    }
+}
+
+/// An action's type: two services and a message, beside those that all actions have.
+#[derive(Debug, Clone)]
+pub struct ActionInterface {
+    /// Sends a goal.
+    pub send_goal: ServiceInterface,
+    /// Waits for a goal's end.
+    pub get_result: ServiceInterface,
+    /// Feedback, with the id of its goal.
+    pub feedback: Type,
+    /// Its hash.
+    pub feedback_hash: String,
+}
+
+impl ActionInterface {
+    /// The type of one of the arm's actions.
+    #[must_use]
+    pub fn of_catalogue(action: Action) -> Self {
+        let name = action.type_name();
+        let [goal, result, feedback] = action
+            .parts()
+            .map(|part| structure(part.name.to_owned(), part.fields));
+        let beside = [goal, result, feedback];
+        let goal_id = field("goal_id", "unique_identifier_msgs/msg/UUID");
+        let send_goal = ServiceInterface::with(
+            kept(format!("{name}_SendGoal")),
+            &[goal_id, field("goal", goal.name)],
+            &[
+                field("accepted", "bool"),
+                field("stamp", "builtin_interfaces/msg/Time"),
+            ],
+            &beside,
+        );
+        let get_result = ServiceInterface::with(
+            kept(format!("{name}_GetResult")),
+            &[goal_id],
+            &[field("status", "int8"), field("result", result.name)],
+            &beside,
+        );
+        let message = structure(
+            format!("{name}_FeedbackMessage"),
+            &[goal_id, field("feedback", feedback.name)],
+        );
+        Self {
+            send_goal,
+            get_result,
+            feedback: message,
+            feedback_hash: type_hash(message, &beside),
+        }
+    }
+}
+
+/// The service by which goals of every action are cancelled.
+#[must_use]
+pub fn cancel_goal() -> ServiceInterface {
+    ServiceInterface::new(
+        "action_msgs/srv/CancelGoal",
+        &[field("goal_info", "action_msgs/msg/GoalInfo")],
+        &[
+            field("return_code", "int8"),
+            field("goals_canceling", "action_msgs/msg/GoalInfo[]"),
+        ],
+    )
+}
+
+/// A type of that name, as ROS 2 has it: with one field at least, and without arrays of arrays, whose rows stand one
+/// behind the other.
+fn structure(name: String, fields: &[Field]) -> Type {
+    let flat = |field: &Field| match field.kind.strip_suffix("[][]") {
+        Some(kind) => Field {
+            kind: kept(format!("{kind}[]")),
+            ..*field
+        },
+        None => *field,
+    };
+    let fields = if fields.is_empty() { &NOTHING } else { fields };
+    Type {
+        name: kept(name),
+        fields: Box::leak(fields.iter().map(flat).collect()),
+        constants: &[],
+    }
+}
+
+/// A text for as long as the program runs: types are made once, when it starts, and needed until it ends.
+fn kept(text: String) -> &'static str {
+    Box::leak(text.into_boxed_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use pendularm::protocol::catalog::Service;
+
+    use super::*;
+
+    /// From `rmw_zenoh`'s design document.
+    #[test]
+    fn a_service_has_the_hash_that_ros_2_has() {
+        let two = [field("a", "int64"), field("b", "int64")];
+        let sum = [field("sum", "int64")];
+        let one = ServiceInterface::new("example_interfaces/srv/AddTwoInts", &two, &sum);
+        assert_eq!(
+            one.hash,
+            "RIHS01_e118de6bf5eeb66a2491b5bda11202e7b68f198d6f67922cf30364858239c81a"
+        );
+    }
+
+    /// By the code that ROS 2 generates for them.
+    #[test]
+    fn services_of_ros_2_have_its_hashes() {
+        let names = Service::DescribeParameters.fields();
+        let described = Service::DescribeParameters.response_fields();
+        let name = Service::DescribeParameters.type_name();
+        let one = ServiceInterface::of_catalogue(name, names, described);
+        assert_eq!(
+            one.hash,
+            "RIHS01_845b484d71eb0673dae682f2e3ba3c4851a65a3dcfb97bddd82c5b57e91e4cff"
+        );
+        assert_eq!(
+            cancel_goal().hash,
+            "RIHS01_573d8b0a534451d7bc2ac8c5ffde8ac14b8593b7001175d0cd6516dcbeb8689a"
+        );
+    }
+
+    #[test]
+    fn only_our_own_services_tell_how_a_call_went() {
+        let ours = ServiceInterface::of_catalogue("pendularm_interfaces/srv/TrialStop", &[], &[]);
+        assert!(ours.tells_outcome());
+        assert_eq!(ours.request.fields, NOTHING);
+        let theirs = ServiceInterface::of_catalogue("rosapi_msgs/srv/Topics", &[], &[]);
+        assert!(!theirs.tells_outcome());
+        assert_eq!(theirs.response.fields, NOTHING);
+    }
+
+    #[test]
+    fn rows_stand_one_behind_the_other() {
+        let rows = [field("positions", "float64[][]")];
+        let one = ServiceInterface::of_catalogue("pendularm_interfaces/srv/Rollout", &[], &rows);
+        assert_eq!(one.response.fields[0].kind, "float64[]");
+    }
+}

@@ -1,0 +1,139 @@
+//! The command line.
+//!
+//! **Invariant:** nothing here is asked to listen: the program connects, to the arm and to a router.
+
+use clap::{Arg, Command, value_parser};
+
+/// The options, with their defaults.
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Host and port of the arm.
+    pub connect: String,
+    /// The endpoint of the Zenoh router.
+    pub router: String,
+    /// The ROS domain.
+    pub domain: u32,
+    /// Empty, or a namespace with a slash in front.
+    pub namespace: String,
+    /// The token that the arm wants to be shown.
+    pub token: Option<String>,
+}
+
+const ABOUT: &str = "\
+Joins a running pendularm to a ROS 2 graph: its topics, services and actions, by the wire conventions of rmw_zenoh \
+(Jazzy).
+
+For several arms, run one of these for each, with a namespace of its own.";
+
+const AFTER_HELP: &str = "\
+On the ROS side: `ros2 run rmw_zenoh_cpp rmw_zenohd`, and RMW_IMPLEMENTATION=rmw_zenoh_cpp everywhere.
+The program listens nowhere, and goes on trying when the arm or the router is not there.
+Exit status: 2 for a bad option.";
+
+/// Reads the command line, or ends the program with what is wrong with it.
+#[must_use]
+pub fn read() -> Options {
+    let matches = command().get_matches();
+    let text = |name: &str| matches.get_one::<String>(name).cloned();
+    Options {
+        connect: text("connect").unwrap_or_default(),
+        router: text("router").unwrap_or_default(),
+        domain: matches.get_one("domain").copied().unwrap_or_default(),
+        namespace: text("namespace").unwrap_or_default(),
+        token: text("token").or_else(token_of_environment),
+    }
+}
+
+/// The variable that the arm itself reads.
+fn token_of_environment() -> Option<String> {
+    std::env::var("ARM_SIM_TOKEN")
+        .ok()
+        .filter(|token| !token.is_empty())
+}
+
+fn command() -> Command {
+    Command::new("pendularm-ros2")
+        .version(env!("CARGO_PKG_VERSION"))
+        .about(ABOUT)
+        .after_help(AFTER_HELP)
+        .arg(
+            Arg::new("connect")
+                .long("connect")
+                .value_name("HOST:PORT")
+                .default_value("127.0.0.1:9095")
+                .help("Where the arm listens"),
+        )
+        .arg(
+            Arg::new("router")
+                .long("router")
+                .value_name("ENDPOINT")
+                .default_value("tcp/127.0.0.1:7447")
+                .help("Where a Zenoh router listens, as Zenoh writes it; nothing is encrypted or asks who is there"),
+        )
+        .arg(
+            Arg::new("domain")
+                .long("domain")
+                .value_name("N")
+                .default_value("0")
+                .value_parser(value_parser!(u32).range(0..=232))
+                .help("The ROS domain, 0 to 232"),
+        )
+        .arg(
+            Arg::new("namespace")
+                .long("namespace")
+                .value_name("/NAME")
+                .value_parser(read_namespace)
+                .help("Put in front of every name, for an arm among others"),
+        )
+        .arg(
+            Arg::new("token").long("token").value_name("TOKEN").help(
+                "What the arm wants to be shown; who may list this machine's processes sees it, so better use the \
+                 variable ARM_SIM_TOKEN",
+            ),
+        )
+}
+
+/// A namespace as ROS 2 allows it, with a slash in front.
+fn read_namespace(text: &str) -> Result<String, String> {
+    let names = text.strip_prefix('/').unwrap_or(text);
+    if names.is_empty() {
+        return Ok(String::new());
+    }
+    let is_name = |name: &str| {
+        name.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+            && name
+                .chars()
+                .all(|one| one.is_ascii_alphanumeric() || one == '_')
+    };
+    if names.split('/').all(is_name) {
+        Ok(format!("/{names}"))
+    } else {
+        Err(
+            "it has to be names of letters, digits and underscores behind slashes, such as /left"
+                .to_owned(),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_namespace_has_one_slash_in_front_and_none_behind() {
+        assert_eq!(read_namespace("left"), Ok("/left".to_owned()));
+        assert_eq!(
+            read_namespace("/robots/left"),
+            Ok("/robots/left".to_owned())
+        );
+        assert_eq!(read_namespace("/"), Ok(String::new()));
+        for wrong in ["/left/", "//left", "/2nd", "/le ft", "/a*", "/%", "/a$"] {
+            assert!(read_namespace(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_command_line_is_whole() {
+        command().debug_assert();
+    }
+}

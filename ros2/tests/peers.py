@@ -1,0 +1,581 @@
+"""The bridge against peers that nobody here wrote: peers.py ARM BRIDGE.
+
+The router is eclipse-zenoh, the other ROS 2 nodes are zenoh-ros2-sdk, hashes and definitions are those of rosbags
+(Jazzy).
+Every wait ends when what is waited for is there, or fails after a minute.
+"""
+
+import logging
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+
+import zenoh
+from rosbags.typesys import Stores, get_typestore
+from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
+from zenoh_ros2_sdk.attachment import Attachment
+from zenoh_ros2_sdk.qos import QosDurability, QosProfile
+
+ARM, BRIDGE = sys.argv[1:]
+DOMAIN = 7
+LIMIT = 60.0
+JAZZY = get_typestore(Stores.ROS2_JAZZY)
+LATCHED = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+
+
+def say(text):
+    print(f"peers: {text}", flush=True)
+
+
+def wait_for(what, get):
+    """Waits until `get` gives something, and gives that."""
+    deadline = time.monotonic() + LIMIT
+    while not (found := get()):
+        assert time.monotonic() < deadline, f"not within {LIMIT} s: {what}"
+        time.sleep(0.05)
+    return found
+
+
+def free_port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return one.getsockname()[1]
+
+
+class Process:
+    """A program, and the lines that it says."""
+
+    all = []
+
+    def __init__(self, *command, stream="stderr"):
+        self.process = subprocess.Popen([str(part) for part in command], text=True, **{stream: subprocess.PIPE})
+        Process.all.append(self.process)
+        self.lines = []
+        self.reader = threading.Thread(target=self.read, args=[getattr(self.process, stream)], daemon=True)
+        self.reader.start()
+
+    def read(self, stream):
+        for line in stream:
+            self.lines.append(line.rstrip("\n"))
+
+    def said(self, text, times=1):
+        """The last of so many lines with that text."""
+
+        def get():
+            found = [line for line in self.lines if text in line]
+            assert found or self.process.poll() is None, f"ended: {self.lines}"
+            return found[-1:] if len(found) >= times else None
+
+        return wait_for(f"{text!r} in {self.lines}", get)[0]
+
+    def end(self):
+        self.process.kill()
+        self.process.wait()
+        self.reader.join()
+
+
+def start_router(port):
+    router = Process(sys.executable, Path(__file__).with_name("router.py"), port, stream="stdout")
+    router.said("ready")
+    return router
+
+
+def start_arm(port, *more):
+    arm = Process(ARM, "--bind", f"127.0.0.1:{port}", "--log", "off", *more, stream="stdout")
+    return arm, arm.said("listening on ").removeprefix("listening on ")
+
+
+def start_bridge(arm, router_port, *more):
+    router = f"tcp/127.0.0.1:{router_port}"
+    return Process(BRIDGE, "--connect", arm, "--router", router, "--domain", DOMAIN, *more)
+
+
+def open_session(port):
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["tcp/127.0.0.1:{port}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
+
+
+def tokens(session, kind="*"):
+    """The tokens of that kind in the domain, taken apart: 8 is the node, 9 the name, 10 the type, 11 the hash."""
+    replies = session.liveliness().get(f"@ros2_lv/{DOMAIN}/*/*/*/{kind}/**")
+    return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok]
+
+
+def command_line(port, *arguments):
+    """The output of the SDK's command."""
+    command = [Path(sys.executable).with_name("zenoh-ros2"), "--no-daemon", "--router", f"127.0.0.1:{port}"]
+    command += ["--domain-id", str(DOMAIN), "--timeout", "5", *arguments]
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=LIMIT).stdout
+
+
+class Peer:
+    """Nodes of the SDK's."""
+
+    def __init__(self, port):
+        self.at = {"domain_id": DOMAIN, "router_ip": "127.0.0.1", "router_port": port}
+
+    def message(self, name):
+        definition, _ = JAZZY.generate_msgdef(name, ros_version=2)
+        return {"msg_definition": definition, "type_hash": JAZZY.hash_rihs01(name), **self.at}
+
+    def subscribe(self, topic, name, qos=None):
+        heard = []
+        ROS2Subscriber(topic, name, heard.append, qos=qos, **self.message(name))
+        return heard
+
+    def publisher(self, topic, name):
+        return ROS2Publisher(topic, name, **self.message(name))
+
+    def service(self, name, kind, request, response, type_hash=None):
+        """A client that computes the type's hash from the definitions by itself, unless it is told."""
+        definitions = {"request_definition": request, "response_definition": response}
+        return ROS2ServiceClient(name, kind, timeout=LIMIT, type_hash=type_hash, **definitions, **self.at)
+
+
+def test_topics_are_listed_with_their_types(port):
+    listed = command_line(port, "topic", "list", "-t").splitlines()
+    for line in [
+        "/joint_states [sensor_msgs/msg/JointState]",
+        "/joint_trajectory [trajectory_msgs/msg/JointTrajectory]",
+        "/clock [rosgraph_msgs/msg/Clock]",
+        "/tf [tf2_msgs/msg/TFMessage]",
+        "/tf_static [tf2_msgs/msg/TFMessage]",
+        "/diagnostics [diagnostic_msgs/msg/DiagnosticArray]",
+        "/robot_description [std_msgs/msg/String]",
+        "/rosout [rcl_interfaces/msg/Log]",
+        "/ik_trial/status [pendularm_interfaces/msg/TrialStatus]",
+    ]:
+        assert line in listed, (line, listed)
+    services = command_line(port, "service", "list", "-t").splitlines()
+    for line in [
+        "/arm_sim/set_integrator [pendularm_interfaces/srv/SetIntegrator]",
+        "/arm_sim/get_parameters [rcl_interfaces/srv/GetParameters]",
+        "/rosapi/topics [rosapi_msgs/srv/Topics]",
+    ]:
+        assert line in services, (line, services)
+    return f"{len(listed)} topics, {len(services)} services"
+
+
+def test_hashes_of_standard_types_are_those_of_jazzy(session):
+    checked = set()
+    for token in tokens(session, "MP") + tokens(session, "MS"):
+        package, _, name = token[10].partition("::msg::dds_::")
+        name = f"{package}/msg/{name.removesuffix('_')}"
+        if name in JAZZY.types:
+            assert token[11] == JAZZY.hash_rihs01(name), token
+            checked.add(name)
+    assert len(checked) >= 7, checked
+    return ", ".join(sorted(checked))
+
+
+def test_joint_states_are_decoded_and_numbered(peer, session):
+    attachments = []
+    watcher = session.declare_subscriber(
+        f"{DOMAIN}/joint_states/**", lambda sample: attachments.append(Attachment.from_bytes(sample.attachment.to_bytes()))
+    )
+    heard = peer.subscribe("/joint_states", "sensor_msgs/msg/JointState")
+    wait_for("120 joint states", lambda: len(heard) >= 120)
+    for state in heard:
+        assert state.name == ["joint1", "joint2"], state
+        assert [len(state.position), len(state.velocity), len(state.effort)] == [2, 2, 2], state
+    stamps = [state.header.stamp.sec + state.header.stamp.nanosec * 1e-9 for state in heard]
+    assert stamps == sorted(set(stamps)), stamps
+    wait_for("120 attachments", lambda: len(attachments) >= 120)
+    watcher.undeclare()
+    numbers = [one.sequence_id for one in attachments]
+    assert numbers == list(range(numbers[0], numbers[0] + len(numbers))), numbers
+    assert len({one.gid for one in attachments}) == 1
+    assert all(len(one.gid) == 16 for one in attachments)
+    assert all(abs(one.timestamp_ns * 1e-9 - time.time()) < LIMIT for one in attachments)
+    return heard
+
+
+def test_who_comes_late_gets_the_last_description(peer):
+    heard = peer.subscribe("/robot_description", "std_msgs/msg/String", qos=LATCHED)
+    wait_for("the description", lambda: heard)
+    assert "<robot" in heard[-1].data, heard[-1].data[:80]
+
+
+def test_a_trajectory_moves_the_arm(peer, states):
+    enable = peer.service(
+        "/pid_controller/enable", "pendularm_interfaces/srv/Enable", "bool data", "bool data\nbool success\nstring message"
+    )
+    response = enable.call(data=True)
+    assert response.data and response.success and not response.message, response
+    publisher = peer.publisher("/joint_trajectory", "trajectory_msgs/msg/JointTrajectory")
+    of = publisher.session_mgr.store.types
+    time_type, duration_type = of["builtin_interfaces/msg/Time"], of["builtin_interfaces/msg/Duration"]
+    goal = [0.5, -0.25]
+    header = of["std_msgs/msg/Header"](stamp=time_type(sec=0, nanosec=0), frame_id="")
+
+    def numbers(*values):
+        import numpy
+
+        return numpy.array(values, dtype=numpy.float64)
+
+    point = of["trajectory_msgs/msg/JointTrajectoryPoint"](
+        positions=numbers(*goal),
+        velocities=numbers(),
+        accelerations=numbers(),
+        effort=numbers(),
+        time_from_start=duration_type(sec=0, nanosec=0),
+    )
+
+    def is_there():
+        # Published until it is heard: a publisher's first message may be gone before the router knows of it.
+        publisher.publish(header=header, joint_names=["joint1", "joint2"], points=[point])
+        # 0.01 rad: what the integral leaves after some seconds is far less.
+        return all(abs(a - b) < 0.01 for a, b in zip(states[-1].position, goal))
+
+    wait_for("the arm at the setpoint", is_there)
+    return [round(float(one), 3) for one in states[-1].position]
+
+
+def test_services_answer_and_say_what_is_wrong(peer):
+    outcome = "bool success\nstring message"
+    method = peer.service(
+        "/arm_sim/set_integrator",
+        "pendularm_interfaces/srv/SetIntegrator",
+        "string method\nfloat64 timestep",
+        f"string method\nfloat64 timestep\n{outcome}",
+    )
+    response = method.call(method="", timestep=0.0)
+    assert response.success and response.timestep > 0, response
+    before = response.timestep
+    response = method.call(method="rk4", timestep=0.0)
+    assert (response.method, response.timestep, response.success) == ("rk4", before, True), response
+    response = method.call(method="magic", timestep=0.0)
+    assert response.method == "rk4" and not response.success and "magic" in response.message, response
+    params = peer.service(
+        "/arm_sim/set_params",
+        "pendularm_interfaces/srv/SetParams",
+        "float64 gravity\nfloat64[] masses\nfloat64[] lengths",
+        f"float64 gravity\nfloat64[] masses\nfloat64[] lengths\n{outcome}",
+    )
+    import numpy
+
+    nothing = numpy.array([], dtype=numpy.float64)
+    response = params.call(gravity=0.0, masses=nothing, lengths=nothing)
+    assert response.success and response.gravity == 9.81 and len(response.masses) == 2, response
+    run = peer.service(
+        "/arm_sim/integration_step",
+        "pendularm_interfaces/srv/IntegrationStep",
+        "string function\nfloat64 x0\nfloat64 xdot0\nfloat64 dt\nuint64 steps\nstring integrator",
+        f"float64[] times\nfloat64[] positions\nfloat64[] velocities\n{outcome}",
+    )
+    response = run.call(function="2", x0=0.0, xdot0=0.0, dt=0.5, steps=2, integrator="rk4")
+    # 2 t^2 / 2, which Runge-Kutta has without an error.
+    assert list(response.positions) == [0.0, 0.25, 1.0], response
+    # Its response has no type inside, so that the SDK needs no definition that it would fetch.
+    types = peer.service(
+        "/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes", "string[] names", "uint8[] types"
+    )
+    response = types.call(names=["gravity", "masses", "nonsense"])
+    assert list(response.types) == [3, 8, 0], response
+    # A type that has no place for a reason: the request fails.
+    kind = peer.service("/rosapi/topic_type", "rosapi_msgs/srv/TopicType", "string topic", "string type")
+    assert kind.call(topic="/joint_states").type == "sensor_msgs/msg/JointState"
+
+
+
+UUID = "unique_identifier_msgs/msg/UUID"
+TIME = "builtin_interfaces/msg/Time"
+
+
+def definition(fields, **inside):
+    """A definition with the definitions of what is inside, as text."""
+    parts = ["=" * 80 + f"\nMSG: {name.replace('__', '/')}\n{text}" for name, text in inside.items()]
+    return "\n".join([fields, *parts])
+
+
+def test_a_goal_is_sent_as_an_action(peer, session):
+    """The SDK has no action client: its services and subscriptions are one. They take the hashes that the graph tells."""
+    import numpy
+
+    place = "/ik_action/_action/"
+    hashes = {token[9]: (token[10], token[11]) for kind in ["SS", "MP"] for token in tokens(session, kind)}
+
+    def found(part, kind):
+        dds, found = hashes[f"%ik_action%_action%{part}"]
+        package, middle, name = kind.split("/")
+        assert dds == f"{package}::{middle}::dds_::{name}_", dds
+        return found
+
+    def service(part, kind, request, response):
+        return peer.service(f"{place}{part}", kind, request, response, found(part, kind))
+
+    uuid, stamp = {"unique_identifier_msgs__UUID": "uint8[16] uuid"}, {"builtin_interfaces__Time": "int32 sec\nuint32 nanosec"}
+    target = {"pendularm_interfaces__Target": "float64 x\nfloat64 y\nfloat64 phi"}
+    move = "pendularm_interfaces/action/MoveTo"
+    send = service(
+        "send_goal",
+        f"{move}_SendGoal",
+        definition(
+            "unique_identifier_msgs/UUID goal_id\npendularm_interfaces/MoveToGoal goal",
+            pendularm_interfaces__MoveToGoal="float64 x\nfloat64 y\nfloat64 phi\nfloat64 epsilon\nfloat64 success_hold",
+            **uuid,
+        ),
+        definition("bool accepted\nbuiltin_interfaces/Time stamp", **stamp),
+    )
+    wait = service(
+        "get_result",
+        f"{move}_GetResult",
+        definition("unique_identifier_msgs/UUID goal_id", **uuid),
+        definition(
+            "int8 status\npendularm_interfaces/MoveToResult result",
+            pendularm_interfaces__MoveToResult="string goal_id\nstring outcome\npendularm_interfaces/Target target\n"
+            "float64 final_distance",
+            **target,
+        ),
+    )
+    info = {"action_msgs__GoalInfo": "unique_identifier_msgs/UUID goal_id\nbuiltin_interfaces/Time stamp", **uuid, **stamp}
+    cancel = service(
+        "cancel_goal",
+        "action_msgs/srv/CancelGoal",
+        definition("action_msgs/GoalInfo goal_info", **info),
+        definition("int8 return_code\naction_msgs/GoalInfo[] goals_canceling", **info),
+    )
+    heard = []
+    ROS2Subscriber(
+        f"{place}feedback",
+        f"{move}_FeedbackMessage",
+        heard.append,
+        msg_definition=definition(
+            "unique_identifier_msgs/UUID goal_id\npendularm_interfaces/MoveToFeedback feedback",
+            pendularm_interfaces__MoveToFeedback="string goal_id\npendularm_interfaces/Target target\nfloat64[] positions\n"
+            "float64 distance_remaining\nfloat64 elapsed",
+            **uuid,
+            **target,
+        ),
+        type_hash=found("feedback", f"{move}_FeedbackMessage"),
+        **peer.at,
+    )
+    states = peer.subscribe(f"{place}status", "action_msgs/msg/GoalStatusArray", qos=LATCHED)
+    of = send.session_mgr.store.types
+
+    def goal(number, x, y):
+        name = of[UUID](uuid=numpy.full(16, number, dtype=numpy.uint8))
+        goal_type = next(one for kind, one in of.items() if kind.endswith("MoveToGoal"))
+        sent = send.call(goal_id=name, goal=goal_type(x=x, y=y, phi=0.0, epsilon=0.0, success_hold=0.0))
+        return name, sent.accepted
+
+    name, accepted = goal(1, 1.0, 1.0)
+    assert accepted
+    ended = wait.call(goal_id=name)
+    assert ended.status == 4 and ended.result.final_distance < 0.02, ended
+    mine = [one for one in heard if list(one.goal_id.uuid) == [1] * 16]
+    assert mine and all(len(one.feedback.positions) == 2 for one in mine), heard
+    _, accepted = goal(2, 5.0, 5.0)
+    assert not accepted, "five metres are out of reach"
+    name, accepted = goal(3, -1.0, 0.5)
+    assert accepted
+    everything = of["action_msgs/msg/GoalInfo"](goal_id=name, stamp=of[TIME](sec=0, nanosec=0))
+    cancelled = cancel.call(goal_info=everything)
+    assert cancelled.return_code == 0 and len(cancelled.goals_canceling) == 1, cancelled
+    ended = wait.call(goal_id=name)
+    assert ended.status == 5, ended
+    wait_for("the states of both", lambda: states and [one.status for one in states[-1].status_list] == [4, 5])
+    return len(mine)
+
+
+def test_a_path_is_sent_as_an_action(peer, session, states):
+    """By the definition that ROS 2 has, with all that is for other robots left empty."""
+    import numpy
+
+    name = "control_msgs/action/FollowJointTrajectory"
+    place = "/joint_trajectory_controller/follow_joint_trajectory/_action/"
+    hashes = {token[9]: token[11] for token in tokens(session, "SS")}
+
+    def own(kind):
+        return JAZZY.generate_msgdef(kind, ros_version=2)[0].split("=" * 80)[0].strip()
+
+    inside = {
+        "unique_identifier_msgs__UUID": "uint8[16] uuid",
+        "control_msgs__FollowGoal": "trajectory_msgs/JointTrajectory trajectory\n"
+        "trajectory_msgs/MultiDOFJointTrajectory multi_dof_trajectory\n"
+        "control_msgs/JointTolerance[] path_tolerance\n"
+        "control_msgs/JointComponentTolerance[] component_path_tolerance\n"
+        "control_msgs/JointTolerance[] goal_tolerance\n"
+        "control_msgs/JointComponentTolerance[] component_goal_tolerance\n"
+        "builtin_interfaces/Duration goal_time_tolerance",
+        "control_msgs__JointTolerance": "string name\nfloat64 position\nfloat64 velocity\nfloat64 acceleration",
+        "control_msgs__JointComponentTolerance": "string joint_name\nuint16 component\nfloat64 position\n"
+        "float64 velocity\nfloat64 acceleration",
+    }
+    for kind in [
+        "trajectory_msgs/msg/JointTrajectory",
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        "trajectory_msgs/msg/MultiDOFJointTrajectory",
+        "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint",
+        "geometry_msgs/msg/Transform",
+        "geometry_msgs/msg/Twist",
+        "geometry_msgs/msg/Vector3",
+        "geometry_msgs/msg/Quaternion",
+        "std_msgs/msg/Header",
+        TIME,
+        "builtin_interfaces/msg/Duration",
+    ]:
+        inside[kind.replace("/msg/", "__")] = own(kind)
+
+    def service(part, kind, request, response):
+        hashed = hashes[f"{place}{part}".replace("/", "%")]
+        return peer.service(f"{place}{part}", f"{name}_{kind}", request, response, hashed)
+
+    uuid, stamp = {"unique_identifier_msgs__UUID": "uint8[16] uuid"}, {"builtin_interfaces__Time": own(TIME)}
+    send = service(
+        "send_goal",
+        "SendGoal",
+        definition("unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowGoal goal", **inside),
+        definition("bool accepted\nbuiltin_interfaces/Time stamp", **stamp),
+    )
+    wait = service(
+        "get_result",
+        "GetResult",
+        definition("unique_identifier_msgs/UUID goal_id", **uuid),
+        definition(
+            "int8 status\ncontrol_msgs/FollowResult result",
+            control_msgs__FollowResult="int32 error_code\nstring error_string",
+        ),
+    )
+    of = send.session_mgr.store.types
+    duration = of["builtin_interfaces/msg/Duration"]
+    header = of["std_msgs/msg/Header"](stamp=of[TIME](sec=0, nanosec=0), frame_id="")
+    nothing = numpy.array([], dtype=numpy.float64)
+    goal = [0.2, 0.3]
+    point = of["trajectory_msgs/msg/JointTrajectoryPoint"](
+        positions=numpy.array(goal),
+        velocities=nothing,
+        accelerations=nothing,
+        effort=nothing,
+        time_from_start=duration(sec=1, nanosec=0),
+    )
+    of_one, of_many = of["trajectory_msgs/msg/JointTrajectory"], of["trajectory_msgs/msg/MultiDOFJointTrajectory"]
+    path = of["control_msgs/msg/FollowGoal"](
+        trajectory=of_one(header=header, joint_names=["joint1", "joint2"], points=[point]),
+        multi_dof_trajectory=of_many(header=header, joint_names=[], points=[]),
+        path_tolerance=[],
+        component_path_tolerance=[],
+        goal_tolerance=[],
+        component_goal_tolerance=[],
+        goal_time_tolerance=duration(sec=0, nanosec=0),
+    )
+    mine = of[UUID](uuid=numpy.full(16, 9, dtype=numpy.uint8))
+    assert send.call(goal_id=mine, goal=path).accepted
+    ended = wait.call(goal_id=mine)
+    assert (ended.status, ended.result.error_code) == (4, 0), ended
+    # 0.05 rad: the tolerance at the end of a path.
+    assert all(abs(a - b) < 0.05 for a, b in zip(states[-1].position, goal)), states[-1]
+
+
+def test_the_router_comes_back(port, bridge, router, states):
+    router.end()
+    bridge.said("has gone; looking for it")
+    router = start_router(port)
+    bridge.said("is here", times=2)
+    session = open_session(port)
+    wait_for("the node", lambda: [token for token in tokens(session, "NN") if token[8] == "arm_sim"])
+    heard = []
+    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", heard.append)
+    wait_for("joint states", lambda: len(heard) >= 10)
+    watcher.undeclare()
+    return router, session
+
+
+def test_the_arm_comes_back(port, bridge, arm, session):
+    arm.end()
+    wait_for("an empty graph", lambda: not [token for token in tokens(session) if token[8] == "arm_sim"])
+    arm, address = start_arm(port)
+    bridge.said("is in domain", times=2)
+    heard = []
+    watcher = session.declare_subscriber(f"{DOMAIN}/joint_states/**", heard.append)
+    wait_for("joint states", lambda: len(heard) >= 10)
+    watcher.undeclare()
+    return arm, address
+
+
+def test_another_arm_has_its_namespace(address, port, session):
+    left = start_bridge(address, port, "--namespace", "/left")
+    left.said("is in domain")
+    heard = []
+    watcher = session.declare_subscriber(f"{DOMAIN}/left/joint_states/**", heard.append)
+    wait_for("joint states", lambda: len(heard) >= 10)
+    watcher.undeclare()
+    found = {(token[7], token[9]) for token in tokens(session, "MP")}
+    assert {("%", "%joint_states"), ("%left", "%left%joint_states")} <= found, found
+    left.end()
+
+
+def test_the_bridge_listens_nowhere(bridge):
+    """By what Linux tells of its sockets: two connections, to the arm and to the router, and nothing that waits."""
+    folder = Path(f"/proc/{bridge.process.pid}")
+    if not folder.exists():
+        return
+    open_files = {os.readlink(one) for one in (folder / "fd").iterdir()}
+    states = []
+    for table in ["tcp", "tcp6", "udp", "udp6"]:
+        rows = [line.split() for line in (folder / "net" / table).read_text().splitlines()[1:]]
+        states += [(table, row[3]) for row in rows if f"socket:[{row[9]}]" in open_files]
+    assert states == [("tcp", "01")] * 2, states
+
+
+def test_an_arm_with_a_token_wants_to_see_it(port):
+    token = "sixteen-or-more-characters"
+    arm, address = start_arm(0, "--token", token)
+    without = start_bridge(address, port, "--namespace", "/right")
+    say(without.said("no arm at"))
+    with_it = start_bridge(address, port, "--namespace", "/right", "--token", token)
+    with_it.said("is in domain")
+    for one in [without, with_it, arm]:
+        one.end()
+
+
+def main():
+    logging.disable(logging.INFO)
+    began = time.monotonic()
+    port, arm_port = free_port(), free_port()
+    bridge = start_bridge(f"127.0.0.1:{arm_port}", port)
+    # Neither is there: the order in which the three start does not matter.
+    bridge.said("no arm at")
+    bridge.said("no router at")
+    router = start_router(port)
+    arm, address = start_arm(arm_port)
+    say(bridge.said("is in domain"))
+    session = open_session(port)
+    peer = Peer(port)
+    say(test_topics_are_listed_with_their_types(port))
+    say(f"hashes of {test_hashes_of_standard_types_are_those_of_jazzy(session)}")
+    test_the_bridge_listens_nowhere(bridge)
+    states = test_joint_states_are_decoded_and_numbered(peer, session)
+    test_who_comes_late_gets_the_last_description(peer)
+    say(f"the arm has gone to {test_a_trajectory_moves_the_arm(peer, states)}")
+    test_services_answer_and_say_what_is_wrong(peer)
+    say(f"a goal with {test_a_goal_is_sent_as_an_action(peer, session)} messages of feedback")
+    test_a_path_is_sent_as_an_action(peer, session, states)
+    router, session = test_the_router_comes_back(port, bridge, router, states)
+    arm, address = test_the_arm_comes_back(arm_port, bridge, arm, session)
+    test_another_arm_has_its_namespace(address, port, session)
+    test_an_arm_with_a_token_wants_to_see_it(port)
+    for one in [bridge, arm, router]:
+        one.end()
+    say(f"all is well after {time.monotonic() - began:.0f} s")
+
+
+try:
+    main()
+    status = 0
+except BaseException:
+    traceback.print_exc()
+    status = 1
+for process in Process.all:
+    process.kill()
+sys.stdout.flush()
+# The SDK's session would look for its router for a long time.
+os._exit(status)
