@@ -16,6 +16,7 @@ mod record;
 mod report;
 mod setting;
 mod usage;
+mod values;
 #[cfg(feature = "web")]
 mod web;
 
@@ -24,6 +25,8 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 #[cfg(feature = "cli")]
 use std::path::PathBuf;
 
+#[cfg(feature = "record")]
+use clap::ArgMatches;
 use clap::builder::{OsStringValueParser, StyledStr};
 use clap::{Arg, Command};
 use tracing::level_filters::LevelFilter;
@@ -35,6 +38,7 @@ pub use self::plan::PlanOptions;
 pub use self::record::{RecordOptions, ReplayOptions};
 use self::setting::{Given, LaunchOption, given};
 pub use self::usage::{Origin, UsageError};
+use self::values::{read_bind, read_links, read_log, read_log_format, read_seed, read_token};
 #[cfg(feature = "web")]
 pub use self::web::WebOptions;
 #[cfg(feature = "cli")]
@@ -47,16 +51,6 @@ use crate::report::ReportOptions;
 /// Address of the runtime unless an option says otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
     SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 1), 9095));
-
-/// The log levels by name, from silent to everything.
-const LEVELS: [(&str, LevelFilter); 6] = [
-    ("off", LevelFilter::OFF),
-    ("error", LevelFilter::ERROR),
-    ("warn", LevelFilter::WARN),
-    ("info", LevelFilter::INFO),
-    ("debug", LevelFilter::DEBUG),
-    ("trace", LevelFilter::TRACE),
-];
 
 /// The features of this build, as the version shows them.
 const BUILD: &str = if cfg!(feature = "web") {
@@ -272,6 +266,31 @@ impl Options {
         Self::read(given).map(Parsed::Serve)
     }
 
+    /// A record to be replayed, or to be served in the arm's place.
+    #[cfg(feature = "record")]
+    fn of_replay(
+        matches: &ArgMatches,
+        environment: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<Parsed, UsageError> {
+        let replay = record::read(matches);
+        let mut of_serving = SETTINGS.iter().filter(|one| record::is_of_replay(one));
+        if matches.get_flag(record::SERVE) {
+            let given = |setting: &LaunchOption| {
+                let is_ours = record::is_of_replay(setting);
+                is_ours.then(|| given(setting, matches, &environment))?
+            };
+            let mut options = Self::read(given)?;
+            options.record.replay = Some(replay.file);
+            return Ok(Parsed::Serve(options));
+        }
+        match of_serving.find(|one| matches.contains_id(one.option)) {
+            Some(stray) => Err(UsageError::UnknownArgument {
+                argument: format!("--{} without --{}", stray.option, record::SERVE),
+            }),
+            None => Ok(Parsed::Replay(replay)),
+        }
+    }
+
     fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Result<Self, UsageError> {
         let token = given(&TOKEN).map(read_token).transpose()?;
         let bind = given(&BIND)
@@ -351,46 +370,4 @@ fn arguments(chosen: fn(&LaunchOption) -> bool) -> impl Iterator<Item = Arg> {
             arg
         }
     })
-}
-
-fn read_links(Given { origin, value }: Given) -> Result<Links, UsageError> {
-    match value.as_str() {
-        "2" => Ok(Links::Two),
-        "3" => Ok(Links::Three),
-        _ => Err(UsageError::Links { origin, value }),
-    }
-}
-
-fn read_token(Given { origin, value }: Given) -> Result<Token, UsageError> {
-    Token::new(&value).map_err(|why| UsageError::Token { origin, why })
-}
-
-/// With a token to ask for, any address will do.
-fn read_bind(Given { origin, value }: Given, has_token: bool) -> Result<SocketAddr, UsageError> {
-    match value.parse::<SocketAddr>() {
-        Ok(address) if address.ip().is_loopback() || has_token => Ok(address),
-        Ok(_) => Err(UsageError::NotLoopback { origin, value }),
-        Err(_) => Err(UsageError::Bind { origin, value }),
-    }
-}
-
-fn read_seed(Given { origin, value }: Given) -> Result<u64, UsageError> {
-    value
-        .parse()
-        .map_err(|_| UsageError::Seed { origin, value })
-}
-
-fn read_log(Given { origin, value }: Given) -> Result<LevelFilter, UsageError> {
-    let known = LEVELS.iter().find(|(name, _)| *name == value);
-    known
-        .map(|(_, level)| *level)
-        .ok_or(UsageError::Log { origin, value })
-}
-
-fn read_log_format(Given { origin, value }: Given) -> Result<LogFormat, UsageError> {
-    match value.as_str() {
-        "text" => Ok(LogFormat::Text),
-        "json" => Ok(LogFormat::Json),
-        _ => Err(UsageError::LogFormat { origin, value }),
-    }
 }

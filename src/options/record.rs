@@ -8,8 +8,7 @@ use std::path::PathBuf;
 use clap::builder::OsStringValueParser;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 
-use super::setting::{Given, LaunchOption, given};
-use super::{Options, Parsed, SETTINGS, UsageError};
+use super::setting::{Given, LaunchOption};
 
 pub(super) const RECORD: LaunchOption = LaunchOption {
     option: "record",
@@ -91,31 +90,5 @@ pub(super) fn read(matches: &ArgMatches) -> ReplayOptions {
     let file = matches.get_one::<OsString>("file");
     ReplayOptions {
         file: file.map(PathBuf::from).unwrap_or_default(),
-    }
-}
-
-impl Options {
-    /// A record to be replayed, or to be served in the arm's place.
-    pub(super) fn of_replay(
-        matches: &ArgMatches,
-        environment: impl Fn(&str) -> Option<OsString>,
-    ) -> Result<Parsed, UsageError> {
-        let replay = read(matches);
-        let mut of_serving = SETTINGS.iter().filter(|one| is_of_replay(one));
-        if matches.get_flag(SERVE) {
-            let given = |setting: &LaunchOption| {
-                let is_ours = is_of_replay(setting);
-                is_ours.then(|| given(setting, matches, &environment))?
-            };
-            let mut options = Self::read(given)?;
-            options.record.replay = Some(replay.file);
-            return Ok(Parsed::Serve(options));
-        }
-        match of_serving.find(|one| matches.contains_id(one.option)) {
-            Some(stray) => Err(UsageError::UnknownArgument {
-                argument: format!("--{} without --{}", stray.option, SERVE),
-            }),
-            None => Ok(Parsed::Replay(replay)),
-        }
     }
 }

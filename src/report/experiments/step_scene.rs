@@ -8,7 +8,7 @@ use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::Simulation;
 
-/// The shipped gains without damping, and with hardly an integral, which would drive an undamped arm away.
+/// The default gains without damping, and with hardly an integral, which would drive an undamped arm away.
 #[must_use]
 pub fn undamped<const N: usize>() -> Gains<N>
 where
@@ -22,7 +22,7 @@ where
     }
 }
 
-/// The arm before its first step, with the shipped gains or without their integral part, its controller on or off.
+/// The arm before its first step, with the default gains or without their integral part, its controller on or off.
 #[must_use]
 pub fn ready<const N: usize>(
     gravity: f64,

@@ -152,7 +152,7 @@ pub(super) fn table_of_runs(data: &[Data]) -> Csv {
                 data.scene.name().into(),
                 (data.scene.links() as u64).into(),
                 method.name().into(),
-                "as shipped".into(),
+                "live".into(),
                 data.scene.control().into(),
                 outcome.timestep.into(),
                 outcome.steps.into(),

@@ -46,7 +46,7 @@ impl Meter {
 /// A sampling in words.
 pub(super) fn in_words(sampling: Sampling) -> &'static str {
     match sampling {
-        Sampling::Held => "effort held for the step (as shipped)",
+        Sampling::Held => "effort held for the step (as the live arm does)",
         Sampling::Continuous => "law in every stage",
     }
 }
@@ -59,7 +59,7 @@ pub(super) fn capital(words: &str) -> String {
     })
 }
 
-/// The 2-link arm with the shipped gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
+/// The 2-link arm with the default gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
 pub(super) fn stiffened(factor: f64) -> ControlLoop<2> {
     let Gains { kp, ki, kd } = Gains::<2>::default();
     let gains = Gains {
@@ -70,11 +70,15 @@ pub(super) fn stiffened(factor: f64) -> ControlLoop<2> {
     ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
-/// The line of the 2-link arm with its shipped gains.
-pub(super) fn shipped(lines: &[LimitRow], sampling: Sampling, method: Method) -> Option<&LimitRow> {
+/// The line of the 2-link arm with its default gains.
+pub(super) fn with_default_gains(
+    lines: &[LimitRow],
+    sampling: Sampling,
+    method: Method,
+) -> Option<&LimitRow> {
     lines.iter().find(|line| {
         line.links == 2
-            && line.gains == "shipped"
+            && line.gains == "default"
             && line.sampling == sampling
             && line.method == method
     })

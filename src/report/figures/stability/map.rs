@@ -14,7 +14,7 @@ use crate::study::linear::Linear;
 use crate::study::matrix::Matrix;
 use crate::study::stability::{Sampling, largest_timestep, step_matrix};
 
-/// Ends of the axes: timestep \[s\], factor on the shipped gains.
+/// Ends of the axes: timestep \[s\], factor on the default gains.
 const TIMESTEPS: (f64, f64) = (2e-4, 1e-1);
 const FACTORS: (f64, f64) = (1e-2, 1e2);
 
@@ -63,7 +63,7 @@ impl Map {
             format!("{method}, {}", sampling.name()),
             Axis::log_between("timestep", Unit::Seconds, TIMESTEPS.0, TIMESTEPS.1),
             Axis::log_between(
-                "stiffness, times the shipped gains",
+                "stiffness, times the default gains",
                 Unit::Number,
                 FACTORS.0,
                 FACTORS.1,
@@ -140,7 +140,7 @@ impl Map {
                 self.cells,
                 self.undecided
             ),
-            "2 links at their setpoint, shipped gains stiffened by a factor (kp by it, kd by its root, ki by its power \
+            "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power \
              of 3/2: the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows \
              (orange), the darker the faster. LimitRow: the predicted limit. Dots: cells where the two disagree. Grey: \
              not judged, because by the prediction the slowest mode changes its energy by less than a factor e in the \

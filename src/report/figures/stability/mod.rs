@@ -88,7 +88,7 @@ fn gains<const N: usize>(kp: [f64; N], kd: [f64; N]) -> Gains<N> {
 fn gains_two() -> [(&'static str, Gains<2>); 4] {
     [
         ("mild", gains([200.0, 100.0], [30.0, 12.0])),
-        ("shipped", Gains::<2>::default()),
+        ("default", Gains::<2>::default()),
         ("stiff", gains([1e4, 1e4], [200.0, 60.0])),
         ("overdamped", gains([200.0, 200.0], [500.0, 500.0])),
     ]
@@ -96,7 +96,7 @@ fn gains_two() -> [(&'static str, Gains<2>); 4] {
 
 fn gains_three() -> [(&'static str, Gains<3>); 3] {
     [
-        ("shipped", Gains::<3>::default()),
+        ("default", Gains::<3>::default()),
         ("stiff", gains([1e4; 3], [300.0, 100.0, 30.0])),
         ("overdamped", gains([200.0; 3], [500.0; 3])),
     ]

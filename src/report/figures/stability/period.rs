@@ -46,7 +46,7 @@ pub(super) fn period_table(periods: &[Period]) -> Table {
         "period-limits",
         "The limit belongs to the control period",
         "Largest stable control period, predicted and measured, when the period is cut into 1, 10 or 100 steps of the \
-         method (2 links, shipped gains). Smaller steps at the same control period buy nothing; Euler only moves to \
+         method (2 links, default gains). Smaller steps at the same control period buy nothing; Euler only moves to \
          the limit of the others.",
         &["Method", "1 step per period", "10 steps", "100 steps"],
     );
@@ -205,7 +205,7 @@ impl Growth {
                 self.dots,
                 number(100.0 * self.furthest)
             ),
-            "2 links, shipped gains, effort held over the period. Curves: spectral radius of one control period of the \
+            "2 links, default gains, effort held over the period. Curves: spectral radius of one control period of the \
              linearised loop. Dots: how much a nudge of the arm itself grows per period, over 4000 periods. Only Euler \
              with one step per period has a curve of its own.",
             &keys,

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** lines are predicted, marks are measured.
 
-use super::line::{LimitRow, capital, in_words, shipped, stiffened};
+use super::line::{LimitRow, capital, in_words, stiffened, with_default_gains};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::section::Figure;
@@ -18,7 +18,7 @@ pub(super) fn radius_figure(lines: &[LimitRow]) -> (Figure, Csv) {
         "spectral-radius",
         "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep; only a law in every stage \
          shows the method",
-        "2 links, shipped gains. Lines are predicted: the largest eigenvalue of one step of the linearised loop. Marks \
+        "2 links, default gains. Lines are predicted: the largest eigenvalue of one step of the linearised loop. Marks \
          are where the arm itself was measured to stop settling.",
         &Key::methods(),
         &plots,
@@ -57,7 +57,9 @@ fn panel(lines: &[LimitRow], sampling: Sampling, csv: &mut Csv) -> Plot {
             dashed: held && matches!(method, Method::Verlet | Method::Rk4),
             ..Curve::line(method.name(), shown)
         });
-        if let Some(limit) = shipped(lines, sampling, method).and_then(|line| line.measured) {
+        if let Some(limit) =
+            with_default_gains(lines, sampling, method).and_then(|line| line.measured)
+        {
             let tooltip = format!("{method}: measured limit {}", seconds(limit));
             plot.series.push(Curve {
                 class: method.name(),

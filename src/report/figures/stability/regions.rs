@@ -47,7 +47,7 @@ pub(super) fn regions_figure(control: &ControlLoop<2>) -> (Figure, Csv) {
         "regions",
         "Why: beyond the limit one eigenvalue leaves the unit circle, and the arm flips at every step",
         format!(
-            "2 links held at (0.4, 0.8) with the shipped gains. Top: the eigenvalues of one step of the linearised \
+            "2 links held at (0.4, 0.8) with the default gains. Top: the eigenvalues of one step of the linearised \
              loop in the circle in which it is stable, at {SHOWN} timesteps from {} to {} of the limit; they \
              begin near 1. Bottom: the arm itself, let go {NUDGE} rad from the setpoint, at {} and {} of that limit.",
             PARTS.0, PARTS.1, RUNS[0].0, RUNS[1].0

@@ -57,7 +57,7 @@ pub(super) fn edges(lines: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "edges",
         "At a glance: where it goes unstable, and why",
-        "Largest stable timestep with the shipped gains. Held for the step, the limit belongs to the control period: \
+        "Largest stable timestep with the default gains. Held for the step, the limit belongs to the control period: \
          the effort answers a state that is up to a step old. In every stage it belongs to the method.",
         &[
             "Arm", "Control", "euler", "midpoint", "verlet", "rk4", "Why",
@@ -68,13 +68,13 @@ pub(super) fn edges(lines: &[LimitRow]) -> Table {
             let of = |method| {
                 lines.iter().find(|line| {
                     line.links == links
-                        && line.gains == "shipped"
+                        && line.gains == "default"
                         && line.sampling == sampling
                         && line.method == method
                 })
             };
             let mut row = vec![
-                Cell::new(format!("{links} links, shipped gains")),
+                Cell::new(format!("{links} links, default gains")),
                 Cell::new(in_words(sampling)),
             ];
             for method in Method::ALL {

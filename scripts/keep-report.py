@@ -1,0 +1,79 @@
+#!/usr/bin/env python3
+"""Keeps a report in docs/report/ and puts its sentences and tables into the papers: `make report KEEP=1`.
+
+A paper says where they go. Between `<!-- report: error 1, budget 2 -->` and `<!-- end -->` stand the first finding of the section
+`error` and the second of `budget`; a name alone stands for all findings of the section, `table left-out` for a table. `--check` changes nothing
+and fails where a paper says other than the report that is kept.
+"""
+
+import json
+import pathlib
+import re
+import shutil
+import sys
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+KEPT = ROOT / "docs" / "report"
+PAPERS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PLACE = re.compile(r"(<!-- report: ([^>]*) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def main():
+    if sys.argv[1] == "--check":
+        summary = json.loads((KEPT / "report.json").read_text())
+        stale = [paper for paper in PAPERS if paper.read_text() != filled(paper.read_text(), summary)]
+        for paper in stale:
+            print(f"keep-report: {paper.relative_to(ROOT)} is not of the report that is kept: make report KEEP=1", file=sys.stderr)
+        sys.exit(bool(stale))
+    keep(pathlib.Path(sys.argv[1]))
+    summary = json.loads((KEPT / "report.json").read_text())
+    for paper in PAPERS:
+        paper.write_text(filled(paper.read_text(), summary))
+    print(f"keep-report: {KEPT.relative_to(ROOT)}")
+
+
+def keep(report):
+    shutil.rmtree(KEPT, ignore_errors=True)
+    KEPT.mkdir(parents=True)
+    for kind in ("html", "json", "svg", "csv"):
+        for file in report.glob(f"*.{kind}"):
+            shutil.copy(file, KEPT)
+    summary = json.loads((KEPT / "report.json").read_text())
+    facts = dict(summary["machine"]["facts"])
+    load = facts["Load when started"].split(" (")[0]
+    look = " It was a quick look, coarser than the report." if summary["quick"] else ""
+    figures = "\n".join(f"- [{figure.stem}]({figure.name})" for figure in sorted(KEPT.glob("*.svg")))
+    (KEPT / "README.md").write_text(
+        "# The report that is kept\n\n"
+        f"Made by `make report KEEP=1` on: {facts['Processor']}, {facts['Cores']} cores, load {load} at the start; "
+        f"commit {summary['machine']['commit']}.{look}\n"
+        "The page is [index.html](index.html), in a browser; its numbers are the `.csv` files, its sentences and tables [report.json](report.json).\n\n"
+        f"{figures}\n")
+
+
+def filled(text, summary):
+    """The paper with what the report says in its places."""
+    sections = {section["name"]: section for section in summary["sections"]}
+    tables = {table["name"]: table for section in summary["sections"] for table in section["tables"]}
+
+    def words(place):
+        lines = []
+        for wanted in place[2].split(", "):
+            name, _, which = wanted.partition(" ")
+            if name == "table":
+                lines += rows(tables[which])
+            else:
+                findings = sections[name]["findings"]
+                lines += [f"- {one}" for one in ([findings[int(which) - 1]] if which else findings)]
+        return place[1] + "\n".join(lines) + "\n" + place[4]
+
+    return PLACE.sub(words, text)
+
+
+def rows(table):
+    width = len(table["head"])
+    cells = [table["head"], ["---"] * width, *(row + [""] * (width - len(row)) for row in table["rows"])]
+    return ["| " + " | ".join(row) + " |" for row in cells]
+
+
+main()
