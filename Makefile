@@ -51,8 +51,8 @@ test-browser: ## Try the page in a headless Chromium; screenshots are kept. ARGS
 	@echo "make test-browser: the page in headless Chromium"
 	@CARGO="$(CARGO)" bash scripts/test-browser.sh $(ARGS)
 
-test-clients: build ## Run clients that nobody here wrote against it: roslibpy, compas_fab, roslib 1 and 2, Lichtblick's packages, roslibrust
-	@echo "make test-clients: needs python3, node 20 with npm, and a network the first time"
+test-clients: build ## Run clients that nobody here wrote against it: roslibpy, compas_fab, ros-mcp, ros3d, roslib 1 and 2, Lichtblick's packages, roslibrust
+	@echo "make test-clients: needs python3, node 20 with npm, Chromium, and a network the first time"
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
 simulate: ## Run the whole runtime in virtual time under SEEDS=1000 seeds that the commit chooses; FROM=n, MINUTES=n, SEED=n

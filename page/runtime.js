@@ -106,7 +106,10 @@ function connection(now) {
     set("trial", null);
     set("estimate", null);
     poll();
-    isOffered("/study/gains").then((offered) => set("offersGains", offered));
+    whatIsOffered().then((services) => {
+      set("offersGains", services.includes("/study/gains"));
+      set("replay", services.includes("/rosbag2_player/seek"));
+    });
     announce("Connected to the arm.");
   } else if (now === "lost" && before === "open") {
     warn("The connection is lost. The page reconnects by itself.");
@@ -131,7 +134,8 @@ function jointStates(msg) {
   if (time < state.time) {
     const now = performance.now();
     const resetAt = now - lastReset < OWN_RESET_MS ? lastReset : now - 1000 * time - LATENESS_MS;
-    if (lastTrajectory < resetAt) keepSetpoint(new Array(n).fill(0));
+    // A record that goes back has its setpoint in its diagnostics.
+    if (lastTrajectory < resetAt && !state.replay) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
     set("goal", null);
     onReset();
@@ -266,10 +270,12 @@ export const cancelGoal = () => bridge.call("/ik_action/cancel_goal");
 export const trialStart = (args) => bridge.call("/ik_trial/start", args);
 export const trialSkip = () => bridge.call("/ik_trial/skip");
 export const trialStop = () => bridge.call("/ik_trial/stop");
-/** Whether anybody provides a service. */
-async function isOffered(service) {
+/** Drives a record that is replayed. */
+export const player = (how, args = {}) => bridge.call(`/rosbag2_player/${how}`, args);
+/** The services that anybody provides. */
+async function whatIsOffered() {
   const answer = await bridge.call("/rosapi/services");
-  return answer.result && answer.values.services.includes(service);
+  return answer.result ? answer.values.services : [];
 }
 
 /** Gains for the present arm, where the runtime offers to find some. */

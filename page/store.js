@@ -26,6 +26,7 @@ export const state = {
   stability: null, // values of /study/stability
   stabilityAsked: "", // the question that they answer; see `policy.js`
   stabilityMissing: false,
+  replay: false, // whether the runtime plays a record in the arm's place
   offersGains: false, // whether /study/gains is served
   estimate: null, // message of /arm_sim/error_estimate
   pushed: false, // whether an effort has acted with the servo off since energy is counted

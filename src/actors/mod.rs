@@ -74,6 +74,9 @@
 //! To `recorder`: [`node::Call`] of `StartRecording` and `StopRecording`, from the registry; `RecordTo` and
 //! `EndRecord`, from the runtime: the beginning and the end of a record.
 //!
+//! `player` is there in the arm's place when a record is replayed. To it: [`node::Call`] of `DriveRecord`, from the
+//! registry, and of the questions to `arm_sim` that ask for settings.
+//!
 //! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
 //!
 //! [`ArmMotion`]: arm::sim::ArmMotion
@@ -138,6 +141,8 @@ pub mod compute;
 pub mod gateway;
 pub mod node;
 pub mod panics;
+#[cfg(feature = "record")]
+pub mod player;
 #[cfg(feature = "record")]
 pub mod recorder;
 pub mod resources;

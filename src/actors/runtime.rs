@@ -30,8 +30,6 @@ use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
-#[cfg(feature = "record")]
-use crate::actors::recorder::{EndRecord, NotRecorded, RecordTo, Recorder};
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
@@ -41,6 +39,11 @@ use crate::actors::wire::Nodes;
 use crate::math::arm::Arm;
 use crate::math::pid::Gains;
 use crate::options::{Links, Options};
+#[cfg(feature = "record")]
+use crate::{
+    actors::player::{self, NotReplayed},
+    actors::recorder::{EndRecord, NotRecorded, RecordTo, Recorder},
+};
 #[cfg(feature = "web")]
 use crate::{
     options::WebOptions,
@@ -72,6 +75,10 @@ pub enum RunError {
     #[cfg(feature = "record")]
     #[error("cannot record: {0}")]
     Record(#[from] NotRecorded),
+    /// The record can't be played.
+    #[cfg(feature = "record")]
+    #[error(transparent)]
+    Replay(#[from] NotReplayed),
     /// A thread or a signal handler was refused.
     #[error("cannot start: {0}")]
     Start(#[from] std::io::Error),
@@ -106,21 +113,30 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
         Arbiter::try_with_tokio_rt(|| Builder::new_current_thread().enable_time().build())?;
     let mut nodes = Nodes::default();
     let seed = options.seed.unwrap_or_else(|| fastrand::u64(..));
-    let start = match options.links {
-        Links::Two => start_nodes::<2>,
-        Links::Three => start_nodes::<3>,
+    #[cfg(feature = "record")]
+    let is_replay = start_replay(options, &registry, &arm_thread, &mut nodes)?;
+    #[cfg(not(feature = "record"))]
+    let is_replay = false;
+    let ends = if is_replay {
+        NodeEnds::default()
+    } else {
+        let start = match options.links {
+            Links::Two => start_nodes::<2>,
+            Links::Three => start_nodes::<3>,
+        };
+        let ends = start(
+            options,
+            seed,
+            &registry,
+            &gauges,
+            &arm_thread,
+            &workers,
+            &mut nodes,
+        );
+        let integration = Integration::new(workers.clone()).start();
+        Integration::attach(&integration, &mut nodes);
+        ends
     };
-    let ends = start(
-        options,
-        seed,
-        &registry,
-        &gauges,
-        &arm_thread,
-        &workers,
-        &mut nodes,
-    );
-    let integration = Integration::new(workers.clone()).start();
-    Integration::attach(&integration, &mut nodes);
     // The registry lives as long as this function: it can't be gone.
     let _ = registry.send(Attach(nodes)).await;
     #[cfg(feature = "record")]
@@ -142,7 +158,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     for listener in listeners {
         listener.do_send(StopListening);
     }
-    shut_down(&registry, &ends.steps, &workers, &gauges).await;
+    shut_down(&registry, ends.steps.as_ref(), &workers, &gauges).await;
     #[cfg(feature = "record")]
     ends.finish_record().await;
     arm_thread.stop();
@@ -175,22 +191,23 @@ fn gate(options: &Options, unauthenticated: usize) -> Gate {
 }
 
 /// The ways by which the nodes that know the number of links are told of the end.
+#[derive(Default)]
 struct NodeEnds {
     /// Steps that are still to be taken are refused.
-    steps: Recipient<RefuseSteps>,
+    steps: Option<Recipient<RefuseSteps>>,
     #[cfg(feature = "record")]
-    record: Recipient<RecordTo>,
+    record: Option<Recipient<RecordTo>>,
     #[cfg(feature = "record")]
-    end_record: Recipient<EndRecord>,
+    end_record: Option<Recipient<EndRecord>>,
 }
 
 #[cfg(feature = "record")]
 impl NodeEnds {
     /// Begins the record that was asked for.
     async fn record(&self, options: &Options) -> Result<(), RunError> {
-        if let Some(file) = &options.record.file {
+        if let (Some(file), Some(recorder)) = (&options.record.file, &self.record) {
             // The recorder lives as long as the registry: it can't be gone.
-            if let Ok(begun) = self.record.send(RecordTo(file.clone())).await {
+            if let Ok(begun) = recorder.send(RecordTo(file.clone())).await {
                 begun?;
             }
         }
@@ -199,7 +216,9 @@ impl NodeEnds {
 
     /// Ends the record, if there is one, for a bounded time.
     async fn finish_record(&self) {
-        let _ = timeout(RECORD_TIME, self.end_record.send(EndRecord)).await;
+        if let Some(recorder) = &self.end_record {
+            let _ = timeout(RECORD_TIME, recorder.send(EndRecord)).await;
+        }
     }
 }
 
@@ -270,12 +289,27 @@ where
     #[cfg(not(feature = "record"))]
     let _ = options;
     NodeEnds {
-        steps: arm.recipient(),
+        steps: Some(arm.recipient()),
         #[cfg(feature = "record")]
-        record: recorder.clone().recipient(),
+        record: Some(recorder.clone().recipient()),
         #[cfg(feature = "record")]
-        end_record: recorder.recipient(),
+        end_record: Some(recorder.recipient()),
     }
+}
+
+/// Starts the player of the record that is to be replayed, if there is one.
+#[cfg(feature = "record")]
+fn start_replay(
+    options: &Options,
+    registry: &Addr<Registry>,
+    thread: &Arbiter,
+    nodes: &mut Nodes,
+) -> Result<bool, RunError> {
+    let Some(file) = &options.record.replay else {
+        return Ok(false);
+    };
+    player::start(file, registry, &thread.handle(), nodes)?;
+    Ok(true)
 }
 
 /// The address asked for; for the default one also its IPv6 twin, where that is to be had.
@@ -323,14 +357,16 @@ fn announce_page(address: SocketAddr, asks_token: bool) {
 /// Refuses what waits, lets every connection send what it owes, for a bounded time.
 async fn shut_down(
     registry: &Addr<Registry>,
-    steps: &Recipient<RefuseSteps>,
+    steps: Option<&Recipient<RefuseSteps>>,
     workers: &WorkerPool,
     gauges: &Gauges,
 ) {
     let _ = registry.send(RefuseCalls(SHUTTING_DOWN)).await;
     workers.close(SHUTTING_DOWN);
     let answered = Instant::now() + ANSWER_TIME;
-    let _ = timeout(ANSWER_TIME, steps.send(RefuseSteps(SHUTTING_DOWN))).await;
+    if let Some(steps) = steps {
+        let _ = timeout(ANSWER_TIME, steps.send(RefuseSteps(SHUTTING_DOWN))).await;
+    }
     until(answered, || workers.is_idle()).await;
     let _ = registry.send(FinishAll).await;
     let flushed = Instant::now() + FLUSH_TIME;

@@ -9,6 +9,7 @@
 
 mod explained;
 mod links;
+mod log;
 mod plan;
 #[cfg(feature = "record")]
 mod record;
@@ -24,6 +25,8 @@ use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 #[cfg(feature = "cli")]
 use std::path::PathBuf;
 
+#[cfg(feature = "record")]
+use clap::ArgMatches;
 use clap::builder::{OsStringValueParser, StyledStr};
 use clap::{Arg, Command};
 use tracing::level_filters::LevelFilter;
@@ -47,16 +50,6 @@ use crate::report::ReportOptions;
 /// Address of the runtime unless an option says otherwise; bound here, it listens on `[::1]` too.
 pub const DEFAULT_BIND: SocketAddr =
     SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::new(127, 0, 0, 1), 9095));
-
-/// The log levels by name, from silent to everything.
-const LEVELS: [(&str, LevelFilter); 6] = [
-    ("off", LevelFilter::OFF),
-    ("error", LevelFilter::ERROR),
-    ("warn", LevelFilter::WARN),
-    ("info", LevelFilter::INFO),
-    ("debug", LevelFilter::DEBUG),
-    ("trace", LevelFilter::TRACE),
-];
 
 /// The features of this build, as the version shows them.
 const BUILD: &str = if cfg!(feature = "web") {
@@ -104,24 +97,6 @@ const SEED: LaunchOption = LaunchOption {
     is_switch: false,
 };
 
-const LOG: LaunchOption = LaunchOption {
-    option: "log",
-    variable: "ARM_SIM_LOG",
-    value: "LEVEL",
-    about: "What is logged to standard error: off, error, warn, info, debug or trace",
-    default: "info",
-    is_switch: false,
-};
-
-const LOG_FORMAT: LaunchOption = LaunchOption {
-    option: "log-format",
-    variable: "ARM_SIM_LOG_FORMAT",
-    value: "FORMAT",
-    about: "How it is logged: text, or json for one object a line",
-    default: "text",
-    is_switch: false,
-};
-
 const TOKEN: LaunchOption = LaunchOption {
     option: "token",
     variable: "ARM_SIM_TOKEN",
@@ -137,8 +112,8 @@ const SETTINGS: &[&LaunchOption] = &[
     &LINKS,
     &BIND,
     &SEED,
-    &LOG,
-    &LOG_FORMAT,
+    &log::LOG,
+    &log::LOG_FORMAT,
     &TOKEN,
     #[cfg(feature = "record")]
     &record::RECORD,
@@ -235,7 +210,7 @@ impl Options {
             Ok(matches) => matches,
             Err(error) => return explained(&error).map(Parsed::Show),
         };
-        if let Some((name, given)) = matches.subcommand() {
+        if let Some((name, subcommand)) = matches.subcommand() {
             // An option of serving means nothing to a subcommand.
             if let Some(stray) = SETTINGS.iter().find(|s| matches.contains_id(s.option)) {
                 return Err(UsageError::UnknownArgument {
@@ -244,23 +219,23 @@ impl Options {
             }
             return match name {
                 #[cfg(feature = "report")]
-                report::NAME => Ok(Parsed::Report(report::read(given))),
+                report::NAME => Ok(Parsed::Report(report::read(subcommand))),
                 #[cfg(feature = "record")]
-                record::REPLAY => Ok(Parsed::Replay(record::read(given))),
-                plan::NAME => plan::read(given).map(Parsed::Plan),
+                record::REPLAY => Self::of_replay(subcommand, environment),
+                plan::NAME => plan::read(subcommand).map(Parsed::Plan),
                 #[cfg(feature = "cli")]
                 command::COMPLETIONS => {
-                    let script = command::complete(command::shell(given), command_line());
+                    let script = command::complete(command::shell(subcommand), command_line());
                     Ok(Parsed::Show(script))
                 }
                 #[cfg(feature = "cli")]
-                command::MAN => Ok(Parsed::WriteManual(command::folder(given))),
+                command::MAN => Ok(Parsed::WriteManual(command::folder(subcommand))),
                 #[cfg(feature = "cli")]
                 subject => {
-                    let leaf = given.subcommand().map_or(given, |(_, leaf)| leaf);
+                    let leaf = subcommand.subcommand().map_or(subcommand, |(_, leaf)| leaf);
                     let token = setting::given(&TOKEN, leaf, &environment);
                     let token = token.map(read_token).transpose()?;
-                    Ok(Parsed::Ask(Asked::new(subject, given, token)))
+                    Ok(Parsed::Ask(Asked::new(subject, subcommand, token)))
                 }
                 #[cfg(not(feature = "cli"))]
                 _ => Err(UsageError::UnknownArgument {
@@ -269,12 +244,41 @@ impl Options {
             };
         }
         let given = |setting: &LaunchOption| given(setting, &matches, &environment);
+        Self::read(given).map(Parsed::Serve)
+    }
+
+    /// A record to be replayed, or to be served in the arm's place.
+    #[cfg(feature = "record")]
+    fn of_replay(
+        matches: &ArgMatches,
+        environment: impl Fn(&str) -> Option<OsString>,
+    ) -> Result<Parsed, UsageError> {
+        let replay = record::read(matches);
+        let mut of_serving = SETTINGS.iter().filter(|one| record::is_of_replay(one));
+        if matches.get_flag(record::SERVE) {
+            let given = |setting: &LaunchOption| {
+                let is_ours = record::is_of_replay(setting);
+                is_ours.then(|| given(setting, matches, &environment))?
+            };
+            let mut options = Self::read(given)?;
+            options.record.replay = Some(replay.file);
+            return Ok(Parsed::Serve(options));
+        }
+        match of_serving.find(|one| matches.contains_id(one.option)) {
+            Some(stray) => Err(UsageError::UnknownArgument {
+                argument: format!("--{} without --{}", stray.option, record::SERVE),
+            }),
+            None => Ok(Parsed::Replay(replay)),
+        }
+    }
+
+    fn read(given: impl Fn(&LaunchOption) -> Option<Given>) -> Result<Self, UsageError> {
         let token = given(&TOKEN).map(read_token).transpose()?;
         let bind = given(&BIND)
             .map(|bind| read_bind(bind, token.is_some()))
             .transpose()?
             .unwrap_or(DEFAULT_BIND);
-        Ok(Parsed::Serve(Self {
+        Ok(Self {
             links: given(&LINKS)
                 .map(read_links)
                 .transpose()?
@@ -282,27 +286,48 @@ impl Options {
             bind,
             is_default_bind: bind == DEFAULT_BIND,
             seed: given(&SEED).map(read_seed).transpose()?,
-            log: given(&LOG)
-                .map(read_log)
+            log: given(&log::LOG)
+                .map(log::read_level)
                 .transpose()?
                 .unwrap_or(LevelFilter::INFO),
-            log_format: given(&LOG_FORMAT)
-                .map(read_log_format)
+            log_format: given(&log::LOG_FORMAT)
+                .map(log::read_format)
                 .transpose()?
                 .unwrap_or_default(),
             token,
             #[cfg(feature = "record")]
-            record: RecordOptions::read(given),
+            record: RecordOptions::read(&given),
             #[cfg(feature = "web")]
-            web: WebOptions::read(given)?,
-        }))
+            web: WebOptions::read(&given)?,
+        })
     }
 }
 
 /// The command line as `clap` is to read it. The values stay unread, and the variables unknown to it.
 #[must_use]
 pub fn command_line() -> Command {
-    let options = SETTINGS.iter().map(|setting| {
+    let command = Command::new(env!("CARGO_PKG_NAME"))
+        .version(BUILD)
+        .about(env!("CARGO_PKG_DESCRIPTION"))
+        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
+        .args(arguments(|_| true))
+        .disable_help_subcommand(true)
+        .subcommand(plan::command());
+    #[cfg(feature = "report")]
+    let command = command.subcommand(report::command());
+    #[cfg(feature = "record")]
+    let command = command.subcommand(record::command(arguments(record::is_of_replay)));
+    #[cfg(feature = "cli")]
+    let command = command
+        .subcommands(command::subjects())
+        .subcommands(command::tools());
+    command
+}
+
+/// The options of serving as `clap` is to read them, as far as they are `chosen`.
+fn arguments(chosen: fn(&LaunchOption) -> bool) -> impl Iterator<Item = Arg> {
+    let chosen = SETTINGS.iter().filter(move |setting| chosen(setting));
+    chosen.map(|setting| {
         let LaunchOption {
             option,
             variable,
@@ -325,23 +350,7 @@ pub fn command_line() -> Command {
         } else {
             arg
         }
-    });
-    let command = Command::new(env!("CARGO_PKG_NAME"))
-        .version(BUILD)
-        .about(env!("CARGO_PKG_DESCRIPTION"))
-        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
-        .args(options)
-        .disable_help_subcommand(true)
-        .subcommand(plan::command());
-    #[cfg(feature = "report")]
-    let command = command.subcommand(report::command());
-    #[cfg(feature = "record")]
-    let command = command.subcommand(record::command());
-    #[cfg(feature = "cli")]
-    let command = command
-        .subcommands(command::subjects())
-        .subcommands(command::tools());
-    command
+    })
 }
 
 fn read_links(Given { origin, value }: Given) -> Result<Links, UsageError> {
@@ -369,19 +378,4 @@ fn read_seed(Given { origin, value }: Given) -> Result<u64, UsageError> {
     value
         .parse()
         .map_err(|_| UsageError::Seed { origin, value })
-}
-
-fn read_log(Given { origin, value }: Given) -> Result<LevelFilter, UsageError> {
-    let known = LEVELS.iter().find(|(name, _)| *name == value);
-    known
-        .map(|(_, level)| *level)
-        .ok_or(UsageError::Log { origin, value })
-}
-
-fn read_log_format(Given { origin, value }: Given) -> Result<LogFormat, UsageError> {
-    match value.as_str() {
-        "text" => Ok(LogFormat::Text),
-        "json" => Ok(LogFormat::Json),
-        _ => Err(UsageError::LogFormat { origin, value }),
-    }
 }

@@ -6,7 +6,7 @@ use std::ffi::OsString;
 use std::path::PathBuf;
 
 use clap::builder::OsStringValueParser;
-use clap::{Arg, ArgMatches, Command};
+use clap::{Arg, ArgAction, ArgMatches, Command};
 
 use super::setting::{Given, LaunchOption};
 
@@ -35,6 +35,8 @@ pub struct RecordOptions {
     pub file: Option<PathBuf>,
     /// Folder in which clients may have runs recorded, if any.
     pub folder: Option<PathBuf>,
+    /// The record that is played to clients in the arm's place, if one is.
+    pub replay: Option<PathBuf>,
 }
 
 impl RecordOptions {
@@ -42,6 +44,7 @@ impl RecordOptions {
         Self {
             file: given(&RECORD).map(|given| given.value.into()),
             folder: given(&RECORD_DIR).map(|given| given.value.into()),
+            replay: None,
         }
     }
 }
@@ -53,20 +56,33 @@ pub struct ReplayOptions {
     pub file: PathBuf,
 }
 
+/// The option that plays the record to clients.
+pub(super) const SERVE: &str = "serve";
+/// The options of serving that mean something to a replay.
+pub(super) fn is_of_replay(option: &LaunchOption) -> bool {
+    !["links", "seed", RECORD.option, RECORD_DIR.option].contains(&option.option)
+}
+
 /// The name of the subcommand.
 pub(super) const REPLAY: &str = "replay";
 
 /// The subcommand as `clap` is to read it.
-pub(super) fn command() -> Command {
+pub(super) fn command(settings: impl Iterator<Item = Arg>) -> Command {
+    let serve = Arg::new(SERVE)
+        .long(SERVE)
+        .action(ArgAction::SetTrue)
+        .help("Play it to clients instead, in the arm's place; the options below are for that");
     let file = Arg::new("file")
         .value_name("FILE")
         .value_parser(OsStringValueParser::new())
         .required(true)
         .help("A record that --record or /recorder/start has made");
     Command::new(REPLAY)
-        .about("Take a recorded run's steps again, and say where they differ from the record")
+        .about("Take a recorded run's steps again and say where they differ from the record, or play it to clients")
         .after_help("Exit status: 0 if every state is the same bit for bit, 1 if not.")
         .arg(file)
+        .arg(serve)
+        .args(settings)
 }
 
 /// Reads its arguments.

@@ -38,6 +38,12 @@ pub enum NoteError {
         /// The name.
         String,
     ),
+    /// A count that nobody has come to.
+    #[error("{0} must be at most 2^53")]
+    Steps(
+        /// The field.
+        &'static str,
+    ),
     /// No timestep.
     #[error("the timestep must be greater than 0")]
     Timestep,
@@ -168,6 +174,13 @@ fn method(name: String) -> Result<Method, NoteError> {
     found.ok_or(NoteError::Method(name))
 }
 
+/// A number of steps: exact as a `float64`, which a run at any speed stays below for years.
+fn counted(field: &'static str, steps: u64) -> Result<u64, NoteError> {
+    const MOST: u64 = 1 << 53;
+    let valid = steps <= MOST;
+    valid.then_some(steps).ok_or(NoteError::Steps(field))
+}
+
 fn checked(timestep: f64) -> Result<f64, NoteError> {
     let valid = timestep.is_finite() && timestep > 0.0;
     valid.then_some(timestep).ok_or(NoteError::Timestep)
@@ -283,8 +296,8 @@ impl WrittenCheckpoint {
             effort: array("effort", &self.effort)?,
             disturbance,
             base: self.base,
-            steps_since_base: self.steps_since_base,
-            steps: self.steps,
+            steps_since_base: counted("steps_since_base", self.steps_since_base)?,
+            steps: counted("steps", self.steps)?,
             divergence: self.divergence,
         })
     }

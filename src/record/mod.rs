@@ -6,17 +6,21 @@
 //!
 //! **Invariant:** a file that was cut anywhere is readable up to its last whole chunk.
 
+mod comparison;
 mod journal;
-mod player;
 mod reader;
+mod reel;
 mod schema;
 mod writer;
 
 use bytes::Bytes;
 
+pub use self::comparison::{
+    AT_ONCE, Difference, MAX_LEAP, ReplayError, ReplayVerdict, recorded_links, replay,
+};
 pub use self::journal::{Note, NoteError, links, read_note, write_note};
-pub use self::player::{Difference, ReplayError, ReplayVerdict, replay};
 pub use self::reader::{Passage, ReadError, RecordEnding, Recording};
+pub use self::reel::{Moment, Reel, ReelPlace};
 pub use self::schema::{CALLS, INPUTS, STATES};
 pub use self::writer::{CHUNK_BYTES, RecordError, RunSettings, Scribe};
 use crate::protocol::catalog::{Service, Topic};

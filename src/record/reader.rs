@@ -16,7 +16,7 @@ use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::cdr_reader::{self, CdrError};
 
 /// Longest chunk that is read: longer ones are never written.
-const MAX_CHUNK: usize = 16 * 1024 * 1024;
+pub(super) const MAX_CHUNK: usize = 16 * 1024 * 1024;
 
 /// A message of the record.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,7 +123,7 @@ impl<R: Read> Recording<R> {
 }
 
 /// The type of that name, if it is defined as we define it.
-fn known_type(name: &str, definition: &[u8]) -> Option<Type> {
+pub(super) fn known_type(name: &str, definition: &[u8]) -> Option<Type> {
     let own = [INPUT, STATE, CALL];
     let own = own.into_iter().find(|one| one.name == name);
     let one = own.or_else(|| types::find(name))?;

@@ -92,6 +92,7 @@ pub const ASSETS: &[Asset] = &[
     asset!("pencil.js", JAVASCRIPT),
     asset!("phase_plot.js", JAVASCRIPT),
     asset!("playback.js", JAVASCRIPT),
+    asset!("player_bar.js", JAVASCRIPT),
     asset!("plots.js", JAVASCRIPT),
     asset!("policy.js", JAVASCRIPT),
     asset!("readouts.js", JAVASCRIPT),

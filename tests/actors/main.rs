@@ -32,8 +32,12 @@ mod memory;
 mod memory_kinds;
 mod pacing;
 #[cfg(feature = "record")]
+mod player;
+#[cfg(feature = "record")]
 mod recorder;
 mod registry;
+#[cfg(feature = "record")]
+mod replay;
 mod rosapi;
 mod slow;
 #[path = "../support/stage.rs"]

@@ -14,27 +14,34 @@ use pendularm::record::{
     ReplayVerdict, RunSettings, STATES, Scribe, replay,
 };
 use serde_json::{Value, json};
-use tokio::time::sleep;
+use tokio::time::{Instant, sleep};
 
 use crate::stage::{Client, Stage, in_virtual_time, ms};
 
 /// Entries as they come, in the order in which they are told.
 #[derive(Clone, Default)]
-struct Notes(Arc<Mutex<Vec<RecordEntry>>>);
+pub struct Notes(Arc<Mutex<Noted>>);
+
+#[derive(Default)]
+struct Noted {
+    began: Option<Instant>,
+    entries: Vec<RecordEntry>,
+}
 
 impl Notes {
     fn put(&self, content: Content) {
-        let mut entries = self.0.lock().unwrap();
-        let log_time = entries.len() as u64;
-        entries.push(RecordEntry { log_time, content });
+        let mut noted = self.0.lock().unwrap();
+        let began = *noted.began.get_or_insert_with(Instant::now);
+        let log_time = began.elapsed().as_nanos() as u64;
+        noted.entries.push(RecordEntry { log_time, content });
     }
 
-    fn entries(&self) -> Vec<RecordEntry> {
-        self.0.lock().unwrap().clone()
+    pub fn entries(&self) -> Vec<RecordEntry> {
+        self.0.lock().unwrap().entries.clone()
     }
 
     /// Begins to note all that passes.
-    async fn take<const N: usize>(&self, stage: &Stage<N>)
+    pub async fn take<const N: usize>(&self, stage: &Stage<N>)
     where
         Gains<N>: Default,
     {
@@ -54,7 +61,7 @@ impl Notes {
     }
 }
 
-fn file(entries: &[RecordEntry]) -> Vec<u8> {
+pub fn file(entries: &[RecordEntry]) -> Vec<u8> {
     let settings = RunSettings { links: 2, seed: 1 };
     let mut scribe = Scribe::new(Vec::new(), &settings).unwrap();
     for (number, entry) in entries.iter().enumerate() {
@@ -66,7 +73,7 @@ fn file(entries: &[RecordEntry]) -> Vec<u8> {
     scribe.finish().unwrap()
 }
 
-fn passages(file: &[u8]) -> (Vec<Passage>, RecordEnding) {
+pub fn passages(file: &[u8]) -> (Vec<Passage>, RecordEnding) {
     let mut recording = Recording::new(file);
     let mut passages = Vec::new();
     while let Some(passage) = recording.next_passage().unwrap() {
@@ -75,11 +82,11 @@ fn passages(file: &[u8]) -> (Vec<Passage>, RecordEnding) {
     (passages, recording.ending().unwrap())
 }
 
-fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
+pub fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
     replay(&*file(entries)).unwrap()
 }
 
-async fn stop<const N: usize>(stage: &Stage<N>)
+pub async fn stop<const N: usize>(stage: &Stage<N>)
 where
     Gains<N>: Default,
 {

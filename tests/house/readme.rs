@@ -9,7 +9,7 @@ use std::process::Command;
 
 use crate::limits::sources;
 use crate::papers::{table, text};
-use pendularm::protocol::catalog::{Field, Rosapi, Service, Topic};
+use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic};
 
 /// The texts between the code marks of a cell, in order.
 fn codes(cell: &str) -> Vec<&str> {
@@ -178,6 +178,20 @@ fn the_papers_list_every_question_of_rosapi_with_its_fields_in_order() {
         assert_eq!(codes(&row[1]), names(service.fields()), "{question:?}");
         let values = names(service.response_fields());
         assert_eq!(codes(&row[2]), values, "{question:?}");
+    }
+}
+
+#[test]
+fn the_papers_list_every_service_of_the_player_with_its_fields_in_order() {
+    let rows = table(&text("docs/protocol.md"), "player");
+    assert_eq!(rows.len(), Playback::ALL.len());
+    for (row, one) in rows.iter().zip(Playback::ALL) {
+        let service = Service::Playback(one);
+        assert_eq!(codes(&row[0]), [one.short_name()]);
+        let names = |fields: &[Field]| -> Vec<&str> { fields.iter().map(|one| one.name).collect() };
+        assert_eq!(codes(&row[1]), names(service.fields()), "{one:?}");
+        let values = names(service.response_fields());
+        assert_eq!(codes(&row[2]), values, "{one:?}");
     }
 }
 

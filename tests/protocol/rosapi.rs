@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** answers are compared whole; names are spelled here as clients spell them.
 
-use pendularm::protocol::catalog::{Action, Node, Rosapi, Service, Topic, types};
+use pendularm::protocol::catalog::{Action, Node, Playback, Rosapi, Service, Topic, types};
 use pendularm::protocol::ros::rosapi::{AnswerError, Census, ListedService, ListedTopic, answer};
 use serde_json::{Value, json};
 
@@ -33,6 +33,7 @@ fn census() -> Census {
             service("/dance", Some("demo/action/Dance")),
             service("/untyped", None),
         ],
+        replayed: None,
     }
 }
 
@@ -432,6 +433,7 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
     let topics = Topic::ALL.map(Topic::type_name);
     let services = Service::ALL.map(Service::type_name);
     let questions = Rosapi::ALL.map(|question| Service::Rosapi(question).type_name());
+    let player = Playback::ALL.map(|one| Service::Playback(one).type_name());
     let inside = [
         "std_msgs/msg/Header",
         "builtin_interfaces/msg/Time",
@@ -462,6 +464,7 @@ fn the_interfaces_are_all_types_of_messages_services_and_actions() {
         .into_iter()
         .chain(services)
         .chain(questions)
+        .chain(player)
         .chain(inside)
         .chain(actions)
         .collect();

@@ -67,6 +67,13 @@ impl Runtime {
         Self::spawn(program(), bind, arguments)
     }
 
+    /// Starts the program with a record in the arm's place.
+    pub fn replaying(record: &str) -> Self {
+        let mut program = program();
+        program.args(["replay", record, "--serve"]);
+        Self::spawn(program, "127.0.0.1:0", &[])
+    }
+
     /// The same, started by a shell that has done `prelude` before: sets limits, say.
     pub fn under(prelude: &str) -> Self {
         let mut shell = Command::new("sh");

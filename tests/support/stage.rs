@@ -10,6 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
+use pendularm::actors::arm::follow::{PathArm, PathFollower};
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{
     CancelGoal, CancelRejected, GoalTracker, IkAction, SendGoal,
@@ -93,6 +94,7 @@ where
         )
         .start();
         ArmSim::attach(&arm, &mut nodes);
+        PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), &mut nodes);
         let tracker = GoalTracker {
             track: arm.clone().recipient(),
             command: arm.clone().recipient(),

@@ -163,6 +163,42 @@ fn a_difference_is_told_with_its_step_and_by_the_exit_status() {
 }
 
 #[test]
+fn a_record_is_played_to_clients_at_the_speed_that_they_choose() {
+    let file = folder("played").join("run.mcap");
+    let runtime = Runtime::with(&["--links", "3", "--record", text(&file)]);
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/set_params", json!({"gravity": 4.25}));
+    client.subscribe("/joint_states");
+    let live: Vec<Value> = (0..30).map(|_| client.message("/joint_states")).collect();
+    end(runtime);
+
+    let player = Runtime::replaying(text(&file));
+    let mut client = player.connect();
+    client.ask("/rosbag2_player/pause", json!({}));
+    let params = client.ask("/arm_sim/set_params", json!({}));
+    assert_eq!(params["lengths"].as_array().unwrap().len(), 3);
+    client.subscribe("/joint_states");
+    client.ask(
+        "/rosbag2_player/seek",
+        json!({"time": {"sec": 0, "nanosec": 0}}),
+    );
+    client.ask("/rosbag2_player/resume", json!({}));
+    for state in &live[1..] {
+        while client.message("/joint_states") != *state {}
+    }
+    // Backward they come the other way round.
+    client.ask("/rosbag2_player/set_rate", json!({"rate": -0.5}));
+    for state in live[2..28].iter().rev() {
+        while client.message("/joint_states") != *state {}
+    }
+    end(player);
+
+    let (status, said) = run(&["replay", "--serve", "--bind", "127.0.0.1:0", "nowhere.mcap"]);
+    assert_eq!(status, Some(1));
+    assert!(said.contains("nowhere.mcap: "), "{said}");
+}
+
+#[test]
 fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
     let folder = folder("refused");
     let there = folder.join("there.mcap");

@@ -4,6 +4,7 @@
 
 use super::entry::{Field, ServiceEntry, optional, required, service};
 use super::node::Node;
+use super::playback::Playback;
 use super::rosapi::Rosapi;
 use super::table::{fields, table};
 use crate::protocol::names;
@@ -258,6 +259,8 @@ table! {
     }
     /// A question of rosapi, under either of its prefixes.
     Rosapi(Rosapi),
+    /// A service of the player, where a record is replayed.
+    Playback(Playback),
 }
 
 const METHOD: [Field; 2] = [
@@ -334,6 +337,7 @@ impl Service {
         let name = names::absolute(name);
         let own = Self::ALL.into_iter().find(|service| service.name() == name);
         own.or_else(|| Rosapi::from_name(&name).map(Self::Rosapi))
+            .or_else(|| Playback::from_name(&name).map(Self::Playback))
     }
 
     /// The service type, as ROS writes it.

@@ -192,7 +192,10 @@ fn finite(raw: &RawValue, field: &str, bound: Bound) -> Result<f64, RejectedFiel
 }
 
 /// A duration in seconds, under the names of ROS 2 or of ROS 1.
-fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
+///
+/// # Errors
+/// If it is none; the reason names `field`.
+pub fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
     let names = ["sec", "nanosec", "secs", "nsecs"];
     let [sec, nanosec, secs, nsecs] = json::members(raw.get(), &names)
         .map_err(|_| mistyped(field, "an object with sec and nanosec", raw))?;

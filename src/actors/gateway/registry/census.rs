@@ -112,6 +112,7 @@ impl Tally {
                 .collect(),
             services: self.services.iter().take(MAX_LISTED).map(listed).collect(),
             actions: self.actions.iter().take(MAX_LISTED).map(listed).collect(),
+            replayed: None,
         }
     }
 }

@@ -33,6 +33,7 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Publish, Respond};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages as frames;
+use crate::protocol::ros::rosapi::Census;
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
@@ -164,7 +165,11 @@ impl Handler<TakeCensus> for Registry {
     type Result = MessageResult<TakeCensus>;
 
     fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        MessageResult(self.tally.take())
+        let replayed = self.nodes.replayed.clone();
+        MessageResult(Census {
+            replayed,
+            ..self.tally.take()
+        })
     }
 }
 

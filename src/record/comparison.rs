@@ -1,7 +1,7 @@
 //! Takes the recorded steps again and compares every recorded state, bit for bit.
 //!
 //! **Invariant:** where inputs were lost the record begins again with the whole simulation; nothing is compared across
-//! that, and it is told.
+//! that, and it is told. A record is not believed to have more steps than the time that it covers has room for.
 
 use std::fmt;
 use std::io::Read;
@@ -12,6 +12,14 @@ use super::journal::{Note, NoteError, links, read_note};
 use super::reader::{Passage, ReadError, RecordEnding, Recording};
 use super::schema::{INPUTS, STATES};
 use crate::math::simulation::Simulation;
+
+/// Steps between two messages of a record, at most: a tick has a tenth of that on the fastest machine, so that a record
+/// whose file was slow for a while is not refused.
+pub const MAX_LEAP: u64 = 10_000_000;
+/// The least time that a step takes, in nanoseconds: no machine was seen to take one in less than three times that.
+const SHORTEST_STEP: u64 = 10;
+/// Steps for which a record needs no time, lest a clock that ticks rarely matters.
+pub const AT_ONCE: u64 = 100_000;
 
 /// The outcome of a replay.
 #[derive(Debug, Clone, PartialEq)]
@@ -68,6 +76,23 @@ pub enum ReplayError {
     /// No input at all, or no state behind one.
     #[error("nothing to compare: it has no states of an arm")]
     Empty,
+    /// More steps than the arm can have taken.
+    #[error(
+        "{topic}, message {sequence}: step {step} is {due} steps after the one before, \
+         and no arm takes more than {most} there"
+    )]
+    Leap {
+        /// The channel's topic.
+        topic: String,
+        /// The message's number on it, from 1.
+        sequence: u32,
+        /// The step.
+        step: u64,
+        /// Steps since the message before.
+        due: u64,
+        /// As many could be.
+        most: u64,
+    },
     /// Steps that run backwards.
     #[error("step {step} comes after step {after}")]
     Order {
@@ -121,14 +146,7 @@ impl fmt::Display for ReplayVerdict {
 /// If the file can't be read, or holds nothing to compare.
 pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     let mut recording = Recording::new(file);
-    let first = loop {
-        let Some(passage) = recording.next_passage()? else {
-            return Err(ReplayError::Empty);
-        };
-        if passage.topic == INPUTS {
-            break passage;
-        }
-    };
+    let first = first_input(&mut recording)?;
     match links(text(&first, "input")?) {
         Some(2) => play::<2>(recording, first),
         Some(3) => play::<3>(recording, first),
@@ -136,12 +154,32 @@ pub fn replay(file: impl Read) -> Result<ReplayVerdict, ReplayError> {
     }
 }
 
+/// How many links the recorded arm has.
+///
+/// # Errors
+/// If the file can't be read, or holds no arm.
+pub fn recorded_links(file: impl Read) -> Result<usize, ReplayError> {
+    let first = first_input(&mut Recording::new(file))?;
+    links(text(&first, "input")?).ok_or(ReplayError::Empty)
+}
+
+fn first_input(recording: &mut Recording<impl Read>) -> Result<Passage, ReplayError> {
+    loop {
+        let passage = recording.next_passage()?.ok_or(ReplayError::Empty)?;
+        if passage.topic == INPUTS {
+            return Ok(passage);
+        }
+    }
+}
+
 fn play<const N: usize>(
     mut recording: Recording<impl Read>,
     first: Passage,
 ) -> Result<ReplayVerdict, ReplayError> {
-    let mut player = Player::<N> {
+    let mut run = Replay::<N> {
         arm: None,
+        began: 0,
+        taken: 0,
         verdict: ReplayVerdict {
             links: N,
             steps: 0,
@@ -155,26 +193,30 @@ fn play<const N: usize>(
     };
     let mut next = Some(first);
     while let Some(passage) = next {
-        player.take(&passage)?;
-        if player.verdict.difference.is_some() {
-            return Ok(player.verdict);
+        run.take(&passage)?;
+        if run.verdict.difference.is_some() {
+            return Ok(run.verdict);
         }
         next = recording.next_passage()?;
     }
-    player.verdict.ending = recording.ending();
-    if player.verdict.states == 0 {
+    run.verdict.ending = recording.ending();
+    if run.verdict.states == 0 {
         return Err(ReplayError::Empty);
     }
-    Ok(player.verdict)
+    Ok(run.verdict)
 }
 
-struct Player<const N: usize> {
+struct Replay<const N: usize> {
     /// The simulation, and the steps it has taken as the record counts them; none before the record begins.
     arm: Option<(Simulation<N>, u64)>,
+    /// When the simulation was recorded as a whole, in nanoseconds since 1970.
+    began: u64,
+    /// Steps taken again since then.
+    taken: u64,
     verdict: ReplayVerdict,
 }
 
-impl<const N: usize> Player<N> {
+impl<const N: usize> Replay<N> {
     fn take(&mut self, passage: &Passage) -> Result<(), ReplayError> {
         match passage.topic.as_str() {
             INPUTS => self.input(passage),
@@ -191,9 +233,11 @@ impl<const N: usize> Player<N> {
             self.verdict.losses += u64::from(self.arm.is_some());
             self.verdict.agreed_to = step;
             self.arm = Some((Simulation::continued(&checkpoint), step));
+            self.began = passage.log_time;
+            self.taken = 0;
             return Ok(());
         }
-        if !self.advance(step)? {
+        if !self.advance(step, passage)? {
             return Ok(());
         }
         let Some((simulation, _)) = &mut self.arm else {
@@ -215,7 +259,7 @@ impl<const N: usize> Player<N> {
 
     fn state(&mut self, passage: &Passage) -> Result<(), ReplayError> {
         let step = number(passage, "step")?;
-        if !self.advance(step)? {
+        if !self.advance(step, passage)? {
             return Ok(());
         }
         let Some((simulation, _)) = &self.arm else {
@@ -249,14 +293,27 @@ impl<const N: usize> Player<N> {
     }
 
     /// Takes the steps up to that one; false if there is nothing to compare there.
-    fn advance(&mut self, step: u64) -> Result<bool, ReplayError> {
+    fn advance(&mut self, step: u64, passage: &Passage) -> Result<bool, ReplayError> {
         let Some((simulation, at)) = &mut self.arm else {
             return Ok(false);
         };
         let due = step.checked_sub(*at);
         let due = due.ok_or(ReplayError::Order { step, after: *at })?;
+        let since = passage.log_time.saturating_sub(self.began);
+        let by_time = (since / SHORTEST_STEP).saturating_add(AT_ONCE);
+        let most = MAX_LEAP.min(by_time.saturating_sub(self.taken));
+        if due > most {
+            return Err(ReplayError::Leap {
+                topic: passage.topic.clone(),
+                sequence: passage.sequence,
+                step,
+                due,
+                most,
+            });
+        }
         let taken = simulation.advance(due);
         *at += taken;
+        self.taken += taken;
         self.verdict.steps += taken;
         if taken < due {
             let at = *at;
