@@ -9,6 +9,7 @@
 
 mod explained;
 mod links;
+mod log;
 mod plan;
 #[cfg(feature = "record")]
 mod record;
@@ -38,7 +39,7 @@ pub use self::plan::PlanOptions;
 pub use self::record::{RecordOptions, ReplayOptions};
 use self::setting::{Given, LaunchOption, given};
 pub use self::usage::{Origin, UsageError};
-use self::values::{read_bind, read_links, read_log, read_log_format, read_seed, read_token};
+use self::values::{read_bind, read_links, read_seed, read_token};
 #[cfg(feature = "web")]
 pub use self::web::WebOptions;
 #[cfg(feature = "cli")]
@@ -98,24 +99,6 @@ const SEED: LaunchOption = LaunchOption {
     is_switch: false,
 };
 
-const LOG: LaunchOption = LaunchOption {
-    option: "log",
-    variable: "ARM_SIM_LOG",
-    value: "LEVEL",
-    about: "What is logged to standard error: off, error, warn, info, debug or trace",
-    default: "info",
-    is_switch: false,
-};
-
-const LOG_FORMAT: LaunchOption = LaunchOption {
-    option: "log-format",
-    variable: "ARM_SIM_LOG_FORMAT",
-    value: "FORMAT",
-    about: "How it is logged: text, or json for one object a line",
-    default: "text",
-    is_switch: false,
-};
-
 const TOKEN: LaunchOption = LaunchOption {
     option: "token",
     variable: "ARM_SIM_TOKEN",
@@ -131,8 +114,8 @@ const SETTINGS: &[&LaunchOption] = &[
     &LINKS,
     &BIND,
     &SEED,
-    &LOG,
-    &LOG_FORMAT,
+    &log::LOG,
+    &log::LOG_FORMAT,
     &TOKEN,
     #[cfg(feature = "record")]
     &record::RECORD,
@@ -305,12 +288,12 @@ impl Options {
             bind,
             is_default_bind: bind == DEFAULT_BIND,
             seed: given(&SEED).map(read_seed).transpose()?,
-            log: given(&LOG)
-                .map(read_log)
+            log: given(&log::LOG)
+                .map(log::read_level)
                 .transpose()?
                 .unwrap_or(LevelFilter::INFO),
-            log_format: given(&LOG_FORMAT)
-                .map(read_log_format)
+            log_format: given(&log::LOG_FORMAT)
+                .map(log::read_format)
                 .transpose()?
                 .unwrap_or_default(),
             token,
