@@ -83,7 +83,7 @@ fn a_step_that_no_arm_has_come_to_is_refused_with_the_message() {
             unreachable!()
         };
         *step += more;
-        // There is time enough for them.
+        // Its time has room for any number.
         entries[last].log_time = 1 << 60;
         entries
     };
