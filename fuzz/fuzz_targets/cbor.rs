@@ -170,9 +170,9 @@ fn is_decoded(found: &Json, all: &Definition, fields: &[Field], msg: Option<&Val
         let Json::Array(found) = found else {
             panic!("{found:?} of {value:?}");
         };
-        assert_eq!(found.len(), entries.len());
-        for (found, value) in found.iter().zip(entries) {
-            is_single(found, all, &field.kind, Some(value));
+        assert_eq!(found.len(), field.length.unwrap_or(entries.len()));
+        for (at, found) in found.iter().enumerate() {
+            is_single(found, all, &field.kind, entries.get(at));
         }
     }
 }
@@ -193,8 +193,10 @@ fn is_single(found: &Json, all: &Definition, kind: &str, value: Option<&Value>) 
                 .map(str::to_owned),
         ),
         "byte" | "char" | "uint8" => number(unsigned(255).to_string()),
+        "uint16" => number(unsigned(u16::MAX.into()).to_string()),
         "uint32" => number(unsigned(u32::MAX.into()).to_string()),
         "uint64" => number(unsigned(u64::MAX).to_string()),
+        "int8" => number(i8::try_from(signed).unwrap_or_default().to_string()),
         "int32" => number(i32::try_from(signed).unwrap_or_default().to_string()),
         "int64" => number(signed.to_string()),
         "float64" | "float32" => {

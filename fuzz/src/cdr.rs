@@ -19,8 +19,10 @@ pub struct Definition {
 pub struct Field {
     /// Its type, without brackets.
     pub kind: String,
-    /// Whether there are any number of them.
+    /// Whether it is an array.
     pub is_many: bool,
+    /// The length of an array that has always the same.
+    pub length: Option<usize>,
     /// Its name.
     pub name: String,
 }
@@ -74,10 +76,15 @@ fn fields_of(text: &str) -> Vec<Field> {
     let words = lines.filter_map(|line| line.trim().split_once(' '));
     // A constant has its value behind its name.
     let fields = words.filter(|(_, name)| !name.contains('='));
-    let field = |(kind, name): (&str, &str)| Field {
-        kind: kind.strip_suffix("[]").unwrap_or(kind).to_owned(),
-        is_many: kind.ends_with("[]"),
-        name: name.trim().to_owned(),
+    let field = |(kind, name): (&str, &str)| {
+        let (single, length) = kind.split_once('[').unwrap_or((kind, ""));
+        Field {
+            kind: single.to_owned(),
+            is_many: kind.ends_with(']'),
+            // Where it is bounded, or not at all, this is no number.
+            length: length.trim_end_matches(']').parse().ok(),
+            name: name.trim().to_owned(),
+        }
     };
     fields.map(field).collect()
 }
@@ -92,7 +99,10 @@ impl Reading<'_> {
         let mut members = Vec::new();
         for field in fields {
             let value = if field.is_many {
-                let count = u32::from_le_bytes(self.primitive()?);
+                let count = match field.length {
+                    Some(length) => length,
+                    None => usize::try_from(u32::from_le_bytes(self.primitive()?)).ok()?,
+                };
                 let entries: Option<_> =
                     (0..count).map(|_| self.single(all, &field.kind)).collect();
                 Json::Array(entries?)
@@ -121,6 +131,8 @@ impl Reading<'_> {
             "byte" | "uint8" | "char" => {
                 Json::Number(u8::from_le_bytes(self.primitive()?).to_string())
             }
+            "int8" => Json::Number(i8::from_le_bytes(self.primitive()?).to_string()),
+            "uint16" => Json::Number(u16::from_le_bytes(self.primitive()?).to_string()),
             "int32" => Json::Number(i32::from_le_bytes(self.primitive()?).to_string()),
             "uint32" => Json::Number(u32::from_le_bytes(self.primitive()?).to_string()),
             "int64" => Json::Number(i64::from_le_bytes(self.primitive()?).to_string()),
