@@ -19,6 +19,8 @@ impl Probe {
             "/arm_sim/set_params",
             json!({"gravity": 0, "masses": all(1e6)}),
         );
+        // It has been falling until now.
+        client.ask("/arm_sim/reset", json!({}));
         client.ask(
             "/pid_controller/set_gains",
             json!({"kp": all(1.0), "ki": all(0.0), "kd": all(1e-3)}),

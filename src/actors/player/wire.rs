@@ -18,7 +18,7 @@ use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::op::follow::seconds;
 
-/// Longest time that can be asked for [s]: a record of ten thousand years ends earlier.
+/// Longest time that can be asked for \[s\]: a record of ten thousand years ends earlier.
 const MAX_TIME: f64 = 1e11;
 
 impl<const N: usize> Player<N> {
