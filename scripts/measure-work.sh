@@ -69,9 +69,10 @@ put allocations-per-subscriber "$(awk '/^200 bytes/ { print $3 }' "$scratch/allo
 seconds=4
 serve() { # name, frames to send first, subscribers, their topic
     local name=$1 first=$2 clients=$3 topic=${4:-/joint_states} counts="$scratch/counts" client pids=()
+    rm -f "$scratch/address"
     valgrind --tool=callgrind --callgrind-out-file="$counts" "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
     server=$!
-    for _ in $(seq 600); do grep -q listening "$scratch/address" && break || sleep 0.1; done
+    for _ in $(seq 600); do grep -qs listening "$scratch/address" && break || sleep 0.1; done
     local port
     port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$scratch/address")
     exec 3<>"/dev/tcp/127.0.0.1/$port"
@@ -86,11 +87,19 @@ serve() { # name, frames to send first, subscribers, their topic
     callgrind_control --dump "$server" >/dev/null 2>&1
     sleep 0.5
     local total
-    total=$(cat "$counts".1 2>/dev/null | awk '/^(summary|totals):/ { print $2; exit }')
-    kill "$server"; wait "$server" 2>/dev/null || true
+    total=$(awk '/^(summary|totals):/ { print $2; exit }' "$counts".1 2>/dev/null || true)
+    local survived=yes
+    kill "$server" 2>/dev/null || survived=
+    wait "$server" 2>/dev/null || true
     server=
     exec 3>&-
     for client in "${pids[@]}"; do kill "$client" 2>/dev/null || true; wait "$client" 2>/dev/null || true; done
+    if [ -z "$survived" ]; then
+        # Valgrind 3.19 cannot run what asks a thread's clock, as the error estimate does: that count stays unmeasured.
+        echo "measure-work: $name: the program does not survive Valgrind here" >&2
+        rm -f "$counts"*
+        return
+    fi
     put "$name-encoded" "$(awk "BEGIN { print $(calls_of 'messages::publish$' "$counts".1) / $seconds }")" "messages per second"
     put "$name-json" "$(awk "BEGIN { printf \"%.0f\", $(of_functions 'serde_json|zmij|messages::publish' "$counts".1) / $seconds }")" "instructions per second"
     rm -f "$counts"*
@@ -109,9 +118,10 @@ fi
 
 # Timers: how often the gateway's thread, where goals and trials live, goes to sleep and is woken. Nothing else happens there.
 wakes() { # name, frames to send first
+    rm -f "$scratch/address"
     "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
     server=$!
-    for _ in $(seq 600); do grep -q listening "$scratch/address" && break || sleep 0.1; done
+    for _ in $(seq 600); do grep -qs listening "$scratch/address" && break || sleep 0.1; done
     local port before after
     port=$(sed -n 's/^listening on .*:\([0-9]*\)$/\1/p' "$scratch/address")
     exec 3<>"/dev/tcp/127.0.0.1/$port"
