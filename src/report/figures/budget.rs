@@ -6,7 +6,7 @@ use super::slope::slope;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::budget::{Budget, Parts};
-use crate::report::experiments::error::OUTPUTS;
+use crate::report::experiments::error::{OUTPUTS, REACH};
 use crate::report::making::Making;
 use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
 use crate::report::svg::{
@@ -231,7 +231,8 @@ fn findings(panels: &[Panel]) -> Vec<String> {
     if let (Some(euler), Some(rk4)) = (euler.and_then(near), rk4.and_then(near)) {
         let part = euler.total / rk4.total;
         findings.push(format!(
-            "**All told, hold and truncation, Euler is off by {} rad at {} on this move and RK4 by {} rad**: {}.",
+            "**All told, hold and truncation, Euler is off by {} rad at {} on {REACH} and RK4 by \
+             {} rad**: {}.",
             scientific(euler.total),
             seconds(rk4.timestep),
             scientific(rk4.total),
@@ -244,8 +245,8 @@ fn findings(panels: &[Panel]) -> Vec<String> {
     }
     if let Some(parts) = rk4.and_then(near) {
         findings.push(format!(
-            "**At a control period of {} holding the effort costs {} rad, RK4's truncation {} and rounding {}**: a \
-             better method cannot make good what the control period loses.",
+            "**On {REACH}, at a control period of {}, holding the effort costs {} rad, RK4's \
+             truncation {} and rounding {}**: a better method cannot make good what the control period loses.",
             seconds(parts.timestep),
             scientific(parts.hold),
             scientific(parts.truncation),

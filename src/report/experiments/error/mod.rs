@@ -75,6 +75,9 @@ pub const REACH_GAINS: Gains<2> = Gains {
     kd: [30.0, 12.0],
 };
 
+/// The reach in words.
+pub const REACH: &str = "a reach of 2 links to (0.8, -0.6) with kp 200, 100 and kd 30, 12";
+
 /// Target of the reach, from the starting pose.
 pub const REACH_SETPOINT: Setpoint<2> = Setpoint {
     position: [0.8, -0.6],

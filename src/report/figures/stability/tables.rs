@@ -57,8 +57,9 @@ pub(super) fn edges(lines: &[LimitRow]) -> Table {
     let mut table = Table::new(
         "edges",
         "At a glance: where it goes unstable, and why",
-        "Largest stable timestep with the default gains. Held for the step, the limit belongs to the control period: \
-         the effort answers a state that is up to a step old. In every stage it belongs to the method.",
+        "Largest stable timestep with the default gains at (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5): elsewhere it \
+         is another. Held for the step, the limit belongs to the control period: the effort answers a state that is \
+         up to a step old. In every stage it belongs to the method.",
         &[
             "Arm", "Control", "euler", "midpoint", "verlet", "rk4", "Why",
         ],
