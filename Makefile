@@ -92,11 +92,11 @@ doc: ## Build the documentation; any warning fails
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps --document-private-items
 
-report: build ## Measure error against run time and stability: report/index.html; ARGS="--quick" or "--only error"; KEEP=1 keeps figures
+report: build ## Measure error against run time and stability: report/index.html; ARGS="--quick" or "--only error"; KEEP=1 keeps it
 	@echo "make report: report/index.html"
 	@case "$(ARGS)" in *--quick*|*--only*) ;; *) bash scripts/measure-work.sh report ;; esac
 	"$(TARGET_DIR)/release/pendularm" report --out report $(ARGS)
-	@[ -z "$(KEEP)" ] || python3 scripts/keep-figures.py report
+	@[ -z "$(KEEP)" ] || python3 scripts/keep-report.py report
 
 picture: build ## Take the README's picture of the page: docs/page.png; needs chromium
 	@echo "make picture: docs/page.png"
