@@ -15,9 +15,9 @@ use zenoh::Session;
 
 use super::gateway::Gateway;
 use super::goals::{Goal, GoalId, Goals, Stamp};
-use super::graph::Seats;
 use super::inlet::{Inlet, Request};
 use super::outlet::Outlet;
+use super::seats::Seats;
 use super::{Cancel, GoalEvent, GoalNews, Leave, MAILBOX, Pursue};
 use crate::convention::EndpointKind;
 use crate::convention::hash::type_hash;

@@ -59,7 +59,8 @@ impl Gateway {
             self.link,
             self.address.clone(),
             self.token.clone(),
-            ctx.address(),
+            ctx.address().recipient(),
+            ctx.address().recipient(),
         );
         let opened = opening
             .into_actor(self)

@@ -18,11 +18,12 @@ use zenoh::{Config, Session, Wait};
 use super::action::ActionBridge;
 use super::gateway::Gateway;
 use super::publisher::Publisher;
+use super::seats::{Seats, graph_node};
 use super::service::ServiceBridge;
 use super::subscription::Subscription;
 use super::{ArmNews, Leave};
 use crate::convention::hash::type_hash;
-use crate::convention::{EndpointKind, GraphNode, Named, Place, Seat};
+use crate::convention::{EndpointKind, Place};
 use crate::interfaces::{ActionInterface, ServiceInterface};
 use crate::options::Options;
 use crate::report::{self, Repeated};
@@ -243,52 +244,6 @@ impl Handler<RouterNews> for Graph {
         } else {
             report::say(&format!("the router at {router} has gone; looking for it"));
         }
-    }
-}
-
-/// Hands out places in the graph, each under a number of its own.
-pub(super) struct Seats {
-    place: Place,
-    last: usize,
-}
-
-impl Seats {
-    /// The next place, for a topic.
-    pub(super) fn next(
-        &mut self,
-        owner: Node,
-        kind: EndpointKind,
-        name: &str,
-        type_name: &str,
-        hash: &str,
-    ) -> Seat {
-        self.last += 1;
-        let of = Named {
-            name,
-            type_name,
-            hash,
-        };
-        self.place.seat(graph_node(owner), self.last, kind, of)
-    }
-
-    /// The next place, for a service.
-    pub(super) fn service(
-        &mut self,
-        owner: Node,
-        name: &str,
-        interface: &ServiceInterface,
-    ) -> Seat {
-        let kind = EndpointKind::Service;
-        self.next(owner, kind, name, interface.name, &interface.hash)
-    }
-}
-
-/// A node as the graph has it.
-fn graph_node(node: Node) -> GraphNode {
-    let id = Node::ALL.iter().position(|one| *one == node);
-    GraphNode {
-        id: id.unwrap_or_default(),
-        name: node.name(),
     }
 }
 

@@ -12,7 +12,6 @@ use tokio::net::tcp::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::sync::mpsc;
 use tokio::time::timeout;
 
-use super::gateway::Gateway;
 use crate::report;
 
 /// Time to connect and to be let in.
@@ -26,7 +25,7 @@ const QUEUE: usize = 1024;
 /// The id of the first call, whose answer says that the arm lets us in.
 const GREETING: &str = "pendularm-ros2";
 
-/// A frame that came. Addressed to the gateway.
+/// A frame that came.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub(super) struct Came {
@@ -36,7 +35,7 @@ pub(super) struct Came {
     pub(super) frame: Value,
 }
 
-/// A connection has ended. Addressed to the gateway.
+/// A connection has ended.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub(super) struct Ended {
@@ -46,12 +45,14 @@ pub(super) struct Ended {
     pub(super) why: String,
 }
 
-/// Connects, is let in, and from then on hands every frame to the gateway. What is sent into the channel is written.
+/// Connects, is let in, and from then on hands every frame to `came`, and the end to `ended`. What is sent into the
+/// channel is written.
 pub(super) async fn open(
     link: u64,
     address: String,
     token: Option<String>,
-    to: Addr<Gateway>,
+    came: Recipient<Came>,
+    ended: Recipient<Ended>,
 ) -> Result<mpsc::Sender<String>, String> {
     let connecting = async {
         let stream = TcpStream::connect(&address).await;
@@ -70,8 +71,8 @@ pub(super) async fn open(
     let (sender, receiver) = mpsc::channel(QUEUE);
     actix_rt::spawn(write(writer, receiver));
     actix_rt::spawn(async move {
-        let why = read(link, reader, &to).await;
-        to.do_send(Ended { link, why });
+        let why = read(link, reader, &came).await;
+        ended.do_send(Ended { link, why });
     });
     Ok(sender)
 }
@@ -105,14 +106,14 @@ async fn greet(
 }
 
 /// Hands over one frame after the other, and says why there are no more.
-async fn read(link: u64, mut reader: BufReader<OwnedReadHalf>, to: &Addr<Gateway>) -> String {
+async fn read(link: u64, mut reader: BufReader<OwnedReadHalf>, came: &Recipient<Came>) -> String {
     loop {
         let frame = match timeout(SILENCE, next(&mut reader)).await {
             Ok(Ok(frame)) => frame,
             Ok(Err(why)) => return why,
             Err(_) => return "it has fallen silent".to_owned(),
         };
-        if to.send(Came { link, frame }).await.is_err() {
+        if came.send(Came { link, frame }).await.is_err() {
             return "the gateway is busy".to_owned();
         }
     }

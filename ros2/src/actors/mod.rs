@@ -20,6 +20,7 @@ mod inlet;
 mod link;
 mod outlet;
 pub mod publisher;
+mod seats;
 pub mod service;
 pub mod subscription;
 
