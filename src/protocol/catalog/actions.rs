@@ -55,10 +55,11 @@ table! {
                 required("desired", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("actual", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("error", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
-                required("multi_dof_joint_names", "string[]", ""),
-                required("multi_dof_desired", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
-                required("multi_dof_actual", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
-                required("multi_dof_error", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
+                // Of ROS 2's definition. In JSON they are absent: compas_fab fails at a field that it does not know.
+                optional("multi_dof_joint_names", "string[]", ""),
+                optional("multi_dof_desired", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
+                optional("multi_dof_actual", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
+                optional("multi_dof_error", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
             ]),
         },
     }

@@ -45,9 +45,6 @@ pub(super) fn feedback<const N: usize>(
             .map(|(wanted, is)| wanted - is)
             .collect()
     };
-    // There are no joints with several degrees of freedom.
-    let nothing =
-        json!({"transforms": [], "velocities": [], "accelerations": [], "time_from_start": stamp});
     json!({
         "header": Header::world(now),
         "joint_names": joint_names::<N>().as_slice(),
@@ -57,9 +54,5 @@ pub(super) fn feedback<const N: usize>(
             &off(&desired.position, &actual.position),
             &off(&desired.velocity, &actual.velocity),
         ),
-        "multi_dof_joint_names": [],
-        "multi_dof_desired": nothing,
-        "multi_dof_actual": nothing,
-        "multi_dof_error": nothing,
     })
 }
