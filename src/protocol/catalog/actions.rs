@@ -55,7 +55,7 @@ table! {
                 required("desired", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("actual", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("error", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
-                // Of ROS 2's definition. In JSON they are absent: compas_fab fails at a field that it does not know.
+                // ROS 2's definition has these too. In JSON they are absent: compas_fab fails at unknown fields.
                 optional("multi_dof_joint_names", "string[]", ""),
                 optional("multi_dof_desired", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
                 optional("multi_dof_actual", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
