@@ -133,9 +133,10 @@ bench-load: ## Measure many clients' messages beside redis and mosquitto; ARGS=-
 	@echo "make bench-load: some minutes; installs redis-server and mosquitto from Debian as root if they are missing"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/load/run.sh
 
-bench-peers: ## Measure beside Pinocchio and MuJoCo, installed from PyPI into benches/peers/.venv; KEEP=1 as above
-	@echo "make bench-peers: downloads about 100 MB once, compiles, then some minutes"
+bench-peers: ## Measure beside Pinocchio, MuJoCo, scipy, heyoka and ode_solvers, installed into benches/peers/.venv; KEEP=1 as above
+	@echo "make bench-peers: downloads about 300 MB once, compiles, then some ten minutes"
 	@KEEP="$(KEEP)" bash benches/peers/run.sh
+	@KEEP="$(KEEP)" bash benches/equal_error/run.sh
 
 attack: ## Attack the program in a hundred ways and measure what a healthy client has of it; ARGS="--only=pings", --list or --quick
 	@echo "make attack: some ten minutes; installs redis-server and mosquitto as bench-load does, and attacks them too"

@@ -34,7 +34,7 @@ put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
 
 count=20000
 for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd,pi,pid,pushed,weightless-pd} \
-    step-3-rk4-{free,weightless,pd,pid} particle-rk4-{constant,cosine}; do
+    step-3-rk4-{free,weightless,pd,pid} estimate-{2,3}-rk4 particle-rk4-{constant,cosine}; do
     once=$(instructions "$target/release/work" "$variant" $count)
     twice=$(instructions "$target/release/work" "$variant" $((2 * count)))
     put "$variant" "$(awk "BEGIN { print ($twice - $once) / $count }")" "instructions per step"
@@ -67,8 +67,8 @@ put allocations-per-subscriber "$(awk '/^200 bytes/ { print $3 }' "$scratch/allo
 
 # The server under callgrind for some seconds of real time: simulated steps keep pace with the clock, so counts are per second.
 seconds=4
-serve() { # name, frames to send first, subscribers, their topic
-    local name=$1 first=$2 clients=$3 topic=${4:-/joint_states} counts="$scratch/counts" client pids=()
+serve() { # name, frames to send first, subscribers of /joint_states
+    local name=$1 first=$2 clients=$3 topic=/joint_states counts="$scratch/counts" client pids=()
     rm -f "$scratch/address"
     valgrind --tool=callgrind --callgrind-out-file="$counts" "$program" --bind 127.0.0.1:0 --log off >"$scratch/address" 2>"$scratch/log" &
     server=$!
@@ -95,7 +95,7 @@ serve() { # name, frames to send first, subscribers, their topic
     exec 3>&-
     for client in "${pids[@]}"; do kill "$client" 2>/dev/null || true; wait "$client" 2>/dev/null || true; done
     if [ -z "$survived" ]; then
-        # Valgrind 3.19 cannot run what asks a thread's clock, as the error estimate does: that count stays unmeasured.
+        # Valgrind 3.19 cannot run what asks a thread's clock, as a server at heavy work does: that count stays unmeasured.
         echo "measure-work: $name: the program does not survive Valgrind here" >&2
         rm -f "$counts"*
         return
@@ -111,9 +111,6 @@ if command -v callgrind_control >/dev/null; then
 ' 0
     serve server-1-subscriber "" 1
     serve server-11-subscribers "" 11
-    if grep -rqF '"/arm_sim/error_estimate"' "$root/src/protocol"; then
-        serve server-error-estimate "" 1 /arm_sim/error_estimate
-    fi
 fi
 
 # Timers: how often the gateway's thread, where goals and trials live, goes to sleep and is woken. Nothing else happens there.

@@ -30,6 +30,7 @@ pub mod planner;
 mod poses;
 mod proof;
 pub mod rollout;
+mod slow_modes;
 pub mod stability;
 mod symmetric;
 mod track;

@@ -27,6 +27,7 @@ pub use super::critical::{BEYOND, Critical};
 pub use super::limits::{ADVISED_PART, LimitSearch, Limits, Rest, limit_held, limits};
 use super::linear::Linear;
 use super::matrix::{Complex, Matrix, largest};
+use super::slow_modes;
 use crate::math::integrator::Method;
 
 /// Growth, relative to the fastest eigenvalue, that rounding can feign: eigenvalues of graded 9×9 matrices are good to
@@ -120,13 +121,17 @@ pub(super) struct Modes {
     eigenvalues: Vec<Complex>,
     /// The fastest rate \[1/s\].
     rate: f64,
+    /// Whether a mode grows so slowly that its eigenvalue does not show it.
+    slow_growth: bool,
 }
 
 impl Modes {
     pub(super) fn of(linear: &Linear) -> Self {
         let eigenvalues = linear.flow().eigenvalues();
+        let rate = largest(eigenvalues.iter().map(|mode| mode.modulus()));
         Self {
-            rate: largest(eigenvalues.iter().map(|mode| mode.modulus())),
+            slow_growth: slow_modes::grows(linear, &eigenvalues, rate, NEUTRAL * rate),
+            rate,
             eigenvalues,
         }
     }
@@ -140,10 +145,11 @@ impl Modes {
     /// decides on which side it is (a double zero is good to the root of the rounding error).
     pub(super) fn run_away(&self) -> bool {
         let noise = 0.1 * NEUTRAL * self.rate;
-        self.eigenvalues.iter().any(|mode| {
+        let grows = |mode: &Complex| {
             let drifts = mode.modulus() < 1e-6 * self.rate;
             mode.re > if drifts { -noise } else { noise } || mode.re.is_nan()
-        })
+        };
+        self.slow_growth || self.eigenvalues.iter().any(grows)
     }
 }
 
@@ -287,6 +293,10 @@ impl<'a> Stepping<'a> {
         let rate = modes.rate;
         if rate == 0.0 {
             return None;
+        }
+        // At timesteps that the fast modes bear, a step is as good as an instant to the slow ones.
+        if modes.slow_growth && !self.delayed {
+            return Some(0.0);
         }
         let start = SEARCH_START / rate;
         if !self.is_stable(start) {

@@ -7,6 +7,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::simulation::step_under;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::forcing::{COARSEST, DURATION, FORCES};
+use pendularm::report::experiments::moving::{LookedAt, MovingScene, distance_behind};
 use pendularm::report::experiments::nonlinear::{
     PeriodicSwing, arrives, is_carried, move_of, spun,
 };
@@ -70,6 +71,35 @@ fn forces_leave_a_method_the_order_that_theory_says() {
             );
         }
     }
+}
+
+/// Halving the timestep divides the error by two to the order, and holding anything leaves the first.
+#[test]
+fn a_setpoint_that_moves_and_is_held_for_the_step_leaves_order_one() {
+    let scene = MovingScene::new();
+    assert!(scene.uncertainty() < 1e-22, "{:e}", scene.uncertainty());
+    for behind in LookedAt::ALL {
+        for method in Method::ALL {
+            let error = |steps| scene.error(behind, method, steps);
+            let seen = (error(1 << 11) / error(1 << 12)).log2();
+            let expected = f64::from(behind.order(method));
+            assert!(
+                (seen - expected).abs() < 0.15,
+                "{} {method}: {seen} for {expected}",
+                behind.name()
+            );
+        }
+    }
+}
+
+/// Without velocities damping holds the arm back; the more seldom the setpoint moves, the further behind the arm is.
+#[test]
+fn velocities_keep_an_arm_near_a_setpoint_that_moves() {
+    for every in [1, 17, 100] {
+        let (with, without) = (distance_behind(every, true), distance_behind(every, false));
+        assert!(1.5 * with < without, "every {every}: {with}, {without}");
+    }
+    assert!(distance_behind(100, true) > 2.0 * distance_behind(1, true));
 }
 
 /// Orders where nothing is stiff, and an error that hardly knows how stiff it is.

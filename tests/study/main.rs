@@ -28,6 +28,7 @@ mod poses;
 mod properties;
 mod reference;
 mod report;
+mod review;
 mod rollout;
 mod scenarios;
 mod stability;

@@ -52,6 +52,66 @@ fn nothing_asks_for_the_present_values_whether_the_controller_is_on_or_off() {
     }
 }
 
+/// Answers that an independent check found wrong, asked of the program itself with the check's own numbers.
+#[test]
+fn the_answers_that_were_wrong_are_right() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    // A limit belongs to its pose: a fresh arm is stretched, where the limit is the smallest of all.
+    let limit = |values: &Value, name: &str| values[name].as_f64().unwrap();
+    let fresh = client.ask("/study/stability", json!({}));
+    assert!(
+        (limit(&fresh, "timestep_limit_held") - 4.32e-3).abs() < 5e-6,
+        "{fresh}"
+    );
+    let bent = client.ask("/study/stability", json!({"setpoint": [0.5, 0.8]}));
+    assert!(
+        (limit(&bent, "timestep_limit_held") - 8.21e-3).abs() < 5e-6,
+        "{bent}"
+    );
+    assert!(
+        (limit(&bent, "minimum_over_poses_held") - 4.32e-3).abs() < 5e-6,
+        "{bent}"
+    );
+    // 223 ms were advised to the arm left to itself, which was lost after 11 s at 83 ms.
+    let none = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.ask("/arm_sim/reset", json!({}));
+    let free = client.ask(
+        "/study/stability",
+        json!({"gains": none, "integrator": "verlet"}),
+    );
+    assert!(
+        (0.02..0.083).contains(&limit(&free, "advised_timestep")),
+        "{free}"
+    );
+    // An error of 1.34e-12 was answered, where 4.41e-12 was true: it is not known.
+    let tiny = json!({"q0": [0.4, -0.3], "duration": 5, "integrator": "rk4", "timestep": 1e-4, "reference": true, "samples": 101});
+    let run = client.ask("/study/rollout", tiny);
+    assert!(
+        run["error"].is_null() && limit(&run, "error_uncertainty") > 0.0,
+        "{}",
+        run["error"]
+    );
+    // "Unstable at every timestep", with a warning, where the arm sags and rests.
+    let gains = json!({"kp": [8, 2.6667], "ki": [0, 0], "kd": [2.6667, 1]});
+    let setpoint = json!([1.694_544_183_420_622_3, -2.503_024_457_368_377_8]);
+    client.ask("/pid_controller/set_gains", gains);
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.send(&json!({"op": "publish", "topic": "/joint_trajectory",
+        "msg": {"points": [{"positions": setpoint}]}}));
+    let sagging = client.ask("/study/stability", json!({}));
+    assert_eq!(sagging["equilibrium_kind"], "sagging");
+    let held = limit(&sagging, "timestep_limit_held");
+    assert!((held - 0.456).abs() < 5e-4, "{sagging}");
+    client.subscribe("/diagnostics");
+    let status = status_with_limit(&mut client, held);
+    assert_eq!(
+        (&status["level"], text(&status, "warning")),
+        (&json!(0), "")
+    );
+}
+
 #[test]
 fn the_predictions_are_those_of_the_library() {
     let runtime = Runtime::with_links(3);

@@ -13,6 +13,7 @@
 //! | [`chaos`] | how far a chaotic swing can be followed, and what becomes of its energy |
 //! | [`rounding`] | energy over very many steps, with the rounding of sums carried and without |
 //! | [`forcing`] | orders under forces that are hard on a method |
+//! | [`moving`] | what it costs to hold a moving setpoint between two control steps |
 //! | [`stiff`] | the cost of an error by stiffness, beside implicit baselines |
 //! | [`nonlinear`] | which moves and swings a timestep carries, and what becomes of deviations from a periodic swing |
 //!
@@ -28,6 +29,7 @@ pub mod error;
 pub mod forcing;
 pub mod growth;
 pub mod measure;
+pub mod moving;
 pub mod nonlinear;
 pub mod reference;
 pub mod rounding;

@@ -1,8 +1,9 @@
-//! Orders under forces that are hard on a method.
+//! Orders under forces that are hard on a method, and behind setpoints that move.
 //!
 //! **Invariant:** an order is fitted where truncation is all there is, and not where nothing is to be seen but
 //! rounding.
 
+use super::moving;
 use super::slope::slope;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -73,7 +74,7 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
     making.keep("forcing", csv);
     let judged: Vec<bool> = lines.iter().filter_map(Convergence::as_expected).collect();
     let held = judged.iter().filter(|holds| **holds).count();
-    Section {
+    let mut section = Section {
         findings: vec![finding(&lines)],
         verdicts: vec![Verdict {
             claim: format!(
@@ -84,7 +85,9 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         }],
         blocks: vec![Block::Figure(figure(&lines)), Block::Table(table(&lines))],
         ..Section::default()
-    }
+    };
+    moving::add(making, &mut section);
+    section
 }
 
 fn order_of(lines: &[Convergence], force: &str, method: Method) -> String {

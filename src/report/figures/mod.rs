@@ -9,6 +9,7 @@ mod error;
 mod floquet;
 mod forcing;
 mod horizon;
+mod moving;
 mod nonlinear;
 mod rounding;
 mod scenarios;
@@ -71,8 +72,8 @@ pub(crate) const SECTIONS: [Maker; 12] = [
     },
     Maker {
         name: "forcing",
-        title: "Forces that cost an order",
-        weight: 3.0,
+        title: "Forces and setpoints that cost an order",
+        weight: 4.0,
         timed: false,
         make: forcing::make,
     },

@@ -10,15 +10,18 @@
 
 mod double_double;
 mod lagrangian;
+mod moving;
 mod steps;
 mod taylor;
 
 pub use double_double::DoubleDouble;
+pub use moving::MovingSetpoint;
 pub use steps::exact_steps;
 
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 use lagrangian::Lagrangian;
+use moving::{Polynomial, constant};
 use taylor::{Exact, JointDrive, Setting, Taylor};
 
 /// The setting whose motion is kept.
@@ -77,8 +80,34 @@ impl<const N: usize> ReferenceMotion<N> {
     /// The motion after each of these `intervals` \[s\], one after the other.
     #[must_use]
     pub fn between(arm: &Arm<N>, start: &State<N>, law: &Law<N>, intervals: &[f64]) -> Self {
-        let fine = motion(arm, start, law, intervals, FINE);
-        let coarse = motion(arm, start, law, intervals, COARSE);
+        Self::judged(|setting| motion(arm, start, law, intervals, setting))
+    }
+
+    /// The motion from `start` under the law at every instant, behind a setpoint that moves: at multiples of `spacing`
+    /// \[s\], `count` samples, the start not among them. The setpoint must not end before.
+    #[must_use]
+    pub fn behind(
+        arm: &Arm<N>,
+        start: &State<N>,
+        gains: &Gains<N>,
+        setpoint: &MovingSetpoint<N>,
+        spacing: f64,
+        count: usize,
+    ) -> Self {
+        Self::judged(|setting| {
+            let mut taylor = Taylor::new(arm, setting);
+            let mut state = exact(start);
+            let mut drive = law_drive(gains, setpoint.polynomials());
+            let samples = (0..count).map(|_| {
+                taylor.advance(&mut state, &mut drive, spacing);
+                state
+            });
+            samples.collect()
+        })
+    }
+
+    fn judged(motion: impl Fn(Setting) -> Vec<Exact<N>>) -> Self {
+        let (fine, coarse) = (motion(FINE), motion(COARSE));
         let uncertainty = fine.iter().zip(&coarse).map(|(a, b)| {
             a.position
                 .iter()
@@ -166,20 +195,17 @@ fn motion<const N: usize>(
     setting: Setting,
 ) -> Vec<Exact<N>> {
     let mut taylor = Taylor::new(arm, setting);
-    let mut state = Exact {
-        position: start.position.map(DoubleDouble::from),
-        velocity: start.velocity.map(DoubleDouble::from),
-        integral: [DoubleDouble::ZERO; N],
-    };
+    let mut state = exact(start);
     let mut samples = Vec::with_capacity(intervals.len());
     for &interval in intervals {
         match law {
             Law::Constant(effort) => {
-                let drive = JointDrive::Constant(effort.map(DoubleDouble::from));
-                taylor.advance(&mut state, &drive, interval);
+                let mut drive = JointDrive::Constant(effort.map(DoubleDouble::from));
+                taylor.advance(&mut state, &mut drive, interval);
             }
             Law::Continuous(gains, setpoint) => {
-                taylor.advance(&mut state, &continuous(gains, setpoint), interval);
+                let setpoint = (constant(&setpoint.position), constant(&setpoint.velocity));
+                taylor.advance(&mut state, &mut law_drive(gains, setpoint), interval);
             }
             Law::Held {
                 gains,
@@ -188,7 +214,7 @@ fn motion<const N: usize>(
             } => {
                 for _ in 0..whole_periods(interval, *period) {
                     let effort = held(gains, setpoint, &mut state, *period);
-                    taylor.advance(&mut state, &JointDrive::Constant(effort), *period);
+                    taylor.advance(&mut state, &mut JointDrive::Constant(effort), *period);
                 }
             }
         }
@@ -206,13 +232,25 @@ fn whole_periods(interval: f64, period: f64) -> u64 {
     ((interval / period).round() as u64).max(1)
 }
 
-fn continuous<const N: usize>(gains: &Gains<N>, setpoint: &Setpoint<N>) -> JointDrive<N> {
+fn exact<const N: usize>(start: &State<N>) -> Exact<N> {
+    Exact {
+        position: start.position.map(DoubleDouble::from),
+        velocity: start.velocity.map(DoubleDouble::from),
+        integral: [DoubleDouble::ZERO; N],
+    }
+}
+
+/// The law at every instant, behind these positions and velocities.
+fn law_drive<const N: usize>(
+    gains: &Gains<N>,
+    (position, velocity): (Polynomial<N>, Polynomial<N>),
+) -> JointDrive<N> {
     JointDrive::Law {
         kp: gains.kp.map(DoubleDouble::from),
         ki: gains.ki.map(DoubleDouble::from),
         kd: gains.kd.map(DoubleDouble::from),
-        position: setpoint.position.map(DoubleDouble::from),
-        velocity: setpoint.velocity.map(DoubleDouble::from),
+        position,
+        velocity,
     }
 }
 

@@ -17,6 +17,7 @@
 
 use super::double_double::DoubleDouble as Real;
 use super::lagrangian::{Factors, Lagrangian, differences, link_efforts, sums};
+use super::moving::{Polynomial, shift};
 use crate::math::arm::Arm;
 use crate::math::count::length_in_f64;
 
@@ -42,13 +43,13 @@ pub(super) struct Exact<const N: usize> {
 pub(super) enum JointDrive<const N: usize> {
     /// Efforts that do not change \[N m\].
     Constant([Real; N]),
-    /// `kp (q* - q) + ki ∫(q* - q) + kd (q̇* - q̇)` at every instant.
+    /// `kp (q* - q) + ki ∫(q* - q) + kd (q̇* - q̇)` at every instant, setpoints in the time from now on.
     Law {
         kp: [Real; N],
         ki: [Real; N],
         kd: [Real; N],
-        position: [Real; N],
-        velocity: [Real; N],
+        position: Polynomial<N>,
+        velocity: Polynomial<N>,
     },
 }
 
@@ -91,8 +92,8 @@ impl<const N: usize> Taylor<N> {
         }
     }
 
-    /// Moves `state` on by `time` \[s\], in as many steps as the tolerance asks for.
-    pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &JointDrive<N>, time: f64) {
+    /// Moves `state` and `drive` on by `time` \[s\], in as many steps as the tolerance asks for.
+    pub(super) fn advance(&mut self, state: &mut Exact<N>, drive: &mut JointDrive<N>, time: f64) {
         let mut rest = Real::from(time);
         while rest.to_f64() > 0.0 {
             self.expand(state, drive);
@@ -104,6 +105,13 @@ impl<const N: usize> Taylor<N> {
                 velocity: differences(&evaluate(&self.rate, self.setting.order, step)),
                 integral: evaluate(&self.integral, self.setting.order, step),
             };
+            if let JointDrive::Law {
+                position, velocity, ..
+            } = drive
+            {
+                shift(position, step);
+                shift(velocity, step);
+            }
             if last {
                 break;
             }
@@ -211,7 +219,7 @@ impl<const N: usize> Taylor<N> {
                 let error = self.error(drive, k);
                 let rate = differences(&self.rate[k]);
                 std::array::from_fn(|i| {
-                    let wanted = if k == 0 { velocity[i] } else { Real::ZERO };
+                    let wanted = velocity.get(k).map_or(Real::ZERO, |wanted| wanted[i]);
                     kp[i] * error[i] + ki[i] * self.integral[k][i] + kd[i] * (wanted - rate[i])
                 })
             }
@@ -225,7 +233,7 @@ impl<const N: usize> Taylor<N> {
         };
         let angle = differences(&self.angle[k]);
         std::array::from_fn(|i| {
-            let wanted = if k == 0 { position[i] } else { Real::ZERO };
+            let wanted = position.get(k).map_or(Real::ZERO, |wanted| wanted[i]);
             wanted - angle[i]
         })
     }

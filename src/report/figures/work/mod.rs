@@ -202,7 +202,6 @@ fn figure(kinds: &[Kind], counts: &Counts) -> Figure {
         ("running, nobody listens", "server-running"),
         ("1 subscriber", "server-1-subscriber"),
         ("11 subscribers", "server-11-subscribers"),
-        ("error estimate", "server-error-estimate"),
     ];
     let panels = [
         Bars {

@@ -1,0 +1,50 @@
+/* What the programs of this folder share: the swing, the sweep over timesteps, the lines that they print.
+ *
+ * Valid C11 and C++17. `src/main.rs` has the same for Rust. Lines are links,system,setting,error,seconds. */
+#ifndef SWEEP_H
+#define SWEEP_H
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+enum { LINKS_MAX = 3 };
+
+static const double DURATION = 4.0;                        /* s */
+static const double GRAVITY = 9.81;                        /* m/s^2, along -y; lengths 1 m, masses 1 kg */
+static const double START_POSITION = 0.3, START_RATE = 0.2; /* of every joint; rad, rad/s */
+static const double REPEATED = 0.02;                       /* s; for how long a run is repeated */
+static const double LONGEST = 0.3;                         /* s; a run that takes longer ends a sweep */
+
+static double now(void)
+{
+    struct timespec time;
+    clock_gettime(CLOCK_MONOTONIC, &time);
+    return (double)time.tv_sec + 1e-9 * (double)time.tv_nsec;
+}
+
+/* Runs `run(context, steps, end)` with ever more steps, each time root two times as many. `truth` has the angles at the end. */
+static void sweep(const char *system, int links, char **truth, void (*run)(void *, long, double *), void *context)
+{
+    for (int half = 10; half < 46; half++) {
+        const long steps = lround(pow(2.0, 0.5 * half));
+        double end[LINKS_MAX], shortest = INFINITY, error = 0.0;
+        const double begun = now();
+        while (isinf(shortest) || now() - begun < REPEATED) {
+            const double start = now();
+            run(context, steps, end);
+            shortest = fmin(shortest, now() - start);
+        }
+        for (int i = 0; i < links; i++) {
+            const double off = fabs(end[i] - atof(truth[i]));
+            error = off <= error ? error : off; /* not a number stays */
+        }
+        printf("%d,%s,%.17g,%.17g,%.17g\n", links, system, DURATION / (double)steps, error, shortest);
+        if (shortest > LONGEST)
+            return;
+    }
+}
+
+#endif
