@@ -4,7 +4,7 @@ equal_error.py FOLDER RUST MUJOCO PINOCCHIO
 
 The programs are those of this folder, compiled (`run.sh` does it); scipy and heyoka run here. All swing the same arm for 4 s, free,
 from 0.3 rad and 0.2 rad/s at every joint, and are judged by the largest angle at the end, against a motion of twice a double's digits.
-Every setting (timestep or tolerance) is run for a fiftieth of a second, shortest run counts, and everything in turn PASSES times. A
+Every setting (timestep or tolerance) is run for a fiftieth of a second and three times at least, the shortest run counts, and everything in turn PASSES times. A
 time to an error is that of the cheapest setting from which on all finer ones keep it, so that no lucky crossing counts.
 
 scipy is handed accelerations compiled by numba; heyoka compiles its own, before the clock starts. Ends with status 1 if anybody who
@@ -27,9 +27,9 @@ import scipy.integrate
 
 DURATION, START, GRAVITY = 4.0, (0.3, 0.2), 9.81
 TARGETS = (1e-3, 1e-6, 1e-9)
-REPEATED, LONGEST = 0.02, 0.3
+REPEATED, REPEATS, LONGEST = 0.02, 3, 1.0
 TOLERANCES = [10.0 ** (-half / 2) for half in range(4, 29)]
-# Of first and of second order: what a sweep that ends at 0.3 s a run cannot reach is no fault.
+# Of first and of second order: what a sweep that ends at a second a run cannot reach is no fault.
 LOW_ORDER = ("euler", "midpoint", "verlet", "implicitfast")
 # A reference whose own uncertainty is larger would judge nobody.
 UNCERTAINTY = 1e-20
@@ -106,8 +106,9 @@ def joints(links, y):
 
 def measured(links, system, setting, run, truth):
     """A line as the compiled programs print it; None once a run takes too long."""
-    shortest, begun = math.inf, time.perf_counter()
-    while math.isinf(shortest) or time.perf_counter() - begun < REPEATED:
+    shortest, runs, begun = math.inf, 0, time.perf_counter()
+    while runs < REPEATS or time.perf_counter() - begun < REPEATED:
+        runs += 1
         began = time.perf_counter()
         end = run()
         shortest = min(shortest, time.perf_counter() - began)

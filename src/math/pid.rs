@@ -56,11 +56,11 @@ impl Default for Gains<2> {
 
 /// Gains for the default 3-link arm: as for two links, within 3.6 s. Stable in every pose up to a timestep of 3.0 ms.
 ///
-/// Found by a search for the least ringing (`benches/src/bin/default_gains.rs`): once all joints are slower than 0.01
-/// rad/s the effort should be within 2 % of the gravity load. So it is on 94 of 100 moves, and on 78 of 100 with links of
-/// 2 kg. Where it is not, a joint is slow because it turns back, or the load is a small part of the stretched arm's. Moves
-/// within ±2π keep from diverging at 3 ms; some of 4π at every joint do not. The last joint has little damping of its own,
-/// because `kd dt` there is what limits the timestep.
+/// Found by a search for the least ringing (`benches/src/bin/default_gains.rs`): once all joints are slower than
+/// 0.01 rad/s the effort should be within 2 % of the gravity load. So it is on 94 of 100 moves, and on 78 of 100 with
+/// links of 2 kg. Where it is not, a joint is slow because it turns back, or the load is a small part of the stretched
+/// arm's. Moves within ±2π keep from diverging at 3 ms; some of 4π at every joint do not. The last joint has little
+/// damping of its own, because `kd dt` there is what limits the timestep.
 impl Default for Gains<3> {
     fn default() -> Self {
         Self {

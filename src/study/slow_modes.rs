@@ -1,7 +1,7 @@
 //! Growth of a loop's slow modes beside fast ones a trillion times their rate.
 //!
-//! Eigenvalues of a matrix are good to some 1e-16 of the largest, which at a damping rate of 1e12/s says nothing of a mode
-//! that grows by a factor e a second. The modes of a loop are also the zeros of the small matrix
+//! Eigenvalues of a matrix are good to some 1e-16 of the largest, which at a damping rate of 1e12/s says nothing of
+//! a mode that grows by a factor e a second. The modes of a loop are also the zeros of the small matrix
 //!
 //! `P(λ) = λ² I + S + M⁻¹ (Kp + λ Kd + Ki/λ)`
 //!
@@ -18,7 +18,7 @@
 )]
 
 use super::linear::Linear;
-use super::matrix::Complex;
+use super::matrix::{Complex, Matrix, largest};
 
 /// A mode is slow, and looked at here, if the fastest one is so many times faster.
 const SLOWER: f64 = 1e-4;
@@ -33,13 +33,73 @@ const ROUNDS: u32 = 30;
 /// A mode has settled if it moves by no more than this part of itself.
 const SETTLED: f64 = 1e-12;
 
-/// Whether one of the `modes` that are slow beside the fastest `rate` \[1/s\] grows, whatever rounding made of its sign.
+/// Whether a mode grows that is slow beside the fastest `rate` \[1/s\], and whose growth is less than `doubtful`
+/// \[1/s\], so that rounding may have hidden it.
 pub(super) fn grows(linear: &Linear, modes: &[Complex], rate: f64, doubtful: f64) -> bool {
+    let is_slow = |mode: &&Complex| mode.modulus() < SLOWER * rate && mode.re.abs() < doubtful;
+    let slow = modes.iter().filter(is_slow).count();
+    if slow == 0 {
+        return false;
+    }
+    // Eigenvalues of the whole loop may be too far off to begin at; those of the loop whose fast joints are locked are
+    // not.
+    let locked = locked_modes(linear, rate);
     modes
         .iter()
-        .filter(|mode| mode.modulus() < SLOWER * rate && mode.re.abs() < doubtful)
+        .chain(&locked)
+        .filter(is_slow)
         .filter_map(|mode| settled(linear, *mode))
         .any(|mode| mode.re > GROWTH * mode.modulus())
+}
+
+/// The modes of the loop with every joint locked that is fast by itself, and of the rest with its own fast ones locked.
+fn locked_modes(linear: &Linear, rate: f64) -> Vec<Complex> {
+    let mut modes = Vec::new();
+    let (mut rest, mut rate) = (linear.clone(), rate);
+    // Every round locks a joint, and the last one moves.
+    while let Some(fast) = fast_joint(&rest, SLOWER * rate).filter(|_| rest.joints() > 1) {
+        rest = locked(&rest, fast);
+        if fast_joint(&rest, SLOWER * rate).is_none() {
+            let found = rest.flow().eigenvalues();
+            rate = largest(found.iter().map(|mode| mode.modulus()));
+            modes.extend(found);
+        }
+    }
+    modes
+}
+
+/// A joint whose own damping or spring is as fast as `least` \[1/s\].
+fn fast_joint(linear: &Linear, least: f64) -> Option<usize> {
+    (0..linear.joints()).find(|&j| {
+        let ease = linear.inverse_mass[(j, j)];
+        let own = (ease * linear.kd[j]).max((ease * linear.kp[j]).sqrt());
+        own > least
+    })
+}
+
+/// The loop without `joint`, which does not move: what holds it acts on the others too.
+fn locked(linear: &Linear, joint: usize) -> Linear {
+    let (n, ease) = (linear.joints(), &linear.inverse_mass);
+    let other = |i: usize| if i < joint { i } else { i + 1 };
+    let without = |of: &Matrix| {
+        Matrix::from_fn(n - 1, |i, j| {
+            let (i, j) = (other(i), other(j));
+            of[(i, j)] - ease[(i, joint)] / ease[(joint, joint)] * of[(joint, j)]
+        })
+    };
+    let gains = |of: &[f64]| (0..n - 1).map(|i| of[other(i)]).collect();
+    Linear {
+        gravity: without(&linear.gravity),
+        inverse_mass: without(ease),
+        kp: gains(&linear.kp),
+        kd: gains(&linear.kd),
+        integrals: (0..n - 1)
+            .filter_map(|i| {
+                let mut of = linear.integrals.iter();
+                of.find(|(at, _)| *at == other(i)).map(|(_, ki)| (i, *ki))
+            })
+            .collect(),
+    }
 }
 
 /// The mode near `guess`, to its own last digits.

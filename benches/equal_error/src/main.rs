@@ -11,7 +11,7 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use ::ode_solvers::{Dop853, Dopri5, SVector, System};
+use ::ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
@@ -23,10 +23,11 @@ use pendularm::study::extrapolation::Follower;
 const DURATION: f64 = 4.0;
 /// Angle \[rad\] and rate \[rad/s\] of every joint at the start.
 const START: (f64, f64) = (0.3, 0.2);
-/// For how long a run is repeated.
+/// For how long a run is repeated, and how often at least.
 const REPEATED: Duration = Duration::from_millis(20);
+const REPEATS: u32 = 3;
 /// A setting whose run takes longer ends a sweep \[s\].
-const LONGEST: f64 = 0.3;
+const LONGEST: f64 = 1.0;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -69,9 +70,10 @@ fn line<const N: usize>(
     setting: f64,
     mut run: impl FnMut() -> Option<[f64; N]>,
 ) -> bool {
-    let (mut shortest, begun) = (f64::INFINITY, Instant::now());
+    let (mut shortest, mut runs, begun) = (f64::INFINITY, 0, Instant::now());
     let mut end = None;
-    while shortest.is_infinite() || begun.elapsed() < REPEATED {
+    while runs < REPEATS || begun.elapsed() < REPEATED {
+        runs += 1;
         let start = Instant::now();
         end = black_box(run());
         shortest = shortest.min(start.elapsed().as_secs_f64());
@@ -173,6 +175,7 @@ fn ode_solvers<const N: usize, const M: usize>(truth: &[f64], arm: &Arm<N>) {
                 tolerance,
                 tolerance,
             );
+            solver.set_output(OutputType::Sparse);
             solver.integrate().ok()?;
             solver.y_out().last().map(|y| angles(y.as_slice()))
         });
@@ -188,6 +191,7 @@ fn ode_solvers<const N: usize, const M: usize>(truth: &[f64], arm: &Arm<N>) {
                 tolerance,
                 tolerance,
             );
+            solver.set_output(OutputType::Sparse);
             solver.integrate().ok()?;
             solver.y_out().last().map(|y| angles(y.as_slice()))
         });

@@ -240,8 +240,7 @@ fn judge(gains: &Three, count: usize) {
                 / loaded.len() as f64;
             println!(
                 "{name}, {kind}: {:.1} % of {} at the first slow instant, {:.1} % ever after, {:.1} % wherever it is \
-                 first slow; {of_loaded:.1} % of {} under a quarter \
-                 of the stretched load or more; worst {:.3}, settled within {:.2} s",
+                 first slow; {of_loaded:.1} % of the {} with a quarter of the stretched arm's load at least; worst {:.3}, settled within {:.2} s",
                 share(&|seen| seen.first.0 <= ASKED),
                 of.len(),
                 share(&|seen| seen.off <= ASKED),

@@ -17,13 +17,13 @@ use crate::report::svg::{
 };
 
 /// Errors below this \[rad\] are rounding as much as truncation.
-const ROUNDING: f64 = 1e-12;
+const ROUNDING: f64 = 1e-13;
 
 /// Errors above this \[rad\] are of a loop near its limit.
 const COARSE: f64 = 1e-2;
 
 /// Runs that an order is fitted to, the finest.
-const FITTED: usize = 4;
+const FITTED: usize = 3;
 
 /// By how much an order may be off.
 const AGREEMENT: f64 = 0.25;
