@@ -134,7 +134,11 @@ impl MovingScene {
             }
             if (step + 1) % every == 0 {
                 let error = self.truth.angle_error(output, &state.position);
-                worst = worst.max(error.unwrap_or(f64::NAN));
+                let error = error.filter(|error| error.is_finite());
+                let Some(error) = error else {
+                    return f64::NAN;
+                };
+                worst = worst.max(error);
                 output += 1;
             }
         }

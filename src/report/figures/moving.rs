@@ -197,7 +197,8 @@ fn figure(lines: &[MovingLine]) -> Figure {
             for line in of() {
                 let points = line.points.iter().map(|&(dt, error)| {
                     let words = format!("{}, {}: {} rad", line.method, seconds(dt), number(error));
-                    Point::new(dt, error.max(1e-15), words)
+                    // A run that is lost stays lost.
+                    Point::new(dt, if error < 1e-15 { 1e-15 } else { error }, words)
                 });
                 plot.series.push(Curve::of(line.method, points.collect()));
             }
@@ -209,7 +210,7 @@ fn figure(lines: &[MovingLine]) -> Figure {
         "A setpoint that moves and is held for the step leaves order 1",
         "2 links with kp 200, 100 and kd 30, 12, behind a setpoint that goes from (0, 0) to (0.8, -0.6) in 2 s along \
          a polynomial of fifth degree, velocity sent along; error against the law and the setpoint at every instant. \
-         On the left is what the live arm does.",
+         The first panel is what the live arm does.",
         &Key::methods(),
         &plots,
     )
