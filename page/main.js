@@ -21,11 +21,11 @@ import { follow, goLive } from "./playback.js";
 import { startPlayerBar } from "./player_bar.js";
 import { movePlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
 import { describeArm, showReadouts, startReadouts } from "./readouts.js";
-import { record, take } from "./recorder.js";
+import { forgetFrom, take } from "./recorder.js";
 import { start } from "./runtime.js";
 import { startSave } from "./save.js";
 import { startShare } from "./share.js";
-import { watch, watchAll } from "./store.js";
+import { state, watch, watchAll } from "./store.js";
 import { startTabs } from "./tabs.js";
 import { startTheme } from "./theme.js";
 import { startTransport } from "./transport.js";
@@ -72,8 +72,9 @@ if (matchMedia("(max-width: 779px)").matches) {
   for (const one of document.querySelectorAll("#controls > details:nth-of-type(n + 3)")) one.removeAttribute("open");
 }
 
-function forget() {
-  record.clear();
+/** Forgets what was before a reset, or, of a record that goes back, what comes after `time` [s]. */
+function forget(time = 0) {
+  forgetFrom(state.replay ? time : 0);
   goLive();
   redrawPlots();
 }
@@ -83,7 +84,7 @@ watch("version", () => {
   follow();
   if (hasMoved()) wake();
 });
-watch("links", forget);
+watch("links", () => forget());
 start(forget, remember);
 
 let beats = 0;

@@ -5,7 +5,7 @@
 import { byId, setAttribute, setText } from "./dom.js";
 import { fixed } from "./format.js";
 import { player } from "./runtime.js";
-import { state, watch } from "./store.js";
+import { set, state, watch } from "./store.js";
 
 const LOOK_MS = 250;
 const SCRUB_STEPS = 1000;
@@ -43,8 +43,9 @@ function seek(time) {
 
 async function look() {
   if (document.hidden) return;
-  const [place, speed] = await Promise.all([player("get_position"), player("get_rate")]);
-  if (!place.result || !speed.result) return;
+  const [place, speed, pause] = await Promise.all([player("get_position"), player("get_rate"), player("is_paused")]);
+  if (!place.result || !speed.result || !pause.result) return;
+  if (state.paused !== pause.values.paused) set("paused", pause.values.paused);
   duration = place.values.duration;
   const { position } = place.values;
   setText(byId("player-time"), `${fixed(position, 1)} of ${fixed(duration, 1)} s`);

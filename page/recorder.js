@@ -1,6 +1,7 @@
 // @ts-check
 // The last five minutes of the arm, one row per joint state: what the plots draw and the CSV file holds.
-// Invariant: rows are in order of simulation time, without repeats; a reset begins anew.
+// Invariant: rows are in order of simulation time, without repeats; a reset begins anew, and a record that goes back
+// keeps what was before.
 
 import { gravityLoad, kinetic, potential } from "./mechanics.js";
 import { Ring } from "./ring.js";
@@ -53,4 +54,9 @@ export function firstAfter(time) {
     else high = middle;
   }
   return low;
+}
+
+/** Forgets the rows at and after `time` [s]. @param {number} time */
+export function forgetFrom(time) {
+  record.keep(firstAfter(time));
 }

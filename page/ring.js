@@ -13,8 +13,13 @@ export class Ring {
   }
 
   clear() {
-    this.length = 0;
-    this.head = 0;
+    this.keep(0);
+  }
+
+  /** Forgets all rows but the oldest `count`. @param {number} count */
+  keep(count) {
+    this.head = (this.head + this.capacity - this.length + count) % this.capacity;
+    this.length = count;
   }
 
   /** Makes room for one row, and gives the index in `data` where it begins. */

@@ -40,10 +40,10 @@ let missingPolls = 0;
 let lastTrajectory = -Infinity;
 let lastReset = -Infinity;
 let touched = -Infinity;
-let onReset = () => {};
+let onReset = (_time) => {};
 let beforeChange = () => {};
 
-/** `whenReset` is called at a reset of the arm, `whenChanging` before the page changes a setting. */
+/** `whenReset` is called at a reset of the arm, or where a record goes back, with the time that it is then [s], `whenChanging` before the page changes a setting. */
 export function start(whenReset, whenChanging) {
   onReset = whenReset;
   beforeChange = whenChanging;
@@ -138,7 +138,7 @@ function jointStates(msg) {
     if (lastTrajectory < resetAt && !state.replay) keepSetpoint(new Array(n).fill(0));
     state.pushed = false;
     set("goal", null);
-    onReset();
+    onReset(time);
   }
   state.time = time;
   for (let i = 0; i < n; i += 1) {
@@ -200,7 +200,8 @@ function diagnostics(msg) {
     }
   }
   const before = state.diagnostics?.state;
-  if (report.state !== "diverged") keep("paused", report.state === "paused");
+  // A record's diagnostics say how the arm was; whether the record itself goes on its bar asks.
+  if (report.state !== "diverged" && !state.replay) keep("paused", report.state === "paused");
   set("diagnostics", report);
   if (motionHasChanged(state) && question(state)) askNow(question(state));
   if (before === report.state) return;

@@ -67,7 +67,8 @@ else
     say "ADVISORIES NOT CHECKED: no copy of the database in $database (ADVISORY_DB names another folder)"
 fi
 
-# The roslibrust client in tests/clients is left out: it stands for somebody else's program, and has what that has.
+# The clients in tests/clients/roslibrust and ros2/tests/ros2-client are left out: they stand for somebody else's
+# programs, and have what those have.
 for package in . benches fuzz python ros2; do
     [ -e "$package/Cargo.lock" ] || continue
     say "$package/Cargo.lock: ${checks[*]} (cargo-deny $version)"

@@ -14,7 +14,7 @@ use crate::convention::hash::type_hash;
 /// Where this project's own types are.
 const OURS: &str = "pendularm_interfaces/";
 /// The field that ROS 2 puts into a type without any, which DDS does not know.
-const NOTHING: [Field; 1] = [field("structure_needs_at_least_one_member", "uint8")];
+pub const NOTHING: [Field; 1] = [field("structure_needs_at_least_one_member", "uint8")];
 /// How a call went.
 const OUTCOME: [Field; 2] = [field("success", "bool"), field("message", "string")];
 

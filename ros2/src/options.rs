@@ -2,6 +2,8 @@
 //!
 //! **Invariant:** nothing here is asked to listen: the program connects, to the arm and to a router.
 
+use std::path::PathBuf;
+
 use clap::{Arg, Command, value_parser};
 
 /// The options, with their defaults.
@@ -17,6 +19,8 @@ pub struct Options {
     pub namespace: String,
     /// The token that the arm wants to be shown.
     pub token: Option<String>,
+    /// Where to write the package of types, and to end.
+    pub interfaces: Option<PathBuf>,
 }
 
 const ABOUT: &str = "\
@@ -28,7 +32,8 @@ For several arms, run one of these for each, with a namespace of its own.";
 const AFTER_HELP: &str = "\
 On the ROS side: `ros2 run rmw_zenoh_cpp rmw_zenohd`, and RMW_IMPLEMENTATION=rmw_zenoh_cpp everywhere.
 The program listens nowhere, and goes on trying when the arm or the router is not there.
-Exit status: 2 for a bad option.";
+With `--interfaces src` in a workspace, `colcon build` builds the types that are this project's own.
+Exit status: 2 for a bad option, 1 if the package could not be written.";
 
 /// Reads the command line, or ends the program with what is wrong with it.
 #[must_use]
@@ -41,6 +46,7 @@ pub fn read() -> Options {
         domain: matches.get_one("domain").copied().unwrap_or_default(),
         namespace: text("namespace").unwrap_or_default(),
         token: text("token").or_else(token_of_environment),
+        interfaces: matches.get_one("interfaces").cloned(),
     }
 }
 
@@ -90,6 +96,13 @@ fn command() -> Command {
                 "What the arm wants to be shown; who may list this machine's processes sees it, so better use the \
                  variable ARM_SIM_TOKEN",
             ),
+        )
+        .arg(
+            Arg::new("interfaces")
+                .long("interfaces")
+                .value_name("FOLDER")
+                .value_parser(value_parser!(PathBuf))
+                .help("Write the source of the ROS 2 package pendularm_interfaces into FOLDER, and end"),
         )
 }
 

@@ -1,88 +1,36 @@
-"""The bridge against peers that nobody here wrote: peers.py ARM BRIDGE.
+"""The bridge against peers that nobody here wrote: peers.py ARM BRIDGE [NODE].
 
 The router is eclipse-zenoh, the other ROS 2 nodes are zenoh-ros2-sdk, hashes and definitions are those of rosbags
-(Jazzy).
-Every wait ends when what is waited for is there, or fails after a minute.
+(Jazzy). NODE is a program with a node of the crate ros2-client, if one was built.
 """
 
+import json
 import logging
 import os
 import socket
 import subprocess
 import sys
-import threading
+import tempfile
 import time
-import traceback
 from pathlib import Path
 
 import zenoh
+from programs import LIMIT, Process, run, say, start_router, wait_for
 from rosbags.typesys import Stores, get_typestore
 from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
 from zenoh_ros2_sdk.attachment import Attachment
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
-ARM, BRIDGE = sys.argv[1:]
+ARM, BRIDGE, *NODE = sys.argv[1:]
 DOMAIN = 7
-LIMIT = 60.0
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
 LATCHED = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
-
-
-def say(text):
-    print(f"peers: {text}", flush=True)
-
-
-def wait_for(what, get):
-    """Waits until `get` gives something, and gives that."""
-    deadline = time.monotonic() + LIMIT
-    while not (found := get()):
-        assert time.monotonic() < deadline, f"not within {LIMIT} s: {what}"
-        time.sleep(0.05)
-    return found
 
 
 def free_port():
     with socket.socket() as one:
         one.bind(("127.0.0.1", 0))
         return one.getsockname()[1]
-
-
-class Process:
-    """A program, and the lines that it says."""
-
-    all = []
-
-    def __init__(self, *command, stream="stderr"):
-        self.process = subprocess.Popen([str(part) for part in command], text=True, **{stream: subprocess.PIPE})
-        Process.all.append(self.process)
-        self.lines = []
-        self.reader = threading.Thread(target=self.read, args=[getattr(self.process, stream)], daemon=True)
-        self.reader.start()
-
-    def read(self, stream):
-        for line in stream:
-            self.lines.append(line.rstrip("\n"))
-
-    def said(self, text, times=1):
-        """The last of so many lines with that text."""
-
-        def get():
-            found = [line for line in self.lines if text in line]
-            assert found or self.process.poll() is None, f"ended: {self.lines}"
-            return found[-1:] if len(found) >= times else None
-
-        return wait_for(f"{text!r} in {self.lines}", get)[0]
-
-    def end(self):
-        self.process.kill()
-        self.process.wait()
-        self.reader.join()
-
-
-def start_router(port):
-    router = Process(sys.executable, Path(__file__).with_name("router.py"), port, stream="stdout")
-    router.said("ready")
-    return router
 
 
 def start_arm(port, *more):
@@ -174,6 +122,35 @@ def test_hashes_of_standard_types_are_those_of_jazzy(session):
             checked.add(name)
     assert len(checked) >= 7, checked
     return ", ".join(sorted(checked))
+
+
+def test_hashes_are_those_that_ros_2_itself_has(session):
+    """Of every type in the graph but those of packages that PyPI does not have."""
+    if not Path(sys.prefix, "share/rosidl_generator_type_description").is_dir():
+        return "SKIPPED: there are no packages of ROS 2 for this Python"
+    with tempfile.TemporaryDirectory() as folder:
+        folder = Path(folder)
+        subprocess.run([BRIDGE, "--interfaces", folder], check=True, capture_output=True)
+        answer = folder / "hashes.json"
+        program = Path(__file__).with_name("jazzy.py")
+        command = [sys.executable, program, folder / "pendularm_interfaces", answer]
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=LIMIT)
+        known = json.loads(answer.read_text())
+    found = {}
+    for token in tokens(session, "MP") + tokens(session, "MS") + tokens(session, "SS"):
+        name = token[10].replace("::dds_::", "/").replace("::", "/").removesuffix("_")
+        assert found.setdefault(name, token[11]) == token[11], token
+    strange = {name.split("/")[0] for name in found.keys() - known.keys()}
+    absent = {"actionlib_msgs", "rosapi_msgs", "tf2_msgs", "tf2_web_republisher", "tf2_web_republisher_interfaces"}
+    assert strange <= absent, strange
+    wrong = {name: (token, known[name]) for name, token in found.items() if known.get(name, token) != token}
+    assert not wrong, wrong
+    for part in ["SendGoal", "GetResult", "FeedbackMessage"]:
+        for action in ["control_msgs/action/FollowJointTrajectory", "pendularm_interfaces/action/MoveTo"]:
+            assert f"{action}_{part}" in found, found.keys()
+    checked = found.keys() & known.keys()
+    ours = [name for name in checked if name.startswith("pendularm_interfaces/")]
+    return f"{len(checked)} types have ROS 2's own hashes, {len(ours)} of them in the package that the bridge writes"
 
 
 def test_joint_states_are_decoded_and_numbered(peer, session):
@@ -284,6 +261,26 @@ def test_services_answer_and_say_what_is_wrong(peer):
     kind = peer.service("/rosapi/topic_type", "rosapi_msgs/srv/TopicType", "string topic", "string type")
     assert kind.call(topic="/joint_states").type == "sensor_msgs/msg/JointState"
 
+
+def test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session):
+    """The request fails, at once, and the reason is in what the client logs."""
+    logged = []
+    handler = logging.Handler(logging.ERROR)
+    handler.emit = lambda record: logged.append(record.getMessage())
+    logger = logging.getLogger("zenoh_ros2_sdk")
+    told, logger.handlers = logger.handlers, [handler]
+    hashed = next(token[11] for token in tokens(session, "SS") if token[9] == "%rosapi%message_details")
+    # The response's own fields need not be known: there is none.
+    kind = ("rosapi_msgs/srv/MessageDetails", "string type", "string nothing", hashed)
+    assert peer.service("/rosapi/message_details", *kind).call(type="nonsense/Nothing") is None
+    logger.handlers = told
+    assert any("type must name a type that this runtime knows" in line for line in logged), logged
+    assert not any("timed out" in line for line in logged), logged
+    # So does a request that is cut off.
+    key = f"{DOMAIN}/rosapi/message_details/rosapi_msgs::srv::dds_::MessageDetails_/{hashed}"
+    cut = next(iter(session.get(key, payload=b"\0\1\0\0\xff"))).err
+    assert cut and cut.payload.to_string(), cut
+    return cut.payload.to_string()
 
 
 UUID = "unique_identifier_msgs/msg/UUID"
@@ -425,6 +422,21 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
     ]:
         inside[kind.replace("/msg/", "__")] = own(kind)
 
+    heard = []
+    feedback = definition(
+        "unique_identifier_msgs/UUID goal_id\ncontrol_msgs/FollowFeedback feedback",
+        control_msgs__FollowFeedback="std_msgs/Header header\nstring[] joint_names\n"
+        "trajectory_msgs/JointTrajectoryPoint desired\ntrajectory_msgs/JointTrajectoryPoint actual\n"
+        "trajectory_msgs/JointTrajectoryPoint error\nstring[] multi_dof_joint_names\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_desired\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_actual\n"
+        "trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error",
+        **inside,
+    )
+    hashed = next(token[11] for token in tokens(session, "MP") if token[9] == f"{place}feedback".replace("/", "%"))
+    options = {"msg_definition": feedback, "type_hash": hashed, **peer.at}
+    ROS2Subscriber(f"{place}feedback", f"{name}_FeedbackMessage", heard.append, **options)
+
     def service(part, kind, request, response):
         hashed = hashes[f"{place}{part}".replace("/", "%")]
         return peer.service(f"{place}{part}", f"{name}_{kind}", request, response, hashed)
@@ -471,14 +483,27 @@ def test_a_path_is_sent_as_an_action(peer, session, states):
     assert send.call(goal_id=mine, goal=path).accepted
     ended = wait.call(goal_id=mine)
     assert (ended.status, ended.result.error_code) == (4, 0), ended
+    told = wait_for("feedback", lambda: [one.feedback for one in heard])
+    for one in told:
+        assert one.joint_names == ["joint1", "joint2"] and len(one.actual.positions) == 2, one
+        # For other robots; in CDR they are there all the same.
+        assert not one.multi_dof_joint_names and not one.multi_dof_error.transforms, one
     # 0.05 rad: the tolerance at the end of a path.
     assert all(abs(a - b) < 0.05 for a, b in zip(states[-1].position, goal)), states[-1]
+    return len(told)
+
+
+def test_a_node_of_another_crate_is_at_home(port):
+    command = [*NODE, f"tcp/127.0.0.1:{port}", str(DOMAIN)]
+    ran = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+    assert ran.returncode == 0, ran.stderr
+    return "; ".join(ran.stdout.splitlines())
 
 
 def test_the_router_comes_back(port, bridge, router, states):
     router.end()
     bridge.said("has gone; looking for it")
-    router = start_router(port)
+    router = start_router(f"tcp/127.0.0.1:{port}")
     bridge.said("is here", times=2)
     session = open_session(port)
     wait_for("the node", lambda: [token for token in tokens(session, "NN") if token[8] == "arm_sim"])
@@ -545,20 +570,24 @@ def main():
     # Neither is there: the order in which the three start does not matter.
     bridge.said("no arm at")
     bridge.said("no router at")
-    router = start_router(port)
+    router = start_router(f"tcp/127.0.0.1:{port}")
     arm, address = start_arm(arm_port)
     say(bridge.said("is in domain"))
     session = open_session(port)
     peer = Peer(port)
     say(test_topics_are_listed_with_their_types(port))
+    say(test_hashes_are_those_that_ros_2_itself_has(session))
     say(f"hashes of {test_hashes_of_standard_types_are_those_of_jazzy(session)}")
     test_the_bridge_listens_nowhere(bridge)
     states = test_joint_states_are_decoded_and_numbered(peer, session)
     test_who_comes_late_gets_the_last_description(peer)
     say(f"the arm has gone to {test_a_trajectory_moves_the_arm(peer, states)}")
     test_services_answer_and_say_what_is_wrong(peer)
+    say(f"refused: {test_a_service_without_a_place_for_reasons_refuses_with_one(peer, session)}")
     say(f"a goal with {test_a_goal_is_sent_as_an_action(peer, session)} messages of feedback")
-    test_a_path_is_sent_as_an_action(peer, session, states)
+    say(f"a path with {test_a_path_is_sent_as_an_action(peer, session, states)} messages of feedback")
+    if NODE:
+        say(f"ros2-client: {test_a_node_of_another_crate_is_at_home(port)}")
     router, session = test_the_router_comes_back(port, bridge, router, states)
     arm, address = test_the_arm_comes_back(arm_port, bridge, arm, session)
     test_another_arm_has_its_namespace(address, port, session)
@@ -568,14 +597,4 @@ def main():
     say(f"all is well after {time.monotonic() - began:.0f} s")
 
 
-try:
-    main()
-    status = 0
-except BaseException:
-    traceback.print_exc()
-    status = 1
-for process in Process.all:
-    process.kill()
-sys.stdout.flush()
-# The SDK's session would look for its router for a long time.
-os._exit(status)
+run(main)

@@ -1,15 +1,33 @@
 #!/usr/bin/env bash
 # pendularm-ros2 against peers that nobody here wrote: run.sh ARM [BUILD_FOLDER]. Needs cargo, python3 and a network
-# the first time. It installs into the build folder.
+# the first time. It installs into the build folder. CLIENT=1 builds a node of the crate ros2-client too, which takes
+# minutes; BENCH=1 measures instead, with a release build.
 set -euo pipefail
 program=$(realpath "$1")
 target=$(realpath -m "${2:-target/ros2}")
 cd "$(dirname "$0")/.."
 environment=$target/peers
 
+# Python packages of ROS 2 Jazzy itself; each names all that it needs.
+has_jazzy() {
+    "$environment/bin/python" -c 'import platform, sys
+sys.exit(not (platform.machine() == "x86_64" and (3, 11) <= sys.version_info < (3, 14)))'
+}
+
+[ -x "$environment/bin/python" ] || python3 -m venv "$environment"
+"$environment/bin/pip" install --quiet --disable-pip-version-check --requirement tests/requirements.txt
+if [ "${BENCH:-}" = 1 ]; then
+    cargo build --quiet --release --locked --target-dir "$target"
+    exec timeout 900 "$environment/bin/python" tests/hosts.py "$program" "$target/release/pendularm-ros2" --bench
+fi
+! has_jazzy || "$environment/bin/pip" install --quiet --disable-pip-version-check --no-deps --requirement tests/jazzy.txt
 echo "test-ros2: the bridge, and its own tests"
 cargo test --quiet --locked --target-dir "$target"
 cargo build --quiet --locked --target-dir "$target"
-[ -x "$environment/bin/python" ] || python3 -m venv "$environment"
-"$environment/bin/pip" install --quiet --disable-pip-version-check --requirement tests/requirements.txt
-timeout 300 "$environment/bin/python" tests/peers.py "$program" "$target/debug/pendularm-ros2"
+node=()
+if [ "${CLIENT:-}" = 1 ]; then
+    cargo build --quiet --locked --manifest-path tests/ros2-client/Cargo.toml --target-dir "$target"
+    node=("$target/debug/ros2-client-peer")
+fi
+timeout 300 "$environment/bin/python" tests/peers.py "$program" "$target/debug/pendularm-ros2" "${node[@]}"
+timeout 300 "$environment/bin/python" tests/hosts.py "$program" "$target/debug/pendularm-ros2"

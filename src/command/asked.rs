@@ -9,6 +9,7 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 
 use super::error::{CommandError, plain};
+use super::field::FieldPath;
 use super::output::print;
 use super::session::Session;
 use super::yaml;
@@ -63,6 +64,17 @@ impl Asked {
     /// A number that was given.
     pub(super) fn number<T: Copy + Send + Sync + 'static>(&self, name: &str) -> Option<T> {
         self.given.get_one(name).copied()
+    }
+
+    /// How often, by `--once` or `--times`; none is for ever.
+    pub(super) fn times(&self) -> Option<usize> {
+        let once = self.has("once").then_some(1);
+        once.or_else(|| self.number("times"))
+    }
+
+    /// A part of a message that was named.
+    pub(super) fn field(&self) -> Option<&FieldPath> {
+        self.given.get_one("field")
     }
 
     /// A value in JSON or YAML.

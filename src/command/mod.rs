@@ -8,6 +8,7 @@ mod action;
 mod asked;
 mod diagnostics;
 mod error;
+mod field;
 mod output;
 mod package;
 mod param;

@@ -12,6 +12,7 @@ use serde_json::value::RawValue;
 
 use super::asked::{Asked, read_count, read_positive};
 use super::error::CommandError;
+use super::field::read_path;
 use super::output::print;
 use super::session::end_on_signal;
 use super::verbs::{flag, required, show_types, subject, typed_value, verb};
@@ -39,7 +40,9 @@ pub(super) fn command() -> Command {
     let echo = verb(
         "echo",
         "Print the messages of a topic as they come",
-        "Examples:\n  pendularm topic echo /joint_states --once\n  pendularm topic echo --json /clock | head -n 3\n\n\
+        "Examples:\n  pendularm topic echo /joint_states --once\n  \
+         pendularm topic echo /joint_states --field position -n 3\n  \
+         pendularm topic echo --json /clock | head -n 3\n\n\
          Each message is a YAML document that ends with ---, or with --json a line. \
          SIGINT, and a reader that goes away, end it\nwith status 0.",
     );
@@ -51,12 +54,20 @@ pub(super) fn command() -> Command {
          two\nmessages [s].",
     );
     let window = Arg::new("window").long("window").short('w');
+    let field = Arg::new("field").long("field").value_name("FIELD");
+    let times = Arg::new("times").long("times").short('n').value_name("N");
     subject("topic", "Watch topics of a running pendularm, and publish").subcommands([
         list.arg(show_types()),
         echo.args([
             topic(),
             type_name(),
-            flag("once", "Print one message and end"),
+            field
+                .value_parser(read_path)
+                .help("Print this part alone, such as header.stamp or position[0]"),
+            flag("once", "Print one message and end").conflicts_with("times"),
+            times
+                .value_parser(read_count)
+                .help("Print so many messages and end"),
         ]),
         hz.args([
             topic(),
@@ -99,17 +110,22 @@ pub(super) fn list(asked: &Asked) -> Result<(), CommandError> {
 }
 
 pub(super) fn echo(asked: &Asked) -> Result<(), CommandError> {
-    let (topic, is_once) = (asked.text("topic"), asked.has("once"));
+    let topic = asked.text("topic");
+    let field = asked.field();
+    let times = asked.times();
     let mut session = asked.open()?;
     session.subscribe(topic, asked.type_name())?;
     end_on_signal()?;
-    loop {
+    let mut count = 0;
+    while times.is_none_or(|times| count < times) {
         let msg = session.message(topic)?;
-        asked.show_next(&msg)?;
-        if is_once {
-            return Ok(());
-        }
+        asked.show_next(match field {
+            Some(field) => field.pick(&msg)?,
+            None => &msg,
+        })?;
+        count += 1;
     }
+    Ok(())
 }
 
 pub(super) fn hz(asked: &Asked) -> Result<(), CommandError> {
@@ -159,11 +175,7 @@ fn rhythm(spans: &VecDeque<f64>, is_json: bool) -> String {
 pub(super) fn publish(asked: &Asked) -> Result<(), CommandError> {
     let topic = asked.text("topic");
     let (type_name, message) = asked.typed_value("MESSAGE")?;
-    let times = if asked.has("once") {
-        Some(1)
-    } else {
-        asked.number::<usize>("times")
-    };
+    let times = asked.times();
     let period = Duration::from_secs_f64(asked.number("rate").unwrap_or(1.0_f64).recip());
     let mut session = asked.open()?;
     let known = session.type_of("topic", topic, type_name)?;

@@ -52,8 +52,23 @@ class Replaying(PageTest):
         self.keep("replay")
         self.seek(0)
         self.page.until("own('store.js').then(({ state }) => Math.abs(state.position[0]) < 0.2)", why="at the beginning")
-        self.page.run("(() => { const e = document.querySelector('#player-speed'); e.value = '-4'; e.dispatchEvent(new Event('change')); })()")
+        self.speed(-4)
         self.wait(lambda: self.runtime.call("/rosbag2_player/get_rate")["values"]["rate"] == -4, "the speed that was chosen")
+
+    def speed(self, rate):
+        self.page.run(f"(() => {{ const e = document.querySelector('#player-speed'); e.value = '{rate}'; e.dispatchEvent(new Event('change')); }})()")
+
+    def test_what_was_before_stays_in_the_plots_while_a_record_goes_back(self):
+        self.page.until("!document.querySelector('#player').hidden", why="it says that it is a replay")
+        self.page.click("#pause")
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        for part, reached in [(0, "< 0.5"), (0.3, "> 1"), (0.6, "> 2"), (1, "> 3.5")]:
+            self.seek(part)
+            self.page.until(f"own('store.js').then(({{ state }}) => state.time {reached})", why="it is there")
+        self.speed(-1)
+        self.page.click("#pause")
+        self.page.until("own('store.js').then(({ state }) => state.time < 3)", why="it goes back")
+        self.page.until("own('recorder.js').then(({ record }) => record.length >= 3)", why="the rows from before are there")
 
 
 class Live(PageTest):

@@ -147,6 +147,26 @@ fn a_message_is_echoed_in_yaml_as_ros2_does_or_on_a_line_of_json() {
 }
 
 #[test]
+fn a_part_of_a_message_is_echoed_so_many_times() {
+    let runtime = Runtime::start();
+    let echo = |field, more: &[&'static str]| {
+        [&["topic", "echo", "/joint_states", "--field", field], more].concat()
+    };
+    let names = said(&runtime, &echo("name[1]", &["-n", "2"]));
+    assert_eq!(names, "joint2\n---\njoint2\n---\n");
+    let stamp = json_of(&runtime, &echo("header.stamp", &["--times", "1"]));
+    assert!(
+        stamp["sec"].is_u64() && stamp["nanosec"].is_u64(),
+        "{stamp}"
+    );
+    let unknown = refusal(&runtime, &echo("name[2]", &["--once"]), 1);
+    assert_eq!(unknown, "the message has no name[2]");
+    for wrong in [echo("name[x]", &[]), echo("name", &["--once", "-n", "2"])] {
+        assert_eq!(ask(&runtime, &wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
 fn what_another_client_says_acts_on_no_terminal_and_loses_nothing() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();

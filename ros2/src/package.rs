@@ -1,0 +1,157 @@
+//! The package of this project's own types as source, which a ROS 2 workspace builds to talk to the bridge.
+//!
+//! **Invariant:** types that are built from it have the hashes that the graph shows. None has a type of another package
+//! inside, so that it needs no package but those of ROS 2's generators.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::Path;
+
+use pendularm::protocol::catalog::types::{self, Type};
+use pendularm::protocol::catalog::{Action, Field, Service};
+use pendularm::protocol::names::short_type;
+
+use crate::interfaces::{NOTHING, ServiceInterface};
+
+/// The package's name.
+pub const NAME: &str = "pendularm_interfaces";
+/// Stands between the parts of a service and of an action.
+const DIVIDER: &str = "---\n";
+
+/// Writes the package into `folder`, and says how many types it has.
+///
+/// # Errors
+/// If a folder or a file can't be written.
+pub fn write(folder: &Path) -> io::Result<usize> {
+    let interfaces = interfaces();
+    for kind in ["msg", "srv", "action"] {
+        fs::create_dir_all(folder.join(kind))?;
+    }
+    for (path, text) in &interfaces {
+        fs::write(folder.join(path), text)?;
+    }
+    fs::write(folder.join("package.xml"), manifest())?;
+    fs::write(folder.join("CMakeLists.txt"), recipe(interfaces.keys()))?;
+    Ok(interfaces.len())
+}
+
+/// The definitions by their paths.
+fn interfaces() -> BTreeMap<String, String> {
+    let mut texts = BTreeMap::new();
+    let mut add = |name: &str, parts: &[Type]| {
+        let Some(path) = name
+            .strip_prefix(NAME)
+            .and_then(|rest| rest.strip_prefix('/'))
+        else {
+            return;
+        };
+        let (kind, _) = path.split_once('/').unwrap_or_default();
+        let parts: Vec<String> = parts.iter().map(text).collect();
+        texts.insert(format!("{path}.{kind}"), parts.join(DIVIDER));
+    };
+    for one in types::all() {
+        add(one.name, &[one]);
+    }
+    for service in Service::ALL {
+        let of = ServiceInterface::of_catalogue(
+            service.type_name(),
+            service.fields(),
+            service.response_fields(),
+        );
+        add(of.name, &[of.request, of.response]);
+    }
+    for action in Action::ALL {
+        add(action.type_name(), &action.parts());
+    }
+    texts
+}
+
+/// A part's definition: constants, then fields with their units.
+fn text(part: &Type) -> String {
+    let constants = part.constants.iter();
+    let constants = constants.map(|one| format!("{} {}={}\n", one.kind, one.name, one.value));
+    // ROS 2 puts its filler into an empty type by itself.
+    let fields = part.fields.iter().filter(|field| !NOTHING.contains(field));
+    let fields = fields.map(|field: &Field| {
+        let kind = short_type(field.kind);
+        match field.unit {
+            "" => format!("{kind} {}\n", field.name),
+            unit => format!("{kind} {}  # {unit}\n", field.name),
+        }
+    });
+    constants.chain(fields).collect()
+}
+
+fn manifest() -> String {
+    format!(
+        r#"<?xml version="1.0"?>
+<package format="3">
+  <name>{NAME}</name>
+  <version>{}</version>
+  <description>Messages, services and actions of pendularm, written by pendularm-ros2</description>
+  <maintainer email="pendularm@example.com">pendularm</maintainer>
+  <license>MIT OR Apache-2.0</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>action_msgs</depend>
+  <exec_depend>rosidl_default_runtime</exec_depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+  <export>
+    <build_type>ament_cmake</build_type>
+  </export>
+</package>
+"#,
+        env!("CARGO_PKG_VERSION")
+    )
+}
+
+fn recipe<'a>(paths: impl Iterator<Item = &'a String>) -> String {
+    let paths: String = paths.map(|path| format!("  \"{path}\"\n")).collect();
+    format!(
+        "cmake_minimum_required(VERSION 3.8)
+project({NAME})
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+rosidl_generate_interfaces(${{PROJECT_NAME}}
+{paths})
+ament_export_dependencies(rosidl_default_runtime)
+ament_package()
+"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn services_say_how_a_call_went_and_have_units() {
+        let texts = interfaces();
+        let text = &texts["srv/SetIntegrator.srv"];
+        assert_eq!(
+            text,
+            "string method\nfloat64 timestep  # s\n---\nstring method\nfloat64 timestep  # s\nbool success\nstring message\n"
+        );
+    }
+
+    #[test]
+    fn no_type_has_one_of_another_package_inside() {
+        for (path, text) in interfaces() {
+            for line in text.lines() {
+                let kind = line.split(' ').next().unwrap();
+                let package = kind.split_once('/').map_or(NAME, |(package, _)| package);
+                assert_eq!(package, NAME, "{path}: {line}");
+            }
+        }
+    }
+
+    #[test]
+    fn types_of_others_are_not_written() {
+        let texts = interfaces();
+        let mut paths = texts.keys();
+        let known = ["action/", "msg/", "srv/"];
+        assert!(paths.all(|path| known.iter().any(|kind| path.starts_with(kind))));
+        assert!(!texts.contains_key("msg/JointState.msg"));
+    }
+}

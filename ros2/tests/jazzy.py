@@ -1,0 +1,87 @@
+"""Type hashes by ROS 2 Jazzy itself: jazzy.py PENDULARM_INTERFACES ANSWER.
+
+They are those that its built packages have with them, and those that its generator computes from definitions; both come
+from PyPI, as packages of `ros-...` (jazzy.txt). The answer is a file with the names of types and their hashes; standard
+output is the generator's own.
+"""
+
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from rosidl_adapter import convert_to_idl
+from rosidl_generator_type_description import generate_type_hash
+
+SHARE = Path(sys.prefix, "share")
+
+# The definitions of `control_msgs`, which is not on PyPI, without comments.
+CONTROL_MSGS = {
+    "msg/JointTolerance.msg": "string name\nfloat64 position\nfloat64 velocity\nfloat64 acceleration\n",
+    "msg/JointComponentTolerance.msg": "string joint_name\nuint16 component\nfloat64 position\nfloat64 velocity\n"
+    "float64 acceleration\n",
+    "action/FollowJointTrajectory.action": """\
+trajectory_msgs/JointTrajectory trajectory
+trajectory_msgs/MultiDOFJointTrajectory multi_dof_trajectory
+JointTolerance[] path_tolerance
+JointComponentTolerance[] component_path_tolerance
+JointTolerance[] goal_tolerance
+JointComponentTolerance[] component_goal_tolerance
+builtin_interfaces/Duration goal_time_tolerance
+---
+int32 error_code
+int32 SUCCESSFUL = 0
+int32 INVALID_GOAL = -1
+string error_string
+---
+std_msgs/Header header
+string[] joint_names
+trajectory_msgs/JointTrajectoryPoint desired
+trajectory_msgs/JointTrajectoryPoint actual
+trajectory_msgs/JointTrajectoryPoint error
+string[] multi_dof_joint_names
+trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_desired
+trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_actual
+trajectory_msgs/MultiDOFJointTrajectoryPoint multi_dof_error
+""",
+}
+
+
+def hashes_in(folder):
+    """The hashes of all types that are described below a folder, by their names."""
+    descriptions = (json.loads(path.read_text()) for path in folder.rglob("*.json"))
+    lists = (one["type_hashes"] for one in descriptions if "type_hashes" in one)
+    return {one["type_name"]: one["hash_string"] for types in lists for one in types}
+
+
+def generate(package, source, scratch):
+    """The hashes of a package's types by ROS 2's generator, from the definitions in a folder."""
+    output = scratch / package / "output"
+    definitions = sorted(path for kind in ["msg", "srv", "action"] for path in source.glob(f"{kind}/*.*"))
+    converted = []
+    for path in definitions:
+        idl = convert_to_idl(source, package, path.relative_to(source), scratch / package)
+        converted.append(f"{scratch / package}:{idl.relative_to(scratch / package)}")
+    arguments = scratch / f"{package}.json"
+    includes = [f"{folder.name}:{folder}" for folder in SHARE.iterdir() if folder.is_dir()]
+    asked = {"package_name": package, "output_dir": str(output), "idl_tuples": converted, "include_paths": includes}
+    arguments.write_text(json.dumps(asked))
+    generate_type_hash(str(arguments))
+    return hashes_in(output)
+
+
+def main(ours, answer, scratch):
+    control = scratch / "source"
+    for path, text in CONTROL_MSGS.items():
+        (control / path).parent.mkdir(parents=True, exist_ok=True)
+        (control / path).write_text(text)
+    known = {}
+    for folder in SHARE.iterdir():
+        known.update(hashes_in(folder))
+    known.update(generate("control_msgs", control, scratch))
+    known.update(generate("pendularm_interfaces", ours, scratch))
+    answer.write_text(json.dumps(known))
+
+
+with tempfile.TemporaryDirectory() as scratch:
+    main(Path(sys.argv[1]).resolve(), Path(sys.argv[2]), Path(scratch))
