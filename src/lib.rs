@@ -10,6 +10,7 @@
 //! | --- | --- | --- |
 //! | `runtime` | yes | `actors`, `protocol`, `options`, `logging`, `plan`, and the program |
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
+//! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
 //! | `record` | yes | `record`: runs on record, read back and replayed |
 //! | `cli` | yes | `command`: commands that ask a running one, completions and manual |

@@ -14,23 +14,23 @@ use thiserror::Error;
 pub struct Arm<const N: usize> {
     lengths: [f64; N],
     masses: [f64; N],
-    gravity: f64,
+    pub(super) gravity: f64,
     pub(super) rods: [Rod; N],
 }
 
-/// The constants of one link that the dynamics need.
+/// The constants of one link that the dynamics need, of one arm or of several side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Rod {
+pub(super) struct Rod<T = f64> {
     /// Length \[m\].
-    pub(super) length: f64,
+    pub(super) length: T,
     /// Mass of all links beyond this one \[kg\].
-    pub(super) beyond: f64,
+    pub(super) beyond: T,
     /// Mass in units of the previous link's; 0 for the first link, which has none before it.
-    pub(super) mass_ratio: f64,
+    pub(super) mass_ratio: T,
     /// `1 / l` \[1/m\].
-    pub(super) per_length: f64,
+    pub(super) per_length: T,
     /// `1 / (m l)` \[1/(kg m)\]; makes an acceleration of an effort.
-    pub(super) per_mass_length: f64,
+    pub(super) per_mass_length: T,
 }
 
 /// A parameter that no arm can have.
@@ -167,13 +167,13 @@ fn check_positive(field: &'static str, values: &[f64]) -> Result<(), ArmError> {
     Ok(())
 }
 
-/// Positions and velocities of the joints.
+/// Positions and velocities of the joints, of one arm or of several side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct State<const N: usize> {
+pub struct State<const N: usize, T = f64> {
     /// Joint angles \[rad\], never wrapped.
-    pub position: [f64; N],
+    pub position: [T; N],
     /// Joint rates \[rad/s\].
-    pub velocity: [f64; N],
+    pub velocity: [T; N],
 }
 
 impl<const N: usize> State<N> {

@@ -17,11 +17,13 @@
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+    reason = "every index runs over arrays of the same constant length"
 )]
 
 use std::fmt;
 use std::str::FromStr;
+
+use super::number::{Number, entries};
 
 /// One of the selectable one-step methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -98,22 +100,22 @@ impl FromStr for Method {
 }
 
 /// The increments of position and velocity in one step: `(Δq, Δv)`.
-pub type Increment<const N: usize> = ([f64; N], [f64; N]);
+pub type Increment<const N: usize, T = f64> = ([T; N], [T; N]);
 
 /// The increment of one step of length `h` \[s\] from `(q, v)` at time `t` \[s\].
 ///
 /// `acceleration(t, q, v)` \[rad/s²\] is evaluated [`Method::evaluations`] times, always first at the start itself.
 /// Increments, not states, are returned, so that a caller can sum them with compensation ([`two_sum`]). What is not
 /// finite is passed on: judging it is the caller's.
-#[inline]
-pub fn increment<const N: usize>(
+#[inline(always)]
+pub fn increment<T: Number, const N: usize>(
     method: Method,
-    acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
-    t: f64,
-    q: &[f64; N],
-    v: &[f64; N],
-    h: f64,
-) -> Increment<N> {
+    acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
+    t: T,
+    q: &[T; N],
+    v: &[T; N],
+    h: T,
+) -> Increment<N, T> {
     match method {
         Method::Euler => euler(acceleration, t, q, v, h),
         Method::Midpoint => midpoint(acceleration, t, q, v, h),
@@ -122,25 +124,27 @@ pub fn increment<const N: usize>(
     }
 }
 
-fn euler<const N: usize>(
-    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
-    t: f64,
-    q: &[f64; N],
-    v: &[f64; N],
-    h: f64,
-) -> Increment<N> {
+#[inline(always)]
+fn euler<T: Number, const N: usize>(
+    mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
+    t: T,
+    q: &[T; N],
+    v: &[T; N],
+    h: T,
+) -> Increment<N, T> {
     let a = acceleration(t, q, v);
     (scaled(h, v), scaled(h, &a))
 }
 
-fn midpoint<const N: usize>(
-    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
-    t: f64,
-    q: &[f64; N],
-    v: &[f64; N],
-    h: f64,
-) -> Increment<N> {
-    let half = 0.5 * h;
+#[inline(always)]
+fn midpoint<T: Number, const N: usize>(
+    mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
+    t: T,
+    q: &[T; N],
+    v: &[T; N],
+    h: T,
+) -> Increment<N, T> {
+    let half = h * 0.5;
     let a1 = acceleration(t, q, v);
     let qm = moved(q, half, v);
     let vm = moved(v, half, &a1);
@@ -148,30 +152,32 @@ fn midpoint<const N: usize>(
     (scaled(h, &vm), scaled(h, &am))
 }
 
-fn verlet<const N: usize>(
-    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
-    t: f64,
-    q: &[f64; N],
-    v: &[f64; N],
-    h: f64,
-) -> Increment<N> {
-    let half = 0.5 * h;
+#[inline(always)]
+fn verlet<T: Number, const N: usize>(
+    mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
+    t: T,
+    q: &[T; N],
+    v: &[T; N],
+    h: T,
+) -> Increment<N, T> {
+    let half = h * 0.5;
     let a1 = acceleration(t, q, v);
-    let dq: [f64; N] = std::array::from_fn(|i| h * (v[i] + half * a1[i]));
-    let predicted_q = std::array::from_fn(|i| q[i] + dq[i]);
+    let dq = entries!(h, i => h * (v[i] + half * a1[i]));
+    let predicted_q = entries!(h, i => q[i] + dq[i]);
     let predicted_v = moved(v, h, &a1);
     let a2 = acceleration(t + h, &predicted_q, &predicted_v);
-    (dq, std::array::from_fn(|i| half * (a1[i] + a2[i])))
+    (dq, entries!(h, i => half * (a1[i] + a2[i])))
 }
 
-fn rk4<const N: usize>(
-    mut acceleration: impl FnMut(f64, &[f64; N], &[f64; N]) -> [f64; N],
-    t: f64,
-    q: &[f64; N],
-    v: &[f64; N],
-    h: f64,
-) -> Increment<N> {
-    let half = 0.5 * h;
+#[inline(always)]
+fn rk4<T: Number, const N: usize>(
+    mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
+    t: T,
+    q: &[T; N],
+    v: &[T; N],
+    h: T,
+) -> Increment<N, T> {
+    let half = h * 0.5;
     let a1 = acceleration(t, q, v);
     let v2 = moved(v, half, &a1);
     let a2 = acceleration(t + half, &moved(q, half, v), &v2);
@@ -179,10 +185,10 @@ fn rk4<const N: usize>(
     let a3 = acceleration(t + half, &moved(q, half, &v2), &v3);
     let v4 = moved(v, h, &a3);
     let a4 = acceleration(t + h, &moved(q, h, &v3), &v4);
-    let sixth = h / 6.0;
+    let sixth = h / h.like(6.0);
     (
-        std::array::from_fn(|i| sixth * (v[i] + 2.0 * (v2[i] + v3[i]) + v4[i])),
-        std::array::from_fn(|i| sixth * (a1[i] + 2.0 * (a2[i] + a3[i]) + a4[i])),
+        entries!(h, i => sixth * (v[i] + (v2[i] + v3[i]) * 2.0 + v4[i])),
+        entries!(h, i => sixth * (a1[i] + (a2[i] + a3[i]) * 2.0 + a4[i])),
     )
 }
 
@@ -191,18 +197,18 @@ fn rk4<const N: usize>(
 /// Carrying what was left out into the next addition makes a million small steps as good as one.
 #[inline(always)]
 #[must_use]
-pub fn two_sum(a: f64, b: f64) -> (f64, f64) {
+pub fn two_sum<T: Number>(a: T, b: T) -> (T, T) {
     let sum = a + b;
     let b_in_sum = sum - a;
     (sum, (a - (sum - b_in_sum)) + (b - b_in_sum))
 }
 
 #[inline(always)]
-fn scaled<const N: usize>(h: f64, x: &[f64; N]) -> [f64; N] {
-    x.map(|x| h * x)
+fn scaled<T: Number, const N: usize>(h: T, x: &[T; N]) -> [T; N] {
+    entries!(h, i => h * x[i])
 }
 
 #[inline(always)]
-fn moved<const N: usize>(x: &[f64; N], h: f64, rate: &[f64; N]) -> [f64; N] {
-    std::array::from_fn(|i| x[i] + h * rate[i])
+fn moved<T: Number, const N: usize>(x: &[T; N], h: T, rate: &[T; N]) -> [T; N] {
+    entries!(h, i => x[i] + h * rate[i])
 }

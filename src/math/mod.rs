@@ -9,6 +9,7 @@ pub mod expression;
 pub mod goal;
 pub mod integrator;
 pub mod kinematics;
+pub mod number;
 pub mod pacer;
 pub mod particle;
 pub mod pid;

@@ -20,24 +20,25 @@
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "every index comes from `array::from_fn` over arrays of the same constant length"
+    reason = "every index runs over arrays of the same constant length"
 )]
 
 use super::arm::State;
+use super::number::{Number, entries};
 
 /// Bound of each joint's integral \[rad s\]. With the default gains it stands for over a thousand times the effort that
 /// gravity asks for, so it never hinders; without it a blocked or impossible setpoint would wind up for ever.
 pub const INTEGRAL_LIMIT: f64 = 50.0;
 
-/// Gains of every joint; each is finite and not negative.
+/// Gains of every joint, of one arm or of several side by side; each is finite and not negative.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Gains<const N: usize> {
+pub struct Gains<const N: usize, T = f64> {
     /// Proportional gains \[N m/rad\].
-    pub kp: [f64; N],
+    pub kp: [T; N],
     /// Integral gains \[N m/(rad s)\].
-    pub ki: [f64; N],
+    pub ki: [T; N],
     /// Derivative gains \[N m s/rad\].
-    pub kd: [f64; N],
+    pub kd: [T; N],
 }
 
 /// Gains for the default 2-link arm: any setpoint within ±2π, from rest or out of a free swing, is reached to 0.02 rad
@@ -73,11 +74,11 @@ impl Default for Gains<3> {
 
 /// Positions and velocities at which the arm is to be held.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Setpoint<const N: usize> {
+pub struct Setpoint<const N: usize, T = f64> {
     /// Joint positions q* \[rad\], not wrapped: a setpoint of 2π asks for a whole turn.
-    pub position: [f64; N],
+    pub position: [T; N],
     /// Joint velocities q̇* \[rad/s\]. They are held too, they do not move the positions.
-    pub velocity: [f64; N],
+    pub velocity: [T; N],
 }
 
 /// The starting pose, q = 0, at rest.
@@ -103,11 +104,31 @@ impl<const N: usize> Setpoint<N> {
 
 /// The answer of the control law for one step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Control<const N: usize> {
+pub struct Control<const N: usize, T = f64> {
     /// Effort τ to hold for the step \[N m\].
-    pub effort: [f64; N],
+    pub effort: [T; N],
     /// The integral that went into it \[rad s\], to be committed if the step is taken.
-    pub integral: [f64; N],
+    pub integral: [T; N],
+}
+
+/// The law for one step of `dt` \[s\] that starts at `state`, with an `integral` as of the step before \[rad s\].
+#[inline(always)]
+pub(super) fn law<T: Number, const N: usize>(
+    gains: &Gains<N, T>,
+    setpoint: &Setpoint<N, T>,
+    integral: &[T; N],
+    state: &State<N, T>,
+    dt: T,
+) -> Control<N, T> {
+    let Gains { kp, ki, kd } = gains;
+    let position_error = entries!(dt, i => setpoint.position[i] - state.position[i]);
+    let integral =
+        entries!(dt, i => (integral[i] + position_error[i] * dt).clamped(INTEGRAL_LIMIT));
+    let effort = entries!(dt, i => {
+        let velocity_error = setpoint.velocity[i] - state.velocity[i];
+        kp[i] * position_error[i] + ki[i] * integral[i] + kd[i] * velocity_error
+    });
+    Control { effort, integral }
 }
 
 /// The controller: gains, setpoint, integral, and whether it is on. It starts off.
@@ -136,17 +157,7 @@ impl<const N: usize> Pid<N> {
     #[inline]
     #[must_use]
     pub fn control(&self, state: &State<N>, dt: f64) -> Control<N> {
-        let Gains { kp, ki, kd } = &self.gains;
-        let position_error: [f64; N] =
-            std::array::from_fn(|i| self.setpoint.position[i] - state.position[i]);
-        let integral: [f64; N] = std::array::from_fn(|i| {
-            (self.integral[i] + position_error[i] * dt).clamp(-INTEGRAL_LIMIT, INTEGRAL_LIMIT)
-        });
-        let effort = std::array::from_fn(|i| {
-            let velocity_error = self.setpoint.velocity[i] - state.velocity[i];
-            kp[i] * position_error[i] + ki[i] * integral[i] + kd[i] * velocity_error
-        });
-        Control { effort, integral }
+        law(&self.gains, &self.setpoint, &self.integral, state, dt)
     }
 
     /// Keeps the integral \[rad s\] of a step that was taken.

@@ -22,8 +22,9 @@
     clippy::indexing_slicing,
     reason = "indices run over 0..N of arrays that have N elements, and over the six coefficients"
 )]
-use std::array::from_fn;
 use std::f64::consts::FRAC_2_PI;
+
+use super::number::{Number, entries};
 
 /// Largest magnitude of an angle \[rad\] for which the reduction holds: beyond it `k` would need more than 17 bits.
 const LIMIT: f64 = 2.0e5;
@@ -61,56 +62,55 @@ const C: [f64; 6] = [
 /// Sines and cosines of `angles` \[rad\], in this order. Not a number where an angle is not finite.
 #[must_use]
 #[inline(always)]
-pub fn sin_cos<const N: usize>(angles: &[f64; N]) -> ([f64; N], [f64; N]) {
-    let shifted = angles.map(|angle| angle * FRAC_2_PI + ROUND);
-    let k = shifted.map(|shifted| shifted - ROUND);
-    let first: [f64; N] = from_fn(|i| angles[i] - k[i] * HALF_PI[0]);
-    let second = k.map(|k| k * HALF_PI[1]);
-    let r: [f64; N] = from_fn(|i| first[i] - second[i]);
-    let tail: [f64; N] = from_fn(|i| ((first[i] - r[i]) - second[i]) - k[i] * HALF_PI[2]);
+pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
+    let any = angles[0];
+    let shifted = entries!(any, i => angles[i] * FRAC_2_PI + ROUND);
+    let k = entries!(any, i => shifted[i] + -ROUND);
+    let first = entries!(any, i => angles[i] - k[i] * HALF_PI[0]);
+    let second = entries!(any, i => k[i] * HALF_PI[1]);
+    let r = entries!(any, i => first[i] - second[i]);
+    let tail = entries!(any, i => ((first[i] - r[i]) - second[i]) - k[i] * HALF_PI[2]);
 
-    let r2 = r.map(|r| r * r);
-    let r4 = r2.map(|r2| r2 * r2);
-    let r8 = r4.map(|r4| r4 * r4);
-    let polynomial = |p: [f64; 6]| -> [f64; N] {
-        // Pairwise (Estrin), which waits half as long as Horner's rule.
-        from_fn(|i| {
-            (p[0] + p[1] * r2[i]) + r4[i] * (p[2] + p[3] * r2[i]) + r8[i] * (p[4] + p[5] * r2[i])
-        })
-    };
-    let (s, c) = (polynomial(S), polynomial(C));
-    let sine: [f64; N] = from_fn(|i| r[i] + (tail[i] + r[i] * r2[i] * s[i]));
-    let cosine: [f64; N] = from_fn(|i| {
-        let half = 0.5 * r2[i];
-        let head = 1.0 - half;
-        head + (((1.0 - head) - half) + (r4[i] * c[i] - r[i] * tail[i]))
+    let r2 = entries!(any, i => r[i] * r[i]);
+    let r4 = entries!(any, i => r2[i] * r2[i]);
+    let r8 = entries!(any, i => r4[i] * r4[i]);
+    // Pairwise (Estrin), which waits half as long as Horner's rule.
+    let s = entries!(any, i => polynomial(S, r2[i], r4[i], r8[i]));
+    let c = entries!(any, i => polynomial(C, r2[i], r4[i], r8[i]));
+    let sine = entries!(any, i => r[i] + (tail[i] + r[i] * r2[i] * s[i]));
+    let cosine = entries!(any, i => {
+        let one = any.like(1.0);
+        let half = r2[i] * 0.5;
+        let head = one - half;
+        head + (((one - head) - half) + (r4[i] * c[i] - r[i] * tail[i]))
     });
 
-    let mut sin = [0.0; N];
-    let mut cos = [0.0; N];
+    let (mut sin, mut cos) = (sine, cosine);
     for i in 0..N {
-        let quadrant = shifted[i].to_bits();
-        let odd = 0_u64.wrapping_sub(quadrant & 1);
-        let (sine, cosine) = (sine[i].to_bits(), cosine[i].to_bits());
-        let exchange = (sine ^ cosine) & odd;
-        let negative_sine = (quadrant & 2) << 62;
-        let negative_cosine = (quadrant.wrapping_add(1) & 2) << 62;
-        sin[i] = f64::from_bits(sine ^ exchange ^ negative_sine);
-        cos[i] = f64::from_bits(cosine ^ exchange ^ negative_cosine);
+        (sin[i], cos[i]) = shifted[i].turned(sine[i], cosine[i]);
     }
-    if !angles.iter().all(|angle| angle.abs() <= LIMIT) {
+    if !T::all_within(angles, LIMIT) {
         replace_far(angles, &mut sin, &mut cos);
     }
     (sin, cos)
 }
 
+/// `p` at the variable whose powers these are.
+#[inline(always)]
+fn polynomial<T: Number>(p: [f64; 6], r2: T, r4: T, r8: T) -> T {
+    (r2 * p[1] + p[0]) + r4 * (r2 * p[3] + p[2]) + r8 * (r2 * p[5] + p[4])
+}
+
 /// The C library's sine and cosine wherever the angle is beyond the limit or not finite.
 #[cold]
 #[inline(never)]
-fn replace_far<const N: usize>(angles: &[f64; N], sin: &mut [f64; N], cos: &mut [f64; N]) {
+fn replace_far<T: Number, const N: usize>(angles: &[T; N], sin: &mut [T; N], cos: &mut [T; N]) {
     for i in 0..N {
-        if angles[i].abs() > LIMIT || angles[i].is_nan() {
-            (sin[i], cos[i]) = angles[i].sin_cos();
+        let pairs = sin[i].lanes_mut().iter_mut().zip(cos[i].lanes_mut());
+        for (angle, (sin, cos)) in angles[i].lanes().iter().zip(pairs) {
+            if angle.abs() > LIMIT || angle.is_nan() {
+                (*sin, *cos) = angle.sin_cos();
+            }
         }
     }
 }

@@ -18,6 +18,8 @@
               helpers are handed values that were made for them, and binaries that share them need not use every part"
 )]
 
+#[cfg(feature = "batch")]
+mod batch;
 mod control;
 mod default_gains;
 mod divergence;

@@ -1,4 +1,4 @@
-//! Many arms side by side, each a lane: the same simulation that steps one arm, as often as there are lanes.
+//! Many arms side by side, each a lane: simulations that share the processor's registers, and threads.
 //!
 //! **Invariant:** no lane knows of another, so that a lane has the bits of a single arm, however many threads share
 //! the work.
@@ -10,12 +10,16 @@ use pendularm::math::count::in_f64;
 use pendularm::math::dynamics::energy;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::Simulation;
+use pendularm::math::simulation::{Simulation, batch};
 
 use crate::fields::Rows;
 
 /// Fewest lane-steps that are worth another thread: some tens of microseconds.
-const WORTH_A_THREAD: u64 = 500;
+const WORTH_A_THREAD: u64 = 3000;
+
+/// Lanes that are handed to a thread together: at least what fills the registers that take steps in turn, and no more
+/// than leaves the other threads something.
+const TOGETHER: (usize, usize) = (32, 1024);
 
 /// The arrays that show the lanes, one row each.
 pub(crate) struct Shown<'a> {
@@ -26,24 +30,26 @@ pub(crate) struct Shown<'a> {
     pub(crate) diverged: &'a mut [bool],
 }
 
-/// One lane with the rows that show it.
-struct Lane<'a, const N: usize> {
-    simulation: &'a mut Simulation<N>,
-    position: &'a mut [f64],
-    velocity: &'a mut [f64],
-    effort: &'a mut [f64],
-    time: &'a mut f64,
-    diverged: &'a mut bool,
-}
-
-impl<const N: usize> Lane<'_, N> {
-    fn show(&mut self) {
-        let State { position, velocity } = self.simulation.state();
-        self.position.copy_from_slice(position);
-        self.velocity.copy_from_slice(velocity);
-        self.effort.copy_from_slice(self.simulation.effort());
-        *self.time = self.simulation.time();
-        *self.diverged = self.simulation.divergence().is_some();
+impl Shown<'_> {
+    /// Brings the rows up to date with lanes that begin with theirs.
+    fn show<const N: usize>(self, lanes: &[Simulation<N>]) {
+        let rows = self
+            .position
+            .chunks_exact_mut(N)
+            .zip(self.velocity.chunks_exact_mut(N))
+            .zip(self.effort.chunks_exact_mut(N))
+            .zip(self.time)
+            .zip(self.diverged);
+        for (one, ((((shown_position, shown_velocity), effort), time), diverged)) in
+            lanes.iter().zip(rows)
+        {
+            let State { position, velocity } = one.state();
+            shown_position.copy_from_slice(position);
+            shown_velocity.copy_from_slice(velocity);
+            effort.copy_from_slice(one.effort());
+            *time = one.time();
+            *diverged = one.divergence().is_some();
+        }
     }
 }
 
@@ -90,87 +96,62 @@ pub(crate) fn advance<const N: usize>(
     shown: Shown<'_>,
     piece: Piece<'_>,
 ) {
-    let step = |(index, mut lane): (usize, Lane<'_, N>)| {
-        let steps = piece.steps.of(index);
-        if piece.done == 0
-            && steps > 0
-            && let Some(effort) = piece.effort
-        {
-            let duration = in_f64(steps) * lane.simulation.timestep();
-            lane.simulation.disturb(effort.row(index), duration);
-        }
-        let left = steps.saturating_sub(piece.done);
-        lane.simulation.advance(left.min(piece.length));
-        lane.show();
-    };
-    let fewest = WORTH_A_THREAD.div_ceil(piece.length.max(1));
-    let lanes_each = usize::try_from(fewest).unwrap_or(usize::MAX);
-    if piece.is_shared && lanes.len() >= 2 * lanes_each {
-        let Shown {
-            position,
-            velocity,
-            effort,
-            time,
-            diverged,
-        } = shown;
-        lanes
-            .par_iter_mut()
-            .zip(position.par_chunks_exact_mut(N))
-            .zip(velocity.par_chunks_exact_mut(N))
-            .zip(effort.par_chunks_exact_mut(N))
-            .zip(time.par_iter_mut())
-            .zip(diverged.par_iter_mut())
-            .map(
-                |(((((simulation, position), velocity), effort), time), diverged)| Lane {
-                    simulation,
-                    position,
-                    velocity,
-                    effort,
-                    time,
-                    diverged,
-                },
-            )
-            .enumerate()
-            .with_min_len(lanes_each)
-            .for_each(step);
-    } else {
-        each(lanes, shown).enumerate().for_each(step);
+    if !piece.is_shared {
+        return piece.take(0, lanes, shown);
     }
-}
-
-/// Brings the arrays up to date, after a change that was no step.
-pub(crate) fn show<const N: usize>(lanes: &mut [Simulation<N>], shown: Shown<'_>) {
-    each(lanes, shown).for_each(|mut lane| lane.show());
-}
-
-fn each<'a, const N: usize>(
-    lanes: &'a mut [Simulation<N>],
-    shown: Shown<'a>,
-) -> impl Iterator<Item = Lane<'a, N>> {
-    let Shown {
-        position,
-        velocity,
-        effort,
-        time,
-        diverged,
-    } = shown;
-    lanes
-        .iter_mut()
-        .zip(position.chunks_exact_mut(N))
-        .zip(velocity.chunks_exact_mut(N))
-        .zip(effort.chunks_exact_mut(N))
-        .zip(time)
-        .zip(diverged)
-        .map(
-            |(((((simulation, position), velocity), effort), time), diverged)| Lane {
-                simulation,
+    let fewest = usize::try_from(WORTH_A_THREAD.div_ceil(piece.length.max(1)));
+    let share = lanes.len().div_ceil(4 * rayon::current_num_threads());
+    let (least, most) = TOGETHER;
+    let each = share.clamp(least, most).max(fewest.unwrap_or(usize::MAX));
+    if lanes.len() < 2 * each {
+        return piece.take(0, lanes, shown);
+    }
+    let shares = lanes
+        .par_chunks_mut(each)
+        .zip(shown.position.par_chunks_mut(each * N))
+        .zip(shown.velocity.par_chunks_mut(each * N))
+        .zip(shown.effort.par_chunks_mut(each * N))
+        .zip(shown.time.par_chunks_mut(each))
+        .zip(shown.diverged.par_chunks_mut(each));
+    shares.enumerate().for_each(
+        |(index, (((((lanes, position), velocity), effort), time), diverged))| {
+            let shown = Shown {
                 position,
                 velocity,
                 effort,
                 time,
                 diverged,
-            },
-        )
+            };
+            piece.take(index * each, lanes, shown);
+        },
+    );
+}
+
+impl Piece<'_> {
+    /// Takes it with the lanes from the first one on.
+    fn take<const N: usize>(&self, first: usize, lanes: &mut [Simulation<N>], shown: Shown<'_>) {
+        if self.done == 0
+            && let Some(effort) = self.effort
+        {
+            for (index, lane) in lanes.iter_mut().enumerate() {
+                let steps = self.steps.of(first + index);
+                if steps > 0 {
+                    let duration = in_f64(steps) * lane.timestep();
+                    lane.disturb(effort.row(first + index), duration);
+                }
+            }
+        }
+        batch::advance(lanes.iter_mut().enumerate().map(|(index, lane)| {
+            let left = self.steps.of(first + index).saturating_sub(self.done);
+            (lane, left.min(self.length))
+        }));
+        shown.show(lanes);
+    }
+}
+
+/// Brings the arrays up to date, after a change that was no step.
+pub(crate) fn show<const N: usize>(lanes: &[Simulation<N>], shown: Shown<'_>) {
+    shown.show(lanes);
 }
 
 /// Kinetic plus potential energy of every lane \[J\].

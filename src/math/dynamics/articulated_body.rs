@@ -26,7 +26,7 @@
 //! [`weightless_dynamics`] leaves out that angle's sine and cosine.
 //!
 //! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a
-//! heavy tip (`tests/math_dynamics.rs`). Known limit: where masses *and* lengths spread by many powers of ten at once,
+//! heavy tip (`tests/math/`). Known limit: where masses *and* lengths spread by many powers of ten at once,
 //! such as 1e7 kg in 0.1 mm at the end of 500 km of gram-light links, the joint of the tiny tip may lose eight.
 //!
 //! **Invariant:** one kernel for every arm and every n. Source of the method: Featherstone, *Rigid Body Dynamics
@@ -37,9 +37,11 @@
     reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
 )]
 
-use crate::math::arm::Arm;
+use std::ops::Add;
+
+use crate::math::arm::{Arm, Rod};
+use crate::math::number::{Number, entries};
 use crate::math::trig;
-use glam::DVec2;
 
 /// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
 ///
@@ -53,7 +55,7 @@ pub fn forward_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    recursion::<N, true>(arm, q, qd, tau)
+    recursion::<f64, N, true>(&arm.rods, &arm.gravity, q, qd, tau)
 }
 
 /// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
@@ -66,64 +68,65 @@ pub fn weightless_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    recursion::<N, false>(arm, q, qd, tau)
+    recursion::<f64, N, false>(&arm.rods, &arm.gravity, q, qd, tau)
 }
 
+/// The joint accelerations of one arm or of several side by side, with or without gravity.
 #[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
-fn recursion<const N: usize, const WEIGHS: bool>(
-    arm: &Arm<N>,
-    q: &[f64; N],
-    qd: &[f64; N],
-    tau: &[f64; N],
-) -> [f64; N] {
-    let rods = &arm.rods;
+pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
+    rods: &[Rod<T>; N],
+    gravity: &T,
+    q: &[T; N],
+    qd: &[T; N],
+    tau: &[T; N],
+) -> [T; N] {
+    let zero = q[0].like(0.0);
     let (sin, cos) = if WEIGHS {
         trig::sin_cos(q)
     } else {
         sin_cos_beyond_first(q)
     };
-    let mut rate = 0.0;
-    let w: [f64; N] = std::array::from_fn(|i| {
-        rate += qd[i];
+    let mut rate = zero;
+    let w = entries!(zero, i => {
+        rate = rate + qd[i];
         rods[i].length * rate * rate
     });
 
     // From the tip to the base: what each link carries, and how its tip will answer its joint.
-    let mut carried = Carried::NOTHING;
-    let mut hinges = [Hinge::default(); N];
-    let mut outer = 0.0;
+    let mut carried = Carried::nothing(zero);
+    let mut hinges = [Hinge::none(zero); N];
+    let mut outer = zero;
     for i in (0..N).rev() {
         let u = (tau[i] - outer) * rods[i].per_mass_length;
         outer = tau[i];
-        let big_w = 1.0 + 3.0 * carried.c;
-        let per_w = 1.0 / big_w;
+        let big_w = carried.c * 3.0 + 1.0;
+        let per_w = zero.like(1.0) / big_w;
         hinges[i] = Hinge {
-            free: 3.0 * per_w * (u - carried.bias.y),
-            along: 3.0 * per_w * carried.b,
-            across: 0.5 * per_w,
+            free: per_w * 3.0 * (u - carried.bias.y),
+            along: per_w * 3.0 * carried.b,
+            across: per_w * 0.5,
         };
         if i > 0 {
-            let x_axis = DVec2::new(cos[i], sin[i]);
+            let x_axis = Planar::new(cos[i], sin[i]);
             carried = if i + 1 == N {
                 Body::bare(u, w[i]).turned(rods[i].mass_ratio, x_axis, x_axis)
             } else {
                 let body = carried.with_rod(u, w[i], big_w, per_w);
-                let v = x_axis + body.k * x_axis.perp();
+                let v = x_axis + x_axis.perp().scaled(body.k);
                 body.turned(rods[i].mass_ratio, x_axis, v)
             };
         }
     }
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
-    let gravity = if WEIGHS { arm.gravity() } else { 0.0 };
-    let mut tip = DVec2::new(0.0, gravity);
-    let mut inner = 0.0;
-    std::array::from_fn(|i| {
-        let x_axis = DVec2::new(cos[i], sin[i]);
-        let joint = DVec2::new(x_axis.dot(tip), x_axis.perp_dot(tip));
+    let mut tip = Planar::new(zero, if WEIGHS { *gravity } else { zero });
+    let mut inner = zero;
+    entries!(zero, i => {
+        let x_axis = Planar::new(cos[i], sin[i]);
+        let joint = Planar::new(x_axis.dot(tip), x_axis.perp_dot(tip));
         let along = joint.x - w[i];
         let across = (hinges[i].free - hinges[i].across * joint.y) - hinges[i].along * along;
-        tip = DVec2::new(along, across);
+        tip = Planar::new(along, across);
         let link = (across - joint.y) * rods[i].per_length;
         let relative = link - inner;
         inner = link;
@@ -133,51 +136,109 @@ fn recursion<const N: usize, const WEIGHS: bool>(
 
 /// Sines and cosines of all angles but the first, for which those of 0 stand.
 #[inline(always)]
-fn sin_cos_beyond_first<const N: usize>(q: &[f64; N]) -> ([f64; N], [f64; N]) {
+fn sin_cos_beyond_first<T: Number, const N: usize>(q: &[T; N]) -> ([T; N], [T; N]) {
     // The constant stands last, where the compiler takes its sine and cosine and finds the others side by side: with it
     // in front a step of 3 links takes fewer instructions and half as long again.
-    let beyond = std::array::from_fn(|i| if i + 1 < N { q[i + 1] } else { 0.0 });
+    let zero = q[0].like(0.0);
+    let beyond = entries!(zero, i => if i + 1 < N { q[i + 1] } else { zero });
     let (sin, cos) = trig::sin_cos(&beyond);
-    let from = |of: [f64; N]| std::array::from_fn(|i| of[(i + N - 1) % N]);
-    (from(sin), from(cos))
+    (
+        entries!(zero, i => sin[(i + N - 1) % N]),
+        entries!(zero, i => cos[(i + N - 1) % N]),
+    )
+}
+
+/// A vector in the plane.
+#[derive(Clone, Copy)]
+struct Planar<T> {
+    x: T,
+    y: T,
+}
+
+impl<T: Number> Planar<T> {
+    #[inline(always)]
+    fn new(x: T, y: T) -> Self {
+        Self { x, y }
+    }
+
+    #[inline(always)]
+    fn dot(self, other: Self) -> T {
+        self.x * other.x + self.y * other.y
+    }
+
+    /// Turned by a right angle.
+    #[inline(always)]
+    fn perp(self) -> Self {
+        Self::new(-self.y, self.x)
+    }
+
+    #[inline(always)]
+    fn perp_dot(self, other: Self) -> T {
+        self.x * other.y - self.y * other.x
+    }
+
+    #[inline(always)]
+    fn scaled(self, factor: T) -> Self {
+        Self::new(factor * self.x, factor * self.y)
+    }
+}
+
+impl<T: Number> Add for Planar<T> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self::new(self.x + other.x, self.y + other.y)
+    }
 }
 
 /// How the tip of a link accelerates across it: `t_y = free - along t_x - across p_y`.
-#[derive(Clone, Copy, Default)]
-struct Hinge {
-    free: f64,
-    along: f64,
-    across: f64,
+#[derive(Clone, Copy)]
+struct Hinge<T> {
+    free: T,
+    along: T,
+    across: T,
+}
+
+impl<T: Number> Hinge<T> {
+    #[inline(always)]
+    fn none(zero: T) -> Self {
+        Self {
+            free: zero,
+            along: zero,
+            across: zero,
+        }
+    }
 }
 
 /// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass:
 /// `A' = x v vᵀ + d y yᵀ` with `v = (1, k)`, and `B' = x φ v + ψ y`.
 #[derive(Clone, Copy)]
-struct Body {
-    x: f64,
-    k: f64,
-    d: f64,
-    phi: f64,
-    psi: f64,
+struct Body<T> {
+    x: T,
+    k: T,
+    d: T,
+    phi: T,
+    psi: T,
 }
 
-impl Body {
+impl<T: Number> Body<T> {
     /// The outermost link, which carries nothing.
     #[inline(always)]
-    fn bare(u: f64, w: f64) -> Self {
+    fn bare(u: T, w: T) -> Self {
         Self {
-            x: 1.0,
-            k: 0.0,
-            d: 0.25,
-            phi: -0.5 * w,
-            psi: 1.5 * u,
+            x: u.like(1.0),
+            k: u.like(0.0),
+            d: u.like(0.25),
+            phi: w * -0.5,
+            psi: u * 1.5,
         }
     }
 
     /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link and of
     /// `v` in that frame.
     #[inline(always)]
-    fn turned(self, mass_ratio: f64, x_axis: DVec2, v: DVec2) -> Carried {
+    fn turned(self, mass_ratio: T, x_axis: Planar<T>, v: Planar<T>) -> Carried<T> {
         let (x, d, psi) = (
             mass_ratio * self.x,
             mass_ratio * self.d,
@@ -189,47 +250,50 @@ impl Body {
             b: x * v.x * v.y + d * y_axis.x * y_axis.y,
             c: x * v.y * v.y + d * y_axis.y * y_axis.y,
             det: x * d,
-            bias: x * self.phi * v + psi * y_axis,
-            e: x * (d * self.phi * x_axis + psi * v.perp()),
+            bias: v.scaled(x * self.phi) + y_axis.scaled(psi),
+            e: (x_axis.scaled(d * self.phi) + v.perp().scaled(psi)).scaled(x),
         }
     }
 }
 
 /// The load at the tip of a link, in the frame of that link and per unit of its mass: `A = (a b; b c)` and `B`.
 #[derive(Clone, Copy)]
-struct Carried {
-    a: f64,
-    b: f64,
-    c: f64,
-    det: f64,
-    bias: DVec2,
+struct Carried<T> {
+    a: T,
+    b: T,
+    c: T,
+    det: T,
+    bias: Planar<T>,
     /// `E = (c B_x - b B_y, a B_y - b B_x)`, without its cancellation.
-    e: DVec2,
+    e: Planar<T>,
 }
 
-impl Carried {
-    const NOTHING: Self = Self {
-        a: 0.0,
-        b: 0.0,
-        c: 0.0,
-        det: 0.0,
-        bias: DVec2::ZERO,
-        e: DVec2::ZERO,
-    };
+impl<T: Number> Carried<T> {
+    #[inline(always)]
+    fn nothing(zero: T) -> Self {
+        Self {
+            a: zero,
+            b: zero,
+            c: zero,
+            det: zero,
+            bias: Planar::new(zero, zero),
+            e: Planar::new(zero, zero),
+        }
+    }
 
     /// Adds the rod that carries this and turns about its joint; `W` and `1 / W` are at hand.
     #[inline(always)]
-    fn with_rod(&self, u: f64, w: f64, big_w: f64, per_w: f64) -> Body {
-        let big_x = 1.0 + self.a + 3.0 * (self.c + self.det);
-        let per_x = 1.0 / big_x;
-        let along = self.bias.x + 3.0 * (self.e.x + self.b * u) + 0.5 * w * big_w;
-        let across = u * (1.0 + self.a) + 0.5 * self.b * w - self.bias.y - self.e.y;
+    fn with_rod(&self, u: T, w: T, big_w: T, per_w: T) -> Body<T> {
+        let big_x = (self.a + 1.0) + (self.c + self.det) * 3.0;
+        let per_x = u.like(1.0) / big_x;
+        let along = self.bias.x + (self.e.x + self.b * u) * 3.0 + w * 0.5 * big_w;
+        let across = u * (self.a + 1.0) + self.b * 0.5 * w - self.bias.y - self.e.y;
         Body {
             x: big_x * per_w,
-            k: -0.5 * self.b * per_x,
-            d: (0.25 * (1.0 + self.a) + self.c + self.det) * per_x,
+            k: self.b * -0.5 * per_x,
+            d: ((self.a + 1.0) * 0.25 + self.c + self.det) * per_x,
             phi: along * per_x - w,
-            psi: u + across * (0.5 * per_x),
+            psi: u + across * (per_x * 0.5),
         }
     }
 }

@@ -28,6 +28,8 @@
 
 mod articulated_body;
 
+#[cfg(feature = "batch")]
+pub(super) use articulated_body::recursion;
 pub use articulated_body::{forward_dynamics, weightless_dynamics};
 
 use super::arm::{Arm, State};

@@ -5,14 +5,13 @@
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "every index comes from `from_fn` over arrays of the same constant length"
+    reason = "every index runs over arrays of the same constant length"
 )]
-
-use std::array::from_fn;
 
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{forward_dynamics, weightless_dynamics};
 use crate::math::integrator::{Increment, Method, increment, two_sum};
+use crate::math::number::Number;
 
 /// The increments of positions and velocities in a step of `h` \[s\] under the constant `effort` \[N m\].
 #[inline(always)]
@@ -24,10 +23,13 @@ pub fn step_under<const N: usize>(
     effort: &[f64; N],
     h: f64,
 ) -> Increment<N> {
+    let State { position, velocity } = state;
     if leaves_out_first_angle(arm) {
-        step_as::<N, false>(arm, method, state, effort, h)
+        let acceleration = |_, q: &[f64; N], v: &[f64; N]| weightless_dynamics(arm, q, v, effort);
+        increment(method, acceleration, 0.0, position, velocity, h)
     } else {
-        step_as::<N, true>(arm, method, state, effort, h)
+        let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
+        increment(method, acceleration, 0.0, position, velocity, h)
     }
 }
 
@@ -38,34 +40,38 @@ pub(super) fn leaves_out_first_angle<const N: usize>(arm: &Arm<N>) -> bool {
     N % 2 == 1 && arm.gravity() == 0.0
 }
 
-/// [`step_under`], of an arm that needs its first angle or does not.
+/// The state that a step of `h` \[s\] from `state` leads to under an `acceleration`, which the time does not enter, and
+/// its `carry`, which rounding leaves for the next step.
 #[inline(always)]
-pub(super) fn step_as<const N: usize, const WEIGHS: bool>(
-    arm: &Arm<N>,
+pub(super) fn stepped<T: Number, const N: usize>(
+    acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
     method: Method,
-    state: &State<N>,
-    effort: &[f64; N],
-    h: f64,
-) -> Increment<N> {
+    state: &State<N, T>,
+    carry: &State<N, T>,
+    h: T,
+) -> (State<N, T>, State<N, T>) {
     let State { position, velocity } = state;
     // The motion does not depend on the time, so none is reckoned for the stages.
-    let acceleration = |_, q: &[f64; N], v: &[f64; N]| {
-        if WEIGHS {
-            forward_dynamics(arm, q, v, effort)
-        } else {
-            weightless_dynamics(arm, q, v, effort)
-        }
+    let (dq, dv) = increment(method, acceleration, h.like(0.0), position, velocity, h);
+    let (position, position_carry) = add(position, &carry.position, &dq);
+    let (velocity, velocity_carry) = add(velocity, &carry.velocity, &dv);
+    let carry = State {
+        position: position_carry,
+        velocity: velocity_carry,
     };
-    increment(method, acceleration, 0.0, position, velocity, h)
+    (State { position, velocity }, carry)
 }
 
 /// `value + carry + increment`, and the carry that rounding leaves for the next step.
 #[inline(always)]
-pub(super) fn add<const N: usize>(
-    value: &[f64; N],
-    carry: &[f64; N],
-    increment: &[f64; N],
-) -> ([f64; N], [f64; N]) {
-    let sums: [(f64, f64); N] = from_fn(|i| two_sum(value[i], increment[i] + carry[i]));
-    (sums.map(|sum| sum.0), sums.map(|sum| sum.1))
+fn add<T: Number, const N: usize>(
+    value: &[T; N],
+    carry: &[T; N],
+    increment: &[T; N],
+) -> ([T; N], [T; N]) {
+    let (mut sums, mut carries) = (*value, *carry);
+    for i in 0..N {
+        (sums[i], carries[i]) = two_sum(value[i], increment[i] + carry[i]);
+    }
+    (sums, carries)
 }

@@ -18,6 +18,8 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
+#[cfg(feature = "batch")]
+pub mod batch;
 mod checkpoint;
 mod increments;
 mod input;
@@ -26,9 +28,10 @@ use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
 pub use self::increments::step_under;
-use self::increments::{add, leaves_out_first_angle, step_as};
+use self::increments::{leaves_out_first_angle, stepped};
 pub use self::input::ArmInput;
 use super::arm::{Arm, State};
+use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
 use super::pid::{Control, Gains, Pid, Setpoint};
 
@@ -186,21 +189,25 @@ impl<const N: usize> Simulation<N> {
         if self.disturbance.is_some() {
             self.add_disturbance(&mut control.effort);
         }
-        let State { position, velocity } = &self.state;
-        let effort = &control.effort;
-        let (dq, dv) =
-            step_as::<N, WEIGHS>(&self.arm, self.method, &self.state, effort, self.timestep);
-        let (position, position_carry) = add(position, &self.carry.position, &dq);
-        let (velocity, velocity_carry) = add(velocity, &self.carry.velocity, &dv);
-        let next = State { position, velocity };
+        let (arm, effort) = (&self.arm, &control.effort);
+        let (next, carry) = stepped(
+            |_, q: &[f64; N], v: &[f64; N]| {
+                if WEIGHS {
+                    forward_dynamics(arm, q, v, effort)
+                } else {
+                    weightless_dynamics(arm, q, v, effort)
+                }
+            },
+            self.method,
+            &self.state,
+            &self.carry,
+            self.timestep,
+        );
         if !next.is_finite() {
             return false;
         }
         self.state = next;
-        self.carry = State {
-            position: position_carry,
-            velocity: velocity_carry,
-        };
+        self.carry = carry;
         self.effort = control.effort;
         self.pid.commit(control.integral);
         self.steps_since_base += 1;

@@ -17,10 +17,11 @@
 use std::f64::consts::FRAC_PI_2;
 
 use crate::math::arm::{Arm, State};
+use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, potential_energy};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::step_under;
+use crate::math::simulation::{Simulation, batch, step_under};
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::{Complex, Matrix};
 
@@ -43,17 +44,34 @@ pub fn move_of(amplitude: f64, method: Method, timestep: f64) -> ControlLoop<2> 
         .with_timestep(timestep)
 }
 
-/// Whether a move arrives, and is there at its end.
+/// Whether each of the moves, stepped side by side, arrives and is there at its end.
 #[must_use]
-pub fn arrives(control: &ControlLoop<2>) -> bool {
-    let mut live = control.simulation(State::rest());
-    while live.time() < MOVE {
-        if !live.step() {
-            return false;
+pub fn arrive(controls: &[ControlLoop<2>]) -> Vec<bool> {
+    let moves = controls.iter();
+    let mut moves: Vec<_> = moves
+        .map(|control| control.simulation(State::rest()))
+        .collect();
+    batch::advance(moves.iter_mut().map(|live| {
+        let steps = first_step_from(MOVE, live.timestep());
+        (live, steps)
+    }));
+    let arrived = |(live, control): (&Simulation<2>, &ControlLoop<2>)| {
+        let (position, setpoint) = (live.state().position, control.setpoint.position);
+        live.divergence().is_none() && (0..2).all(|i| (position[i] - setpoint[i]).abs() <= ARRIVED)
+    };
+    moves.iter().zip(controls).map(arrived).collect()
+}
+
+/// The first step that does not begin before `time` \[s\], in steps of `timestep` \[s\].
+fn first_step_from(time: f64, timestep: f64) -> u64 {
+    let mut steps = 0;
+    for bit in (0..u64::BITS / 2).rev() {
+        let more = steps | 1 << bit;
+        if in_f64(more - 1) * timestep < time {
+            steps = more;
         }
     }
-    let (position, setpoint) = (live.state().position, control.setpoint.position);
-    (0..2).all(|i| (position[i] - setpoint[i]).abs() <= ARRIVED)
+    steps
 }
 
 /// A free swing of a 2-link arm from the horizontal, turning at `spin` \[rad/s\].

@@ -7,7 +7,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
-use crate::report::experiments::nonlinear::{arrives, is_carried, move_of, spun};
+use crate::report::experiments::nonlinear::{arrive, is_carried, move_of, spun};
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Axis, Curve, Heat, Key, Plot, Unit};
@@ -125,10 +125,11 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
             .unwrap_or(f64::INFINITY);
         let row = |amplitude: f64| {
             let motion = Motion::ahead(&move_of(amplitude, method, 1e-3), &State::rest());
-            let verdicts = centres(MOVE_STEPS, columns)
+            let loops: Vec<_> = centres(MOVE_STEPS, columns)
                 .into_iter()
-                .map(|h| arrives(&move_of(amplitude, method, h)));
-            (motion.timestep.min(poses), verdicts.collect())
+                .map(|h| move_of(amplitude, method, h))
+                .collect();
+            (motion.timestep.min(poses), arrive(&loops))
         };
         let rows = centres(AMPLITUDES, columns).into_iter().map(row).collect();
         maps.push(MotionMap { method, rows });

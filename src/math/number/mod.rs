@@ -1,0 +1,107 @@
+//! A number of the arm's formulas: one for one arm, or a register full of them, a lane for each of several arms.
+//!
+//! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
+//! done in all lanes alike; the two that have to look at a lane by itself, the bound of an integral and the quadrant of
+//! an angle, select and do not branch.
+//!
+//! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next: so
+//! that a lane has the bits of the arm that is stepped alone, on every machine and in registers of every width.
+
+#[cfg(feature = "batch")]
+mod register;
+
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+#[cfg(feature = "batch")]
+pub(super) use register::Register;
+
+/// An array with an entry for each `$i`, its length that of where it goes; `$any` is any number of the kind.
+///
+/// A loop in place of [`std::array::from_fn`], whose closures the compiler may leave as functions of their own: there
+/// the wide registers are not switched on, and every operation in them would be a call.
+macro_rules! entries {
+    ($any:expr, $i:ident => $entry:expr) => {{
+        let mut entries = [$any; N];
+        for $i in 0..N {
+            entries[$i] = $entry;
+        }
+        entries
+    }};
+}
+pub(super) use entries;
+
+/// A number, or as many as a register has lanes. Constants are the same in all lanes.
+pub trait Number:
+    Copy
+    + Add<Output = Self>
+    + Sub<Output = Self>
+    + Mul<Output = Self>
+    + Div<Output = Self>
+    + Neg<Output = Self>
+    + Add<f64, Output = Self>
+    + Mul<f64, Output = Self>
+{
+    /// `value` in as many lanes as `self` has.
+    #[must_use]
+    fn like(self, value: f64) -> Self;
+
+    /// The nearest number to `self` between `-limit` and `limit`; what is not a number stays so.
+    #[must_use]
+    fn clamped(self, limit: f64) -> Self;
+
+    /// Whether all lanes of all values are within `±limit`; what is not a number is not.
+    fn all_within(values: &[Self], limit: f64) -> bool;
+
+    /// Sine and cosine of an angle by those of what is left of it beyond a number of quarter turns, the lowest two bits
+    /// of `self`: an odd number exchanges them, and their signs are those of the quadrant.
+    #[must_use]
+    fn turned(self, sine: Self, cosine: Self) -> (Self, Self);
+
+    /// The lanes, one by one.
+    fn lanes(&self) -> &[f64];
+
+    /// The lanes, one by one.
+    fn lanes_mut(&mut self) -> &mut [f64];
+}
+
+/// One arm.
+impl Number for f64 {
+    #[inline(always)]
+    fn like(self, value: f64) -> Self {
+        value
+    }
+
+    #[inline(always)]
+    fn clamped(self, limit: f64) -> Self {
+        self.clamp(-limit, limit)
+    }
+
+    #[inline(always)]
+    fn all_within(values: &[Self], limit: f64) -> bool {
+        values.iter().all(|value| value.abs() <= limit)
+    }
+
+    #[inline(always)]
+    fn turned(self, sine: Self, cosine: Self) -> (Self, Self) {
+        let quadrant = self.to_bits();
+        let odd = 0_u64.wrapping_sub(quadrant & 1);
+        let (sine, cosine) = (sine.to_bits(), cosine.to_bits());
+        let exchange = (sine ^ cosine) & odd;
+        let negative_sine = (quadrant & 2) << 62;
+        let negative_cosine = (quadrant.wrapping_add(1) & 2) << 62;
+        (
+            Self::from_bits(sine ^ exchange ^ negative_sine),
+            Self::from_bits(cosine ^ exchange ^ negative_cosine),
+        )
+    }
+
+    #[inline(always)]
+    fn lanes(&self) -> &[f64] {
+        std::slice::from_ref(self)
+    }
+
+    #[inline(always)]
+    fn lanes_mut(&mut self) -> &mut [f64] {
+        std::slice::from_mut(self)
+    }
+}

@@ -1,0 +1,151 @@
+//! Arms in the lanes of a register against the same arms alone: every bit of every simulation.
+
+use std::f64::consts::TAU;
+
+use fastrand::Rng;
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation;
+use pendularm::math::simulation::batch::{self, Registers};
+
+/// Sizes around the point at which the sine's reduction needs the C library (2e5 rad), and far beyond.
+const FAR: [f64; 5] = [1.9e5, 2.1e5, 1e9, 1e16, 1e300];
+
+fn between(rng: &mut Rng, least: f64, most: f64) -> f64 {
+    least + (most - least) * rng.f64()
+}
+
+/// Evenly spread over the powers of ten between the two.
+fn of_any_size(rng: &mut Rng, least: f64, most: f64) -> f64 {
+    10_f64.powf(between(rng, least.log10(), most.log10()))
+}
+
+fn each<const N: usize>(mut value: impl FnMut() -> f64) -> [f64; N] {
+    std::array::from_fn(|_| value())
+}
+
+fn any_state<const N: usize>(rng: &mut Rng) -> State<N> {
+    let mut state = State {
+        position: each(|| between(rng, -2.0 * TAU, 2.0 * TAU)),
+        velocity: each(|| between(rng, -5.0, 5.0)),
+    };
+    match rng.u32(..8) {
+        0 => state.position[rng.usize(..N)] = *rng.choice(&FAR).unwrap(),
+        1 => state.velocity[rng.usize(..N)] = -rng.choice(&FAR).unwrap(),
+        2 => state = State::rest(),
+        3 => state.position = each(|| -0.0),
+        _ => {}
+    }
+    state
+}
+
+/// An arm of any kind, anywhere in its life: weightless, wound up, pushed, off, about to diverge, or diverged.
+fn any_simulation<const N: usize>(rng: &mut Rng) -> Simulation<N> {
+    let gravity = if rng.u32(..3) == 0 { 0.0 } else { 9.81 };
+    let arm = Arm::new(
+        each(|| of_any_size(rng, 0.1, 10.0)),
+        each(|| of_any_size(rng, 0.1, 10.0)),
+        gravity,
+    );
+    let gains = Gains {
+        kp: each(|| between(rng, 0.0, 2000.0)),
+        ki: each(|| between(rng, 0.0, 3000.0)),
+        kd: each(|| between(rng, 0.0, 100.0)),
+    };
+    let mut simulation = Simulation::new(arm.unwrap(), gains);
+    simulation.set_method(*rng.choice(Method::ALL.iter()).unwrap());
+    // The larger of them leave the finite numbers within some steps.
+    simulation.set_timestep(of_any_size(rng, 1e-5, 0.5));
+    simulation.set_state(any_state(rng));
+    simulation.enable(rng.bool());
+    simulation.set_setpoint(Setpoint {
+        position: each(|| between(rng, -TAU, TAU)),
+        velocity: each(|| between(rng, -1.0, 1.0)),
+    });
+    // A carry, an integral and a clock that are no zeros.
+    simulation.advance(rng.u64(..3));
+    if rng.bool() {
+        simulation.set_timestep(of_any_size(rng, 1e-5, 1e-2));
+    }
+    if rng.u32(..3) == 0 {
+        let duration = simulation.timestep() * between(rng, 0.1, 40.0);
+        simulation.disturb(each(|| between(rng, -20.0, 20.0)), duration);
+    }
+    simulation
+}
+
+/// Every number with its sign, also that of zero.
+fn shown<const N: usize>(simulation: &Simulation<N>) -> String {
+    format!("{simulation:?}")
+}
+
+/// Steps `count` arms together, then alone, and counts those that diverged on the way.
+fn compare<const N: usize>(registers: Registers, rng: &mut Rng, count: usize) -> usize {
+    let mut together: Vec<Simulation<N>> = (0..count).map(|_| any_simulation(rng)).collect();
+    let mut alone = together.clone();
+    let mut diverged = 0;
+    for _ in 0..3 {
+        let alike = rng.bool().then(|| rng.u64(1..60));
+        let steps: Vec<u64> = (0..count)
+            .map(|_| alike.unwrap_or_else(|| rng.u64(..60)))
+            .collect();
+        registers.advance(together.iter_mut().zip(steps.iter().copied()));
+        for ((one, other), &steps) in alone.iter_mut().zip(&together).zip(&steps) {
+            let before = one.clone();
+            let was_diverged = one.divergence().is_some();
+            one.advance(steps);
+            diverged += usize::from(one.divergence().is_some() && !was_diverged);
+            assert_eq!(
+                shown(other),
+                shown(one),
+                "{steps} steps in {} lanes from {before:?}",
+                registers.lanes()
+            );
+        }
+    }
+    diverged
+}
+
+#[test]
+fn a_lane_has_the_bits_of_an_arm_that_is_stepped_alone() {
+    let mut rng = Rng::with_seed(1);
+    for registers in Registers::all() {
+        let mut diverged = 0;
+        for count in (1..40).chain([64, 100, 129, 300]) {
+            diverged += compare::<2>(registers, &mut rng, count);
+            diverged += compare::<3>(registers, &mut rng, count);
+        }
+        assert!(diverged > 300, "only {diverged} diverged");
+    }
+}
+
+#[test]
+fn an_arm_that_diverges_leaves_its_neighbours_alone() {
+    let mut arms = vec![Simulation::<3>::new(Arm::default(), Gains::default()); 16];
+    for arm in &mut arms {
+        arm.enable(true);
+        arm.set_setpoint(Setpoint::at([0.5, -0.5, 0.25]));
+    }
+    arms[5].set_timestep(0.05);
+    batch::advance(arms.iter_mut().map(|arm| (arm, 5000)));
+    for (index, arm) in arms.iter().enumerate() {
+        assert_eq!(arm.divergence().is_some(), index == 5, "arm {index}");
+        assert_eq!(arm.steps() == 5000, index != 5, "arm {index}");
+        assert!(arm.state().is_finite());
+    }
+}
+
+#[test]
+fn an_advance_may_be_cut_anywhere() {
+    let mut rng = Rng::with_seed(3);
+    let mut whole: Vec<Simulation<2>> = (0..50).map(|_| any_simulation(&mut rng)).collect();
+    let mut cut = whole.clone();
+    batch::advance(whole.iter_mut().map(|arm| (arm, 30)));
+    for steps in [1, 0, 7, 22] {
+        batch::advance(cut.iter_mut().map(|arm| (arm, steps)));
+    }
+    for (whole, cut) in whole.iter().zip(&cut) {
+        assert_eq!(shown(whole), shown(cut));
+    }
+}
