@@ -16,7 +16,7 @@ scratch=$(mktemp -d)
 server=
 trap 'if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; fi; rm -rf "$scratch"' EXIT
 
-(cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work --bin allocations)
+(cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work --bin estimate --bin allocations)
 program=${CARGO_TARGET_DIR:-$root/target}/release/pendularm
 if grep -q '^web = ' "$root/Cargo.toml"; then
     (cd "$root" && cargo build --release --locked --quiet --no-default-features --features runtime)
@@ -34,10 +34,15 @@ put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
 
 count=20000
 for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd,pi,pid,pushed,weightless-pd} \
-    step-3-rk4-{free,weightless,pd,pid} estimate-{2,3}-rk4 particle-rk4-{constant,cosine}; do
+    step-3-rk4-{free,weightless,pd,pid} particle-rk4-{constant,cosine}; do
     once=$(instructions "$target/release/work" "$variant" $count)
     twice=$(instructions "$target/release/work" "$variant" $((2 * count)))
     put "$variant" "$(awk "BEGIN { print ($twice - $once) / $count }")" "instructions per step"
+done
+for links in 2 3; do
+    once=$(instructions "$target/release/estimate" $links 1000)
+    twice=$(instructions "$target/release/estimate" $links 2000)
+    put "estimate-$links-rk4" "$(awk "BEGIN { print ($twice - $once) / 1000 }")" "instructions per step"
 done
 
 # Whose instructions they are: those of the arm, in a step of the arm and in one of the 1-DOF service.

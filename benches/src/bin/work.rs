@@ -4,8 +4,7 @@
 //!
 //! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. `step-LINKS-METHOD-WHAT` is a step of
 //! the live arm's simulation; all start bent and at rest with a setpoint at their equilibrium's side, so that none diverges. WHAT is
-//! `free`, `pid`, `pd` (no integral), `pi` (no damping) or `pushed` (`pid` under a disturbance of zeros), with `weightless` before it. `estimate-LINKS-METHOD`
-//! is the estimate of the step ahead, which the live arm makes ten times a second for whoever listens.
+//! `free`, `pid`, `pd` (no integral), `pi` (no damping) or `pushed` (`pid` under a disturbance of zeros), with `weightless` before it.
 
 use std::hint::black_box;
 
@@ -14,7 +13,6 @@ use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
 use pendularm::math::pid::Gains;
 use pendularm::report::experiments::step_scene::{ready, undamped};
-use pendularm::study::error_estimate::estimate;
 
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
@@ -32,17 +30,6 @@ where
     }
     assert_eq!(simulation.advance(count), count);
     black_box(simulation.state());
-}
-
-/// The local error of the step ahead of the arm under its controller, again and again.
-fn estimates<const N: usize>(method: Method, count: u64)
-where
-    Gains<N>: Default,
-{
-    let simulation = ready::<N>(9.81, true, true, method);
-    for _ in 0..count {
-        black_box(estimate(black_box(&simulation)));
-    }
 }
 
 fn particle(method: Method, function: &str, count: u64) {
@@ -63,8 +50,6 @@ fn main() {
     match parts.as_slice() {
         ["step", "2", method, what] => step::<2>(method.parse().expect("a method"), what, count),
         ["step", "3", method, what] => step::<3>(method.parse().expect("a method"), what, count),
-        ["estimate", "2", method] => estimates::<2>(method.parse().expect("a method"), count),
-        ["estimate", "3", method] => estimates::<3>(method.parse().expect("a method"), count),
         ["particle", method, "constant"] => particle(method.parse().expect("a method"), "1", count),
         ["particle", method, "cosine"] => {
             particle(method.parse().expect("a method"), "cos(2*t)", count)

@@ -1,0 +1,38 @@
+//! The live arm's estimate of its error in the step ahead, so many times: what `scripts/measure-work.sh` counts the
+//! instructions of.
+//!
+//! `cargo run --release --bin estimate -- LINKS COUNT`
+//!
+//! Counting `COUNT` and twice `COUNT` and taking the difference leaves out the start of the program. A program of its own:
+//! where estimates are compiled beside steps, the compiler shares code between them and a step takes up to 3 % more.
+
+use std::hint::black_box;
+
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pendularm::report::experiments::step_scene::ready;
+use pendularm::study::error_estimate::estimate;
+
+/// The arm under its controller, stepped by Runge-Kutta 4.
+fn estimates<const N: usize>(count: u64)
+where
+    Gains<N>: Default,
+{
+    let simulation = ready::<N>(9.81, true, true, Method::Rk4);
+    for _ in 0..count {
+        black_box(estimate(black_box(&simulation)));
+    }
+}
+
+fn main() {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let [links, count] = arguments.as_slice() else {
+        panic!("usage: estimate LINKS COUNT");
+    };
+    let count: u64 = count.parse().expect("a number");
+    match links.as_str() {
+        "2" => estimates::<2>(count),
+        "3" => estimates::<3>(count),
+        _ => panic!("LINKS must be 2 or 3, got {links}"),
+    }
+}
