@@ -1,10 +1,8 @@
 # Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
-# Needs: `root` (this project). Sets: `benches`, `built`,
-# and `clients` for those programs that are only the clients of another. A kept run names the processor, never the machine or a path.
+# Needs: `root` (this project). Sets: `benches`, `built`. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches
 built=${CARGO_TARGET_DIR:-$benches/target}/release
-clients=${CARGO_TARGET_DIR:-$benches/target}/clients
 
 say() { echo "bench: $*"; }
 fail() { echo "bench: $*" >&2; exit 1; }

@@ -7,6 +7,6 @@ root=$(cd "$(dirname "$0")/.." && pwd)
 source "$root/benches/common.sh"
 
 (cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --profile clients --locked --quiet --bin load --bin attack --bin soak)
+(cd "$benches" && cargo build --release --locked --quiet --bin soak)
 environment "make soak MINUTES=${MINUTES:-1}${SEED:+ SEED=$SEED}${ONLY:+ ONLY=$ONLY}"
-exec "$clients/soak" "${CARGO_TARGET_DIR:-$root/target}/release/pendularm"
+exec "$built/soak" "${CARGO_TARGET_DIR:-$root/target}/release/pendularm"

@@ -19,12 +19,12 @@ trap 'rm -rf "$scratch"' EXIT
 
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --profile clients --locked --quiet --bin load --bin attack --bin soak)
+(cd "$benches" && cargo build --release --locked --quiet --bin attack)
 program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
 
 arguments=()
 case " ${ARGS:-} " in
-    *" --list "*) exec "$clients/attack" --list ;;
+    *" --list "*) exec "$built/attack" --list ;;
     *" --quick "*) ;;
     *) if (install_peers); then PATH=$PATH:/usr/sbin; arguments+=(--peers); else say "ours alone"; fi ;;
 esac
@@ -37,6 +37,6 @@ mkdir -p "$folder"
 } | tee "$folder/environment.txt"
 status=0
 # shellcheck disable=SC2086 # arguments, several
-"$clients/attack" "$program" "${arguments[@]}" ${ARGS:-} | tee "$folder/table.txt" || status=$?
+"$built/attack" "$program" "${arguments[@]}" ${ARGS:-} | tee "$folder/table.txt" || status=$?
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/attack"
 exit $status

@@ -25,7 +25,7 @@ trap cleanup EXIT
 install_peers
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --profile clients --locked --quiet --bin load --bin attack --bin soak)
+(cd "$benches" && cargo build --release --locked --quiet --bin load)
 program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
 
 # Waits until something listens on port $1; $2 is who it should be.
@@ -39,7 +39,7 @@ await() {
     fail "$2 does not listen"
 }
 
-{ read -r redis_port; read -r mosquitto_port; } < <("$clients/load" ports 2)
+{ read -r redis_port; read -r mosquitto_port; } < <("$built/load" ports 2)
 
 # Every setting that would drop a message or write one to a disk is off.
 redis-server --bind 127.0.0.1 --port "$redis_port" --dir "$scratch" --save '' --appendonly no --maxclients 2000 \
@@ -80,6 +80,6 @@ mkdir -p "$folder"
     echo "peers:     $(redis-server --version | sed 's/ sha=.*//'); $(mosquitto -h | sed -n 1p)"
 } | tee "$folder/environment.txt"
 # shellcheck disable=SC2086 # arguments, several
-"$clients/load" "pendularm=$address=$pendularm" "redis=127.0.0.1:$redis_port=$redis" \
+"$built/load" "pendularm=$address=$pendularm" "redis=127.0.0.1:$redis_port=$redis" \
     "mosquitto=127.0.0.1:$mosquitto_port=$mosquitto" ${ARGS:-} | tee "$folder/summary.txt"
 [ "${KEEP:-}" != 1 ] || say "kept in benches/results/$(basename "$(dirname "$folder")")/load"
