@@ -275,7 +275,7 @@ fn distance_figure(distances: &[Distance]) -> Figure {
     }
     Figure::new(
         "behind",
-        "Sending velocities along keeps the arm near a setpoint that moves",
+        "Velocities sent along keep it nearer",
         "The same path with the default gains and steps of a 1024th of a second, from rest where it begins. The \
          setpoint is held between two moves, its velocity too.",
         &keys,
