@@ -196,6 +196,14 @@ class BlowUp(Lesson):
         self.assertIn("Advised: ", self.page.text("#limit-text"))
         self.assertNotIn(" ns", self.page.text("#limit-text"))
 
+    def test_the_map_stays_where_it_is_when_the_reason_comes(self):
+        self.page.click("#lesson-stiff")
+        self.page.until("document.querySelector('#why-text').textContent !== ''")
+        top = "document.querySelector('#map').getBoundingClientRect().top"
+        # The reason is a paragraph more or less with each setting: a click aimed at the map must not land beside it.
+        with_reason = self.page.run(top)
+        self.assertEqual(self.page.run(f"(document.querySelector('#why-text').textContent = '', {top})"), with_reason)
+
     def test_a_click_in_the_map_brings_an_arm_that_has_diverged_back(self):
         self.page.click("#lesson-stiff")
         self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
