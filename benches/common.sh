@@ -1,8 +1,12 @@
 # Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
-# Needs: `root` (this project). Sets: `benches`, `built`. A kept run names the processor, never the machine or a path.
+# Needs: `root` (this project). Sets: `benches`, `built`, `core`. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches
 built=${CARGO_TARGET_DIR:-$benches/target}/release
+
+# The last core, which interrupts visit least; without taskset, wherever the system likes.
+core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
+pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }
 
 say() { echo "bench: $*"; }
 fail() { echo "bench: $*" >&2; exit 1; }

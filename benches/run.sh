@@ -5,10 +5,6 @@ set -euo pipefail
 root=$(cd "$(dirname "$0")/.." && pwd)
 source "$root/benches/common.sh"
 
-# The last core, which interrupts visit least; without taskset, wherever the system likes.
-core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
-pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }
-
 # Instructions per call: exact on a given compiler, whatever else the machine does.
 instructions() {
     command -v valgrind >/dev/null || { echo "valgrind is not installed: no instruction counts"; return; }

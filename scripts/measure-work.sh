@@ -32,17 +32,21 @@ instructions() { # command...: instructions executed
 echo "name,value,unit" >"$scratch/work.csv"
 put() { echo "$1,$2,$3" >>"$scratch/work.csv"; }
 
+count_step() { # name, count, program that takes a count last...: instructions of a step, the start left out
+    local name=$1 count=$2 once twice
+    shift 2
+    once=$(instructions "$@" "$count")
+    twice=$(instructions "$@" $((2 * count)))
+    put "$name" "$(awk "BEGIN { print ($twice - $once) / $count }")" "instructions per step"
+}
+
 count=20000
 for variant in step-2-{euler,midpoint,verlet,rk4}-free step-2-rk4-{weightless,pd,pi,pid,pushed,weightless-pd} \
     step-3-rk4-{free,weightless,pd,pid} particle-rk4-{constant,cosine}; do
-    once=$(instructions "$target/release/work" "$variant" $count)
-    twice=$(instructions "$target/release/work" "$variant" $((2 * count)))
-    put "$variant" "$(awk "BEGIN { print ($twice - $once) / $count }")" "instructions per step"
+    count_step "$variant" $count "$target/release/work" "$variant"
 done
 for links in 2 3; do
-    once=$(instructions "$target/release/estimate" $links 1000)
-    twice=$(instructions "$target/release/estimate" $links 2000)
-    put "estimate-$links-rk4" "$(awk "BEGIN { print ($twice - $once) / 1000 }")" "instructions per step"
+    count_step "estimate-$links-rk4" 1000 "$target/release/estimate" $links
 done
 
 # Whose instructions they are: those of the arm, in a step of the arm and in one of the 1-DOF service.

@@ -29,7 +29,7 @@ DURATION, START, GRAVITY = 4.0, (0.3, 0.2), 9.81
 TARGETS = (1e-3, 1e-6, 1e-9)
 REPEATED, REPEATS, LONGEST = 0.02, 3, 1.0
 TOLERANCES = [10.0 ** (-half / 2) for half in range(4, 29)]
-# Of first and of second order: what a sweep that ends at a second a run cannot reach is no fault.
+# Methods of first and of second order: a sweep that ends at a second a run cannot reach the finer errors, and that is no fault.
 LOW_ORDER = ("euler", "midpoint", "verlet", "implicitfast")
 # A reference whose own uncertainty is larger would judge nobody.
 UNCERTAINTY = 1e-20

@@ -8,10 +8,8 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 source "$root/benches/common.sh"
 here=$benches/equal_error
 venv=$benches/peers/.venv
-core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
 cc=${CC:-gcc}
 cxx=${CXX:-g++}
-pinned() { if command -v taskset >/dev/null; then taskset -c "$core" "$@"; else "$@"; fi; }
 
 for tool in python3 "$cc" "$cxx" cargo; do
     command -v "$tool" >/dev/null || fail "$tool is needed"

@@ -164,36 +164,27 @@ impl<const N: usize, const M: usize> System<f64, SVector<f64, M>> for FirstOrder
 fn ode_solvers<const N: usize, const M: usize>(truth: &[f64], arm: &Arm<N>) {
     let first = || SVector::<f64, M>::from_fn(|i, _| if i < N { START.0 } else { START.1 });
     let angles = |y: &[f64]| -> [f64; N] { std::array::from_fn(|i| y[i]) };
-    for tolerance in tolerances() {
-        line(truth, "ode_solvers Dopri5", tolerance, || {
-            let mut solver = Dopri5::new(
-                FirstOrder(*arm),
-                0.0,
-                DURATION,
-                DURATION,
-                black_box(first()),
-                tolerance,
-                tolerance,
-            );
-            solver.set_output(OutputType::Sparse);
-            solver.integrate().ok()?;
-            solver.y_out().last().map(|y| angles(y.as_slice()))
-        });
+    // The two have the same functions and no trait in common.
+    macro_rules! sweep {
+        ($solver:ident, $name:literal) => {
+            for tolerance in tolerances() {
+                line(truth, $name, tolerance, || {
+                    let mut solver = $solver::new(
+                        FirstOrder(*arm),
+                        0.0,
+                        DURATION,
+                        DURATION,
+                        black_box(first()),
+                        tolerance,
+                        tolerance,
+                    );
+                    solver.set_output(OutputType::Sparse);
+                    solver.integrate().ok()?;
+                    solver.y_out().last().map(|y| angles(y.as_slice()))
+                });
+            }
+        };
     }
-    for tolerance in tolerances() {
-        line(truth, "ode_solvers Dop853", tolerance, || {
-            let mut solver = Dop853::new(
-                FirstOrder(*arm),
-                0.0,
-                DURATION,
-                DURATION,
-                black_box(first()),
-                tolerance,
-                tolerance,
-            );
-            solver.set_output(OutputType::Sparse);
-            solver.integrate().ok()?;
-            solver.y_out().last().map(|y| angles(y.as_slice()))
-        });
-    }
+    sweep!(Dopri5, "ode_solvers Dopri5");
+    sweep!(Dop853, "ode_solvers Dop853");
 }

@@ -32,7 +32,7 @@ pub(crate) struct Shown<'a> {
 
 impl Shown<'_> {
     /// Brings the rows up to date with lanes that begin with theirs.
-    fn show<const N: usize>(self, lanes: &[Simulation<N>]) {
+    pub(crate) fn show<const N: usize>(self, lanes: &[Simulation<N>]) {
         let rows = self
             .position
             .chunks_exact_mut(N)
@@ -147,11 +147,6 @@ impl Piece<'_> {
         }));
         shown.show(lanes);
     }
-}
-
-/// Brings the arrays up to date, after a change that was no step.
-pub(crate) fn show<const N: usize>(lanes: &[Simulation<N>], shown: Shown<'_>) {
-    shown.show(lanes);
 }
 
 /// Kinetic plus potential energy of every lane \[J\].

@@ -157,7 +157,7 @@ impl Batch {
                 }
             }
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| lanes::show(lanes, shown))
+            self.windows.write(py, |shown| shown.show(lanes))
         })
     }
 
@@ -193,7 +193,7 @@ impl Batch {
                 }
             }
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| lanes::show(lanes, shown))
+            self.windows.write(py, |shown| shown.show(lanes))
         })
     }
 
@@ -313,7 +313,7 @@ impl Batch {
             let mut lanes = hold(py, lanes);
             lanes.iter_mut().for_each(|one| one.enable(data));
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| lanes::show(lanes, shown))
+            self.windows.write(py, |shown| shown.show(lanes))
         })
     }
 

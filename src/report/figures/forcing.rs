@@ -4,7 +4,7 @@
 //! rounding.
 
 use super::moving;
-use super::slope::slope;
+use super::slope::{AGREEMENT, as_expected, order_cell, slope};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
@@ -18,9 +18,6 @@ const ROUNDING: f64 = 1e-12;
 
 /// Runs that an order is fitted to, the finest that stand out from rounding.
 const FITTED: usize = 6;
-
-/// By how much an order may be off.
-const AGREEMENT: f64 = 0.25;
 
 struct Convergence {
     force: &'static Force,
@@ -36,8 +33,7 @@ impl Convergence {
     }
 
     fn as_expected(&self) -> Option<bool> {
-        let expected = f64::from((self.force.order)(self.method));
-        Some((self.order()? - expected).abs() <= AGREEMENT)
+        as_expected(self.order(), (self.force.order)(self.method))
     }
 }
 
@@ -161,13 +157,7 @@ fn table(lines: &[Convergence]) -> Table {
     for force in &FORCES {
         let mut row = vec![Cell::new(force.name), Cell::new(force.formula)];
         for line in lines.iter().filter(|line| line.force.name == force.name) {
-            let expected = (force.order)(line.method);
-            row.push(match (line.order(), line.as_expected()) {
-                (Some(order), Some(good)) => Cell::new(format!("{order:.2}"))
-                    .detail(format!("expected {expected}"))
-                    .class(if good { "good" } else { "bad" }),
-                _ => Cell::new("not seen").class("bad"),
-            });
+            row.push(order_cell(line.order(), (force.order)(line.method)));
         }
         table.rows.push(row);
     }

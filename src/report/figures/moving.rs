@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** an order is fitted where truncation and hold are all there is.
 
-use super::slope::slope;
+use super::slope::{AGREEMENT, as_expected, order_cell, slope};
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
@@ -25,9 +25,6 @@ const COARSE: f64 = 1e-2;
 /// Runs that an order is fitted to, the finest.
 const FITTED: usize = 3;
 
-/// By how much an order may be off.
-const AGREEMENT: f64 = 0.25;
-
 /// Steps between two moves of the setpoint: each, five (as the action `follow_joint_trajectory` moves it), 60 Hz, …
 const EVERY: [u64; 7] = [1, 2, 5, 10, 17, 50, 100];
 
@@ -46,8 +43,7 @@ impl MovingLine {
     }
 
     fn as_expected(&self) -> Option<bool> {
-        let expected = f64::from(self.behind.order(self.method));
-        Some((self.order()? - expected).abs() <= AGREEMENT)
+        as_expected(self.order(), self.behind.order(self.method))
     }
 
     /// Timestep and error nearest to a millisecond.
@@ -226,13 +222,7 @@ fn table(lines: &[MovingLine]) -> Table {
     for behind in LookedAt::ALL {
         let mut row = vec![Cell::new(behind.name())];
         for line in lines.iter().filter(|line| line.behind == behind) {
-            let expected = behind.order(line.method);
-            row.push(match (line.order(), line.as_expected()) {
-                (Some(order), Some(good)) => Cell::new(format!("{order:.2}"))
-                    .detail(format!("expected {expected}"))
-                    .class(if good { "good" } else { "bad" }),
-                _ => Cell::new("not seen").class("bad"),
-            });
+            row.push(order_cell(line.order(), behind.order(line.method)));
         }
         table.rows.push(row);
     }
