@@ -1,6 +1,7 @@
 //! A number of the arm's formulas: one for one arm, or a register full of them, a lane for each of several arms.
 //!
-//! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
+//! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes; methods need its
+//! [`Arithmetic`] alone, which numbers of more digits have too. An operation is
 //! done in all lanes alike; the two that have to look at a lane by itself, the bound of an integral and the quadrant of
 //! an angle, select and do not branch.
 //!
@@ -30,8 +31,8 @@ macro_rules! entries {
 }
 pub(super) use entries;
 
-/// A number, or as many as a register has lanes. Constants are the same in all lanes.
-pub trait Number:
+/// Sums, products and quotients of numbers, and with constants.
+pub trait Arithmetic:
     Copy
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -44,7 +45,10 @@ pub trait Number:
     /// `value` in as many lanes as `self` has.
     #[must_use]
     fn like(self, value: f64) -> Self;
+}
 
+/// A number, or as many as a register has lanes. Constants are the same in all lanes.
+pub trait Number: Arithmetic {
     /// The nearest number to `self` between `-limit` and `limit`; what is not a number stays so.
     #[must_use]
     fn clamped(self, limit: f64) -> Self;
@@ -64,13 +68,15 @@ pub trait Number:
     fn lanes_mut(&mut self) -> &mut [f64];
 }
 
-/// One arm.
-impl Number for f64 {
+impl Arithmetic for f64 {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         value
     }
+}
 
+/// One arm.
+impl Number for f64 {
     #[inline(always)]
     fn clamped(self, limit: f64) -> Self {
         self.clamp(-limit, limit)
