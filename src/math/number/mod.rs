@@ -1,18 +1,19 @@
 //! A number of the arm's formulas: one for one arm, or a register full of them, a lane for each of several arms.
 //!
-//! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes; methods need its
-//! [`Arithmetic`] alone, which numbers of more digits have too. An operation is
+//! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
 //! done in all lanes alike; the two that have to look at a lane by itself, the bound of an integral and the quadrant of
 //! an angle, select and do not branch.
 //!
 //! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next: so
 //! that a lane has the bits of the arm that is stepped alone, on every machine and in registers of every width.
 
+mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
 pub(super) use register::Register;
 
@@ -31,8 +32,8 @@ macro_rules! entries {
 }
 pub(super) use entries;
 
-/// Sums, products and quotients of numbers, and with constants.
-pub trait Arithmetic:
+/// A number, or as many as a register has lanes. Constants are the same in all lanes.
+pub trait Number:
     Copy
     + Add<Output = Self>
     + Sub<Output = Self>
@@ -45,10 +46,7 @@ pub trait Arithmetic:
     /// `value` in as many lanes as `self` has.
     #[must_use]
     fn like(self, value: f64) -> Self;
-}
 
-/// A number, or as many as a register has lanes. Constants are the same in all lanes.
-pub trait Number: Arithmetic {
     /// The nearest number to `self` between `-limit` and `limit`; what is not a number stays so.
     #[must_use]
     fn clamped(self, limit: f64) -> Self;
@@ -68,15 +66,13 @@ pub trait Number: Arithmetic {
     fn lanes_mut(&mut self) -> &mut [f64];
 }
 
-impl Arithmetic for f64 {
+/// One arm.
+impl Number for f64 {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         value
     }
-}
 
-/// One arm.
-impl Number for f64 {
     #[inline(always)]
     fn clamped(self, limit: f64) -> Self {
         self.clamp(-limit, limit)

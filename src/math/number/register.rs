@@ -6,7 +6,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use fearless_simd::prelude::*;
 
-use super::{Arithmetic, Number};
+use super::Number;
 
 /// As many numbers as a register of `S` has lanes.
 #[derive(Clone, Copy)]
@@ -86,14 +86,12 @@ impl<S: Simd> Mul<f64> for Register<S> {
 }
 
 /// Several arms.
-impl<S: Simd> Arithmetic for Register<S> {
+impl<S: Simd> Number for Register<S> {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         Self::splat(self.0.token(), value)
     }
-}
 
-impl<S: Simd> Number for Register<S> {
     #[inline(always)]
     fn clamped(self, limit: f64) -> Self {
         let (least, most) = (self.like(-limit).0, self.like(limit).0);
