@@ -38,6 +38,7 @@ use crate::cbor;
 use crate::client::{Client, Door, Received};
 use crate::json::Json;
 use crate::stage::{Manner, Stage, run, run_apart, scarce};
+use text::{TOPICS, VALUES, fitting, put, quoted, service_name, service_of, topic_of};
 
 /// Most steps of one execution, and its number of clients.
 const MAX_STEPS: usize = 48;
