@@ -102,7 +102,7 @@ impl Method {
     }
 }
 
-/// What is known of a method, beside its steps.
+/// All that is known of a method, beside its steps.
 struct Facts {
     name: &'static str,
     order: u32,

@@ -2,7 +2,7 @@
 //!
 //! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
 //! until numbers end. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
-//! fastest link. [`turn_per_step`](crate::math::integrator::Method::turn_per_step) is what every method was seen to carry.
+//! fastest link. [`turn_per_step`] is what every method was seen to carry.
 //!
 //! | motion | speed Ω assumed |
 //! | --- | --- |
@@ -18,6 +18,8 @@
 //! dampings the speed assumed was 0.5 to 2.9 times the true one.
 //!
 //! **Invariant:** pure and cheap, some 3 µs: it is asked for at every tick.
+//!
+//! [`turn_per_step`]: crate::math::integrator::Method::turn_per_step
 
 #![allow(
     clippy::indexing_slicing,

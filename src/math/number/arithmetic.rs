@@ -1,5 +1,7 @@
-//! What a method's steps ask of their numbers: less than dynamics and control do, so that numbers of more digits can be
+//! Arithmetic as a method's steps need it: less than dynamics and control do, so that numbers of more digits can be
 //! stepped too.
+//!
+//! **Invariant:** for a number of the arm's formulas it is that number's own.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -64,7 +64,7 @@ fn closed_form(method: Method, w: f64, d: f64) -> bool {
             det < 1.0 && 1.0 + trace + det > 0.0 && 1.0 - trace + det > 0.0
         }
         Method::Verlet => d < 2.0 && w < 4.0 - 2.0 * d + d * d,
-        // |R(s)| of the two roots s = -d/2 ± sqrt(d²/4 - w), of a Runge-Kutta method of as many evaluations as its order.
+        // |R(s)| of the roots s = -d/2 ± sqrt(d²/4 - w), for Runge-Kutta methods of as many evaluations as their order.
         _ => {
             let half = d * d / 4.0 - w;
             let r = |re: f64, im: f64| {
