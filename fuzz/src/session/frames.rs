@@ -1,4 +1,4 @@
-//! What is sent for a deed, noted where an answer is owed.
+//! Frames that are sent for a deed, noted where an answer is owed.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What one client hears, beside what it must.
+//! All that one client hears, beside what it must.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What is light beside what is heavy, on the pool.
+//! Light requests beside heavy ones, on the pool.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What is refused, and in which words.
+//! Targets that are refused, and in which words.
 
 use super::*;
 

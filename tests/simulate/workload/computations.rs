@@ -1,4 +1,4 @@
-//! What takes its time: computations, goals, trials.
+//! Requests that take their time: computations, goals, trials.
 
 use super::*;
 
