@@ -1,4 +1,4 @@
-//! What clients do, as the fuzzer draws it.
+//! Scripts: all that clients do, as the fuzzer draws it.
 
 use super::*;
 

@@ -7,7 +7,7 @@
 //! Source: Dekker, *Numer. Math.* 18 (1971); Hida, Li and Bailey, *Library for double-double and quad-double
 //! arithmetic* (2007).
 //!
-//! **Invariant:** shares nothing with the arm's own dynamics, and [`two_sum`] with its sums, so that a mistake cannot be
+//! **Invariant:** shares nothing with the arm's own dynamics, and [`two_sum`] with its sums, so that a mistake is not
 //! in both.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
