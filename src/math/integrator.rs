@@ -13,7 +13,7 @@
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.1; for Verlet, Swope
 //! et al., *J. Chem. Phys.* 76 (1982), with the velocity predicted by `v + h a₁` for the second evaluation.
 //!
-//! All that is known of a method by itself stands here: its [`Facts`] and its steps, over any numbers.
+//! All that is known of a method by itself stands here: its facts and its steps, over any numbers.
 //!
 //! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
 
