@@ -158,10 +158,14 @@ impl Outbox {
             if taken > 0 && bytes > max_bytes {
                 break;
             }
-            let frame = next.split_to(length);
-            if next.is_empty() {
-                queue.pop_front();
-            }
+            let frame = if length < next.len() {
+                next.split_to(length)
+            } else {
+                let Some((_, whole)) = queue.pop_front() else {
+                    break;
+                };
+                whole
+            };
             if !is_response {
                 self.topic_bytes -= length;
             }

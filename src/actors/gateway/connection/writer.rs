@@ -37,10 +37,11 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
 
 /// Waits where many are written to. Responses wait for no turn.
 async fn wait_for_turn(shared: &Shared) {
-    if let Some(bytes) = shared.outgoing.topics_alone()
+    let outgoing = &shared.outgoing;
+    if let Some(bytes) = outgoing.topics_alone()
         && !turns::may_write(bytes)
     {
-        shared.outgoing.stand_in_line(turns::write(bytes)).await;
+        outgoing.wait_for_turn(bytes).await;
     }
 }
 
