@@ -28,7 +28,7 @@ const FREE_WRITES: usize = 256;
 /// Bytes of a message that count as another write.
 const LONG: usize = 4096;
 
-/// Whoever stands in a line.
+/// One who stands in a line.
 trait Waiting: 'static {
     /// It is their turn; false if they wait no longer.
     fn go_on(self) -> bool;
@@ -41,8 +41,8 @@ impl Waiting for oneshot::Sender<()> {
     }
 }
 
-/// Writes in its turn, where the line is worked through: a task woken for each of a thousand writers would cost half
-/// as much as their writes.
+/// Writes in its turn, where the line is worked through: its actor, if that were woken, would look at its mailbox and
+/// at all that it waits for, a thousand times for a message to a thousand subscribers.
 pub(super) trait WritesInTurn {
     /// Writes what there is to write, without waiting.
     fn write_in_turn(&self);

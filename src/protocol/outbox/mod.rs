@@ -265,6 +265,9 @@ impl Outbox {
 
     /// Queues the held back messages whose time has come.
     fn release(&mut self, now: Instant) {
+        if !self.is_throttled() {
+            return;
+        }
         while let Some(frame) = self.throttles.release(now) {
             let number = self.number();
             self.enqueue(number, frame);

@@ -147,6 +147,9 @@ impl Outgoing {
     /// Moves what is written next into `batch`.
     pub(super) fn take(&self, batch: &mut Vec<Bytes>) {
         let mut outbox = self.outbox.borrow_mut();
+        if outbox.is_empty() && !outbox.is_throttled() {
+            return;
+        }
         let now = self.now(&outbox).into_std();
         // Clients that end no line take what one read gives them for one frame.
         let frames = if self.singly.get() { 1 } else { BATCH_FRAMES };
