@@ -29,13 +29,13 @@ const FREE_WRITES: usize = 256;
 const LONG: usize = 4096;
 
 /// One who stands in a line.
-trait Waiting: 'static {
+trait StandsInLine: 'static {
     /// It is their turn; false if they wait no longer.
     fn go_on(self) -> bool;
 }
 
 /// A reader is a task, which is woken.
-impl Waiting for oneshot::Sender<()> {
+impl StandsInLine for oneshot::Sender<()> {
     fn go_on(self) -> bool {
         self.send(()).is_ok()
     }
@@ -48,7 +48,7 @@ pub(super) trait WritesInTurn {
     fn write_in_turn(&self);
 }
 
-impl Waiting for Weak<dyn WritesInTurn> {
+impl StandsInLine for Weak<dyn WritesInTurn> {
     fn go_on(self) -> bool {
         let writer = self.upgrade();
         if let Some(writer) = &writer {
@@ -94,7 +94,7 @@ pub(super) fn stand_in_line(bytes: usize, writer: Weak<dyn WritesInTurn>) {
     WRITERS.with(|line| line.stand(bytes, writer));
 }
 
-impl<W: Waiting> Line<W> {
+impl<W: StandsInLine> Line<W> {
     const fn new(at_a_time: usize, free: usize) -> Self {
         Self {
             at_a_time,
@@ -127,9 +127,9 @@ impl<W: Waiting> Line<W> {
 }
 
 /// The task; where it ends before its time, with the runtime that it ran in, no reader waits in vain.
-struct LineTask<W: Waiting>(Rc<Line<W>>);
+struct LineTask<W: StandsInLine>(Rc<Line<W>>);
 
-impl<W: Waiting> Drop for LineTask<W> {
+impl<W: StandsInLine> Drop for LineTask<W> {
     fn drop(&mut self) {
         self.0.at_work.set(false);
         self.0.left.set(self.0.free);
@@ -137,7 +137,7 @@ impl<W: Waiting> Drop for LineTask<W> {
     }
 }
 
-impl<W: Waiting> LineTask<W> {
+impl<W: StandsInLine> LineTask<W> {
     async fn run(self) {
         let line = &self.0;
         loop {

@@ -38,7 +38,7 @@ pub(super) struct Outgoing {
     /// Messages whose publishers wait until they have been offered to the socket.
     underway: RefCell<Vec<Underway>>,
     /// The writer, while the client is spoken with.
-    writer: RefCell<Option<Writer>>,
+    writer: RefCell<Option<WriterFuture>>,
     /// Wakes the actor, which polls the writer.
     actor: RefCell<Waker>,
     /// The writer stands in line.
@@ -48,7 +48,7 @@ pub(super) struct Outgoing {
     /// Since when responses have been waiting without a break.
     responses_since: Cell<Option<Instant>>,
     /// There is something for whoever waits for [`Outgoing::news`], and who that is.
-    told: Cell<bool>,
+    has_news: Cell<bool>,
     listener: RefCell<Waker>,
     /// When the connection was made.
     since: Instant,
@@ -56,12 +56,12 @@ pub(super) struct Outgoing {
     pub(super) backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
     account: Arc<Account>,
-    /// How many topic messages waited when the account was told last, their bytes, and those of responses.
+    /// Topic messages that waited when the account was last brought up to date, their bytes, and those of responses.
     counted: Cell<(usize, usize, usize)>,
 }
 
-/// Writes until the connection ends.
-type Writer = Pin<Box<dyn Future<Output = ()>>>;
+/// The writer at its work, until the connection ends.
+type WriterFuture = Pin<Box<dyn Future<Output = ()>>>;
 
 impl Outgoing {
     /// Nothing waits.
@@ -75,7 +75,7 @@ impl Outgoing {
             in_line: Cell::new(false),
             singly: Cell::new(false),
             responses_since: Cell::new(None),
-            told: Cell::new(false),
+            has_news: Cell::new(false),
             listener: RefCell::new(Waker::noop().clone()),
             since: Instant::now(),
             backlog: Arc::default(),
@@ -211,14 +211,14 @@ impl Outgoing {
 
     /// Wakes the writer.
     pub(super) fn tell(&self) {
-        self.told.set(true);
+        self.has_news.set(true);
         self.listener.borrow().wake_by_ref();
     }
 
     /// Waits until `holds` does, or until the writer is woken for another reason.
     pub(super) async fn news(&self, holds: impl Fn() -> bool) {
         poll_fn(|cx| {
-            if holds() || self.told.take() {
+            if holds() || self.has_news.take() {
                 return Poll::Ready(());
             }
             remember(&self.listener, cx);
@@ -233,9 +233,9 @@ impl Outgoing {
     pub(super) fn begin_writing(
         self: &Rc<Self>,
         writer: impl Future<Output = ()> + 'static,
-    ) -> Writing {
+    ) -> HasWriter {
         self.writer.replace(Some(Box::pin(writer)));
-        Writing(Rc::clone(self))
+        HasWriter(Rc::clone(self))
     }
 
     /// The actor has handled its messages: the writer does what it can.
@@ -348,9 +348,9 @@ impl WritesInTurn for Outgoing {
 }
 
 /// While this is there, the client has a writer.
-pub(super) struct Writing(Rc<Outgoing>);
+pub(super) struct HasWriter(Rc<Outgoing>);
 
-impl Drop for Writing {
+impl Drop for HasWriter {
     fn drop(&mut self) {
         self.0.writer.take();
     }

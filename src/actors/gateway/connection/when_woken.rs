@@ -62,3 +62,57 @@ impl<F: Future + Unpin> Future for WhenWoken<F> {
         Pin::new(&mut self.part).poll(&mut Context::from_waker(&waker))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::cell::{Cell, RefCell};
+    use std::future::poll_fn;
+
+    use super::*;
+
+    #[test]
+    fn it_is_polled_at_first_and_when_it_was_woken() {
+        let (polls, own) = (Cell::new(0), RefCell::new(None));
+        let mut part = WhenWoken::new(poll_fn(|cx| {
+            polls.set(polls.get() + 1);
+            own.replace(Some(cx.waker().clone()));
+            if polls.get() < 3 {
+                Poll::Pending
+            } else {
+                Poll::Ready(())
+            }
+        }));
+        let mut poll = || {
+            Pin::new(&mut part)
+                .poll(&mut Context::from_waker(Waker::noop()))
+                .is_ready()
+        };
+        let wake = || own.borrow().iter().for_each(Waker::wake_by_ref);
+        assert!(!poll() && !poll() && !poll());
+        assert_eq!(polls.get(), 1);
+        wake();
+        wake();
+        assert!(!poll() && !poll());
+        assert_eq!(polls.get(), 2);
+        wake();
+        assert!(poll());
+        assert_eq!(polls.get(), 3);
+    }
+
+    #[test]
+    fn it_is_polled_again_by_another_task() {
+        let polls = Cell::new(0);
+        let mut part = WhenWoken::new(poll_fn(|_| {
+            polls.set(polls.get() + 1);
+            Poll::<()>::Pending
+        }));
+        let task = Waker::from(Arc::new(PartWaker {
+            is_woken: AtomicBool::new(false),
+            task: Waker::noop().clone(),
+        }));
+        for waker in [Waker::noop(), &task, &task] {
+            let _ = Pin::new(&mut part).poll(&mut Context::from_waker(waker));
+        }
+        assert_eq!(polls.get(), 2);
+    }
+}
