@@ -22,8 +22,8 @@ const LIGHT_TURNS: u64 = 30_000;
 /// Turns within which a computation is done, once the client's one before is, for each client that may have some too: what takes longest
 /// of what honest clients have computed takes some 1,000 where nobody else computes.
 const COMPUTED_TURNS: u64 = 2_000;
-/// The same for what is computed in a few turns: in a hundred seeds none took more than 12.
-const SHORT_TURNS: u64 = 40;
+/// The same for what is computed in a few turns: in two thousand seeds one took 43, beside a flood, and all others fewer than 40.
+const SHORT_TURNS: u64 = 80;
 /// A light call's patience in virtual time.
 const LIGHT_TIME: Duration = Duration::from_secs(1);
 /// Once the faults are over, all that is owed has come within so much virtual time.
