@@ -10,7 +10,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
-use std::rc::Rc;
+use std::rc::{Rc, Weak};
 
 use tokio::sync::oneshot;
 
@@ -28,39 +28,73 @@ const FREE_WRITES: usize = 256;
 /// Bytes of a message that count as another write.
 const LONG: usize = 4096;
 
+/// One who stands in a line.
+trait StandsInLine: 'static {
+    /// It is their turn; false if they wait no longer.
+    fn go_on(self) -> bool;
+}
+
+/// A reader is a task, which is woken.
+impl StandsInLine for oneshot::Sender<()> {
+    fn go_on(self) -> bool {
+        self.send(()).is_ok()
+    }
+}
+
+/// Writes in its turn, where the line is worked through: its actor, if that were woken, would look at its mailbox and
+/// at all that it waits for, a thousand times for a message to a thousand subscribers.
+pub(super) trait WritesInTurn {
+    /// Writes what there is to write, without waiting.
+    fn write_in_turn(&self);
+}
+
+impl StandsInLine for Weak<dyn WritesInTurn> {
+    fn go_on(self) -> bool {
+        let writer = self.upgrade();
+        if let Some(writer) = &writer {
+            writer.write_in_turn();
+        }
+        writer.is_some()
+    }
+}
+
 /// A line of this thread.
-struct Line {
+struct Line<W> {
     at_a_time: usize,
     /// How many may go on without standing in line, and how many of these still may.
     free: usize,
     left: Cell<usize>,
     /// Each with the bytes that it is going to write.
-    waiting: RefCell<VecDeque<(usize, oneshot::Sender<()>)>>,
+    waiting: RefCell<VecDeque<(usize, W)>>,
     /// Whether there is a task at work.
     at_work: Cell<bool>,
 }
 
 thread_local! {
-    static READERS: Rc<Line> = Rc::new(Line::new(READERS_AT_A_TIME, 0));
-    static WRITERS: Rc<Line> = Rc::new(Line::new(WRITERS_AT_A_TIME, FREE_WRITES));
+    static READERS: Rc<Line<oneshot::Sender<()>>> = Rc::new(Line::new(READERS_AT_A_TIME, 0));
+    static WRITERS: Rc<Line<Weak<dyn WritesInTurn>>> =
+        Rc::new(Line::new(WRITERS_AT_A_TIME, FREE_WRITES));
 }
 
 /// Waits until it is this reader's turn.
 pub(super) async fn read() {
-    READERS.with(Rc::clone).turn(0).await;
+    let (go, goes) = oneshot::channel();
+    READERS.with(|line| line.stand(0, go));
+    // Where the task has ended before its time, the runtime that it ran in is ending too.
+    let _ = goes.await;
 }
 
-/// Whether a client may be written so many bytes at once; otherwise its writer waits for [`write()`].
+/// Whether a client may be written so many bytes at once; otherwise its writer has to [`stand_in_line`].
 pub(super) fn may_write(bytes: usize) -> bool {
-    WRITERS.with(Rc::clone).take(1 + bytes / LONG)
+    WRITERS.with(|line| line.take(1 + bytes / LONG))
 }
 
-/// Waits until it is the turn of this writer, which has so many bytes to write.
-pub(super) async fn write(bytes: usize) {
-    WRITERS.with(Rc::clone).turn(bytes).await;
+/// Puts a writer, which has so many bytes to write, at the end of the line.
+pub(super) fn stand_in_line(bytes: usize, writer: Weak<dyn WritesInTurn>) {
+    WRITERS.with(|line| line.stand(bytes, writer));
 }
 
-impl Line {
+impl<W: StandsInLine> Line<W> {
     const fn new(at_a_time: usize, free: usize) -> Self {
         Self {
             at_a_time,
@@ -72,7 +106,7 @@ impl Line {
     }
 
     /// Takes some of what is free; false if there is not enough of it, and then nothing is left.
-    fn take(self: Rc<Self>, cost: usize) -> bool {
+    fn take(self: &Rc<Self>, cost: usize) -> bool {
         let left = self.left.get().checked_sub(cost);
         self.left.set(left.unwrap_or(0));
         self.work();
@@ -80,25 +114,22 @@ impl Line {
     }
 
     /// Has the task work through the line, and make free again what has been taken.
-    fn work(self: Rc<Self>) {
+    fn work(self: &Rc<Self>) {
         if !self.at_work.replace(true) {
-            actix_rt::spawn(LineTask(self).run());
+            actix_rt::spawn(LineTask(Rc::clone(self)).run());
         }
     }
 
-    async fn turn(self: Rc<Self>, bytes: usize) {
-        let (go, goes) = oneshot::channel();
-        self.waiting.borrow_mut().push_back((bytes, go));
+    fn stand(self: &Rc<Self>, bytes: usize, waiting: W) {
+        self.waiting.borrow_mut().push_back((bytes, waiting));
         self.work();
-        // Where the task has ended before its time, the runtime that it ran in is ending too.
-        let _ = goes.await;
     }
 }
 
-/// The task; where it ends before its time, with the runtime that it ran in, nobody waits in vain.
-struct LineTask(Rc<Line>);
+/// The task; where it ends before its time, with the runtime that it ran in, no reader waits in vain.
+struct LineTask<W: StandsInLine>(Rc<Line<W>>);
 
-impl Drop for LineTask {
+impl<W: StandsInLine> Drop for LineTask<W> {
     fn drop(&mut self) {
         self.0.at_work.set(false);
         self.0.left.set(self.0.free);
@@ -106,7 +137,7 @@ impl Drop for LineTask {
     }
 }
 
-impl LineTask {
+impl<W: StandsInLine> LineTask<W> {
     async fn run(self) {
         let line = &self.0;
         loop {
@@ -116,7 +147,7 @@ impl LineTask {
                     return;
                 };
                 // One that has ended meanwhile takes no turn.
-                if next.send(()).is_ok() {
+                if next.go_on() {
                     going += 1;
                     bytes += wanted;
                 }

@@ -158,10 +158,14 @@ impl Outbox {
             if taken > 0 && bytes > max_bytes {
                 break;
             }
-            let frame = next.split_to(length);
-            if next.is_empty() {
-                queue.pop_front();
-            }
+            let frame = if length < next.len() {
+                next.split_to(length)
+            } else {
+                let Some((_, whole)) = queue.pop_front() else {
+                    break;
+                };
+                whole
+            };
             if !is_response {
                 self.topic_bytes -= length;
             }
@@ -261,6 +265,9 @@ impl Outbox {
 
     /// Queues the held back messages whose time has come.
     fn release(&mut self, now: Instant) {
+        if !self.is_throttled() {
+            return;
+        }
         while let Some(frame) = self.throttles.release(now) {
             let number = self.number();
             self.enqueue(number, frame);

@@ -22,9 +22,14 @@ impl Outgoing {
     /// behind what does. Feedback of a goal is always ready.
     pub(super) fn accept(self: &Rc<Self>, message: Deliver) {
         let waits = self.is_encoding() && !matches!(message.frames, Frames::Feedback(_));
-        if !waits && self.pass(&message) {
+        let left = if waits {
+            Some(message)
+        } else {
+            self.pass(message)
+        };
+        let Some(message) = left else {
             return;
-        }
+        };
         let mut unencoded = self.unencoded.borrow_mut();
         self.count_dropped(unencoded.push(message));
         if !std::mem::replace(&mut unencoded.at_work, true) {
@@ -37,15 +42,13 @@ impl Outgoing {
         self.unencoded.borrow().at_work
     }
 
-    /// Puts messages that are ready into the outbox; returns false if these are not.
-    fn pass(&self, message: &Deliver) -> bool {
-        match &message.frames {
-            Frames::Plain(frame) | Frames::Feedback(frame) => {
-                self.push(&message.topic, frame.clone());
-            }
-            Frames::Encoded(encoded, newest) => {
+    /// Puts messages that are ready into the outbox; gives them back if they are not.
+    fn pass(&self, message: Deliver) -> Option<Deliver> {
+        match message.frames {
+            Frames::Plain(frame) | Frames::Feedback(frame) => self.push(&message.topic, frame),
+            Frames::Encoded(ref encoded, newest) => {
                 let Some(frames) = encoded.at_hand() else {
-                    return false;
+                    return Some(message);
                 };
                 // The first may be due; all others but the newest would be replaced by those.
                 let last = newest.map_or(0, |newest| frames.len().saturating_sub(newest));
@@ -55,7 +58,7 @@ impl Outgoing {
                 }
             }
         }
-        true
+        None
     }
 }
 
@@ -91,7 +94,7 @@ impl EncodingTask {
                 }
             }
             if let Some(outgoing) = self.0.upgrade() {
-                let _ = outgoing.pass(&message);
+                let _ = outgoing.pass(message);
                 outgoing.tell();
             }
             tokio::task::yield_now().await;

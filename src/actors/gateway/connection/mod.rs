@@ -27,6 +27,7 @@ mod unfinished;
 mod watched;
 #[cfg(feature = "web")]
 mod web;
+mod when_woken;
 mod writer;
 
 use std::future::poll_fn;
@@ -41,6 +42,7 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use self::gate::Gate;
 use self::reception::Reception;
 use self::shared::Shared;
+use self::when_woken::WhenWoken;
 pub use super::ends::Ends;
 use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
 use super::registry::Registry;
@@ -190,10 +192,10 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
             ends: self.ends,
         };
         let outgoing = Rc::clone(&self.shared.outgoing);
-        let mut serving = contained(reception.run(stream, outlets));
+        let mut course = WhenWoken::new(contained(reception.run(stream, outlets)));
         let served = poll_fn(move |cx| {
-            let polled = Pin::new(&mut serving).poll(cx);
-            outgoing.settle();
+            let polled = Pin::new(&mut course).poll(cx);
+            outgoing.write(cx);
             polled
         });
         ctx.spawn(served.into_actor(self).map(|served, _, ctx| {

@@ -3,24 +3,26 @@
 //!
 //! The connection's handlers put things in and the [writer](super::writer) takes them out. The writer is polled after
 //! each message that the actor has handled, so it looks for itself; whatever changes something from another task says
-//! so by [`Outgoing::tell`].
+//! so by [`Outgoing::tell`]. Where it stands in line, it is polled in its turn as well, and the actor is not.
 //!
 //! **Invariant:** nothing that borrows a cell here waits while it does.
 
 use std::cell::{Cell, RefCell};
 use std::future::poll_fn;
-use std::rc::Rc;
+use std::pin::Pin;
+use std::rc::{Rc, Weak};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::task::Poll;
+use std::task::{Context, Poll, Waker};
 
 use bytes::Bytes;
-use tokio::sync::Notify;
 use tokio::time::Instant;
 
 use super::unencoded::Unencoded;
 use crate::actors::gateway::limits::{BATCH_BYTES, BATCH_FRAMES, LINGER, STALL_LIMIT};
 use crate::actors::gateway::messages::{Throttle, Underway};
+use crate::actors::gateway::turns::{self, WritesInTurn};
+use crate::actors::panics::contain;
 use crate::actors::resources::budget::{Account, MESSAGES_LEFT, free_elsewhere};
 use crate::actors::resources::gauges::Gauges;
 use crate::protocol::outbox::Outbox;
@@ -35,20 +37,31 @@ pub(super) struct Outgoing {
     pub(super) unencoded: RefCell<Unencoded>,
     /// Messages whose publishers wait until they have been offered to the socket.
     underway: RefCell<Vec<Underway>>,
-    /// The writer waits for its turn.
+    /// The writer, while the client is spoken with.
+    writer: RefCell<Option<WriterFuture>>,
+    /// Wakes the actor, which polls the writer.
+    actor: RefCell<Waker>,
+    /// The writer stands in line.
     in_line: Cell<bool>,
     /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
     singly: Cell<bool>,
     /// Since when responses have been waiting without a break.
     responses_since: Cell<Option<Instant>>,
-    news: Notify,
+    /// There is something for whoever waits for [`Outgoing::news`], and who that is.
+    has_news: Cell<bool>,
+    listener: RefCell<Waker>,
     /// When the connection was made.
     since: Instant,
     /// Bytes of responses in the outbox, for the registry to look at.
     pub(super) backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
     account: Arc<Account>,
+    /// Topic messages that waited when the account was last brought up to date, their bytes, and those of responses.
+    counted: Cell<(usize, usize, usize)>,
 }
+
+/// The writer at its work, until the connection ends.
+type WriterFuture = Pin<Box<dyn Future<Output = ()>>>;
 
 impl Outgoing {
     /// Nothing waits.
@@ -57,14 +70,18 @@ impl Outgoing {
             outbox: RefCell::new(Outbox::new()),
             unencoded: RefCell::default(),
             underway: RefCell::default(),
+            writer: RefCell::default(),
+            actor: RefCell::new(Waker::noop().clone()),
             in_line: Cell::new(false),
             singly: Cell::new(false),
             responses_since: Cell::new(None),
-            news: Notify::new(),
+            has_news: Cell::new(false),
+            listener: RefCell::new(Waker::noop().clone()),
             since: Instant::now(),
             backlog: Arc::default(),
             gauges,
             account,
+            counted: Cell::default(),
         })
     }
 
@@ -130,6 +147,9 @@ impl Outgoing {
     /// Moves what is written next into `batch`.
     pub(super) fn take(&self, batch: &mut Vec<Bytes>) {
         let mut outbox = self.outbox.borrow_mut();
+        if outbox.is_empty() && !outbox.is_throttled() {
+            return;
+        }
         let now = self.now(&outbox).into_std();
         // Clients that end no line take what one read gives them for one frame.
         let frames = if self.singly.get() { 1 } else { BATCH_FRAMES };
@@ -191,43 +211,65 @@ impl Outgoing {
 
     /// Wakes the writer.
     pub(super) fn tell(&self) {
-        self.news.notify_one();
+        self.has_news.set(true);
+        self.listener.borrow().wake_by_ref();
     }
 
     /// Waits until `holds` does, or until the writer is woken for another reason.
     pub(super) async fn news(&self, holds: impl Fn() -> bool) {
-        let seen = poll_fn(|_| {
-            if holds() {
-                Poll::Ready(())
-            } else {
-                Poll::Pending
+        poll_fn(|cx| {
+            if holds() || self.has_news.take() {
+                return Poll::Ready(());
             }
-        });
-        tokio::select! {
-            biased;
-            () = seen => {}
-            () = self.news.notified() => {}
+            remember(&self.listener, cx);
+            Poll::Pending
+        })
+        .await;
+    }
+
+    // ---- the writer -------------------------------------------------------------------------------------------------
+
+    /// From now on this is the writer, until what is given is dropped.
+    pub(super) fn begin_writing(
+        self: &Rc<Self>,
+        writer: impl Future<Output = ()> + 'static,
+    ) -> HasWriter {
+        self.writer.replace(Some(Box::pin(writer)));
+        HasWriter(Rc::clone(self))
+    }
+
+    /// The actor has handled its messages: the writer does what it can.
+    pub(super) fn write(&self, cx: &mut Context<'_>) {
+        remember(&self.actor, cx);
+        self.go_on(cx);
+    }
+
+    /// Stands in line, in which so many bytes are to be written, while no response waits. Publishers wait as well.
+    pub(super) async fn wait_for_turn(self: &Rc<Self>, bytes: usize) {
+        if !self.in_line.replace(true) {
+            let this: Weak<Self> = Rc::downgrade(self);
+            turns::stand_in_line(bytes, this);
+        }
+        // It is polled in its turn, and behind the handler of a response.
+        let may_go_on = || !self.in_line.get() || self.has_responses();
+        while !may_go_on() {
+            self.news(may_go_on).await;
         }
     }
 
-    /// Waits in line for `turn`, while a response does not wait; publishers wait as well.
-    pub(super) async fn stand_in_line(&self, turn: impl Future<Output = ()>) {
-        self.in_line.set(true);
-        let line = InLine(self);
-        tokio::pin!(turn);
-        while !self.has_responses() {
-            tokio::select! {
-                biased;
-                () = &mut turn => break,
-                () = self.news(|| self.has_responses()) => {}
+    /// Polls the writer, counts what is left, and lets publishers go on. Its panic ends this client and nothing else.
+    fn go_on(&self, cx: &mut Context<'_>) {
+        let mut writer = self.writer.borrow_mut();
+        if let Some(writing) = writer.as_mut() {
+            let polled = contain(|| writing.as_mut().poll(cx));
+            if let Err(panic) = &polled {
+                tracing::error!(%panic, "a client's writer failed; its connection ends");
+            }
+            if !matches!(polled, Ok(Poll::Pending)) {
+                *writer = None;
             }
         }
-        drop(line);
-    }
-
-    /// The actor has handled its messages and the writer has done what it could: counts what is left, and lets
-    /// publishers go on.
-    pub(super) fn settle(&self) {
+        drop(writer);
         self.recount();
         if !self.in_line.get() {
             self.underway.borrow_mut().clear();
@@ -240,10 +282,13 @@ impl Outgoing {
     fn recount(&self) {
         let outbox = self.outbox.borrow();
         let (count, bytes) = self.unencoded.borrow().size();
-        self.backlog
-            .store(outbox.response_cost(), Ordering::Relaxed);
-        self.account
-            .queue(outbox.topic_count() + count, outbox.topic_bytes() + bytes);
+        let (count, bytes) = (outbox.topic_count() + count, outbox.topic_bytes() + bytes);
+        let responses = outbox.response_cost();
+        // Others look at these, in memory that is not at hand: mostly nothing waits, before and after.
+        if self.counted.replace((count, bytes, responses)) != (count, bytes, responses) {
+            self.backlog.store(responses, Ordering::Relaxed);
+            self.account.queue(count, bytes);
+        }
     }
 
     /// Gives up what is asked for when all clients together hold too much: topic messages as often as need be, and
@@ -294,11 +339,24 @@ impl Drop for Outgoing {
     }
 }
 
-/// While this is there, the writer waits for its turn.
-struct InLine<'a>(&'a Outgoing);
-
-impl Drop for InLine<'_> {
-    fn drop(&mut self) {
-        self.0.in_line.set(false);
+impl WritesInTurn for Outgoing {
+    fn write_in_turn(&self) {
+        self.in_line.set(false);
+        let actor = self.actor.borrow();
+        self.go_on(&mut Context::from_waker(&actor));
     }
+}
+
+/// While this is there, the client has a writer.
+pub(super) struct HasWriter(Rc<Outgoing>);
+
+impl Drop for HasWriter {
+    fn drop(&mut self) {
+        self.0.writer.take();
+    }
+}
+
+/// Keeps whom to wake.
+fn remember(whom: &RefCell<Waker>, cx: &Context<'_>) {
+    whom.borrow_mut().clone_from(cx.waker());
 }

@@ -107,8 +107,11 @@ impl Shared {
 
     /// So many bytes are on their way to the client: there may be room again.
     pub(super) fn written(&self, bytes: usize) {
+        let may_read = self.may_read();
         self.outgoing.written(bytes);
-        self.room.notify_one();
+        if !may_read {
+            self.room.notify_one();
+        }
         self.start_computation();
     }
 

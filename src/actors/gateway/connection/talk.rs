@@ -1,12 +1,12 @@
-//! A client that is spoken with: one task reads what it sends, the writer beside it sends what it is to get.
+//! A client that is spoken with: one task reads what it sends, the writer sends what it is to get.
 //!
 //! **Invariant:** where one of the two ends, the other has a bounded time.
 
-use std::pin::{Pin, pin};
 use std::rc::Rc;
 use std::time::Duration;
 
 use bytes::BytesMut;
+use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
@@ -46,7 +46,7 @@ impl Reception {
     pub(super) async fn talk<I, O>(&self, reader: Reader, input: I, output: O, first: BytesMut)
     where
         I: Inbound + 'static,
-        O: Outbound,
+        O: Outbound + 'static,
     {
         let shared = Rc::clone(&self.shared);
         let mut reading = Spawned(actix_rt::spawn(async move {
@@ -59,17 +59,21 @@ impl Reception {
                 shared.finish();
             }
         }));
-        let mut writing = pin!(writer::run(output, &self.shared));
+        let (end, mut ended) = oneshot::channel();
+        let shared = Rc::clone(&self.shared);
+        let _writing = self.shared.outgoing.begin_writing(async move {
+            let _ = end.send(writer::run(output, &shared).await);
+        });
         let all_written = tokio::select! {
             biased;
-            all_written = &mut writing => all_written,
+            all_written = &mut ended => all_written.unwrap_or(false),
             held = self.shared.outgoing.gives_way() => {
                 drop(reading);
-                return self.cut_off(held, writing).await;
+                return self.cut_off(held, ended).await;
             }
             () = self.shared.displaced.notified() => {
                 drop(reading);
-                return self.make_way(writing).await;
+                return self.make_way(ended).await;
             }
         };
         // If something still reads after this, it ends here.
@@ -82,7 +86,7 @@ impl Reception {
 
     /// Ends the connection of a client that held the most when all clients together held too much: what it had goes
     /// at once, and it is told why if it takes that within [`FAREWELL_TIME`].
-    async fn cut_off(&self, held: usize, writing: Pin<&mut impl Future<Output = bool>>) {
+    async fn cut_off(&self, held: usize, ended: oneshot::Receiver<bool>) {
         let shared = &self.shared;
         let id = shared.id.get();
         let why = format!("{HELD_MOST} ({} MB)", held.div_ceil(1_000_000));
@@ -110,14 +114,14 @@ impl Reception {
         let _ = self.finish.send(Finish).await;
         // A long frame in the middle of which it has stopped would have to be kept until it goes on.
         if shared.account.held() <= MODEST {
-            let _ = timeout(FAREWELL_TIME, writing).await;
+            let _ = timeout(FAREWELL_TIME, ended).await;
         }
     }
 }
 
 impl Reception {
     /// Ends the connection of a client that has lost its place: the registry knows it no longer, and another is served.
-    async fn make_way(&self, writing: Pin<&mut impl Future<Output = bool>>) {
+    async fn make_way(&self, ended: oneshot::Receiver<bool>) {
         let shared = &self.shared;
         shared.abandon_computations();
         let why = messages::status(Level::Error, DISPLACED, None);
@@ -125,7 +129,7 @@ impl Reception {
             .outgoing
             .push_response(shared.account.count(why), &[]);
         shared.finish();
-        let _ = timeout(FAREWELL_TIME, writing).await;
+        let _ = timeout(FAREWELL_TIME, ended).await;
     }
 }
 

@@ -2,7 +2,8 @@
 //! that is served.
 //!
 //! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
-//! put into the outbox is offered to the socket in the same turn. A client that takes nothing wakes it when it does.
+//! put into the outbox is offered to the socket in the same turn. Where it stands in line
+//! ([`turns`]), it is polled in its turn. A client that takes nothing wakes it when it does.
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 
@@ -37,10 +38,11 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
 
 /// Waits where many are written to. Responses wait for no turn.
 async fn wait_for_turn(shared: &Shared) {
-    if let Some(bytes) = shared.outgoing.topics_alone()
+    let outgoing = &shared.outgoing;
+    if let Some(bytes) = outgoing.topics_alone()
         && !turns::may_write(bytes)
     {
-        shared.outgoing.stand_in_line(turns::write(bytes)).await;
+        outgoing.wait_for_turn(bytes).await;
     }
 }
 
