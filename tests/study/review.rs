@@ -13,7 +13,7 @@ use pendularm::report::experiments::chaos::separation;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate_step;
-use pendularm::study::extrapolation::Follower;
+use pendularm::study::follower::Follower;
 use pendularm::study::motion::Motion;
 use pendularm::study::rollout::{Plan, Rollout};
 use pendularm::study::stability::{Rest, limit_held, limits};

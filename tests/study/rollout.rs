@@ -6,7 +6,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::{estimate, estimate_step};
-use pendularm::study::extrapolation::Follower;
+use pendularm::study::follower::Follower;
 use pendularm::study::rollout::{MAX_SAMPLES, Plan, Rollout, RolloutError};
 
 fn swing() -> Plan<2> {

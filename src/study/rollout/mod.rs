@@ -3,7 +3,7 @@
 //! The run is the live loop, [`Simulation`], from any state. Its reference obeys the very same control law, looked at
 //! on the same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what
 //! is left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost
-//! an error of first order that no method can mend.) A second reference, cut into other spans, says how far the first
+//! an error of first order that no method can mend.) A second reference, in steps half as long, says how far the first
 //! can be trusted: on a chaotic swing not beyond some twenty seconds.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
@@ -18,7 +18,7 @@ mod plan;
 
 pub use plan::{MAX_SAMPLES, MAX_STEPS, Plan, RolloutError};
 
-use super::extrapolation::Follower;
+use super::follower::Follower;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::energy;
@@ -87,9 +87,8 @@ impl<const N: usize> Rollout<N> {
         let simulation = plan.control.simulation(plan.start);
         let references = plan.reference.then(|| {
             [1, 2].map(|cuts| Reference {
-                follower: Follower::new(plan.start),
+                follower: Follower::new(plan.start).cut(cuts),
                 pid: simulation.pid().clone(),
-                cuts,
                 lost: false,
                 behind: Behind::default(),
             })
@@ -218,7 +217,7 @@ impl<const N: usize> Rollout<N> {
         let references = self.references.iter().flatten();
         self.evaluations()
             + references
-                .map(|one| one.follower.evaluations())
+                .map(|one| one.follower.coefficients())
                 .sum::<u64>()
     }
 
@@ -270,8 +269,6 @@ impl<const N: usize> Rollout<N> {
 struct Reference<const N: usize> {
     follower: Follower<N>,
     pid: Pid<N>,
-    /// Spans that every stretch is cut into.
-    cuts: u32,
     /// Whether the motion was too wild to be followed.
     lost: bool,
     behind: Behind<N>,
@@ -284,8 +281,8 @@ struct Behind<const N: usize> {
     steps: u64,
     /// Length of each \[s\].
     stretch: f64,
-    /// Spans that are left of the stretch that is being followed; 0 before one is begun.
-    spans: u32,
+    /// Whether the stretch is being followed.
+    begun: bool,
     /// The effort that drives the arm in it.
     effort: [f64; N],
 }
@@ -295,7 +292,7 @@ impl<const N: usize> Default for Behind<N> {
         Self {
             steps: 0,
             stretch: 0.0,
-            spans: 0,
+            begun: false,
             effort: [0.0; N],
         }
     }
@@ -317,37 +314,30 @@ impl<const N: usize> Reference<N> {
 
     /// Follows the run with about `work` evaluations at most, and says with how many.
     fn follow(&mut self, arm: &Arm<N>, work: u64) -> u64 {
-        let before = self.follower.evaluations();
+        let before = self.follower.coefficients();
         let bound = before.saturating_add(work);
         while self.behind.steps > 0 {
-            let timestep = self.behind.stretch;
-            let part = timestep / f64::from(self.cuts);
-            if self.behind.spans == 0 {
+            if !self.behind.begun {
+                let timestep = self.behind.stretch;
                 if self.pid.is_enabled() {
                     let control = self.pid.control(self.follower.state(), timestep);
                     self.behind.effort = control.effort;
                     self.pid.commit(control.integral);
                 }
-                self.behind.spans = self.cuts;
-                self.follower.begin(part);
+                self.follower.begin(timestep);
+                self.behind.begun = true;
             }
             match self.follower.go_on(arm, &self.behind.effort, bound) {
                 None => break,
                 Some(false) => {
                     self.lost = true;
                     self.behind.steps = 0;
-                    break;
                 }
-                Some(true) => {}
+                Some(true) => self.behind.steps -= 1,
             }
-            self.behind.spans -= 1;
-            if self.behind.spans == 0 {
-                self.behind.steps -= 1;
-            } else {
-                self.follower.begin(part);
-            }
+            self.behind.begun = false;
         }
-        self.follower.evaluations() - before
+        self.follower.coefficients() - before
     }
 }
 
