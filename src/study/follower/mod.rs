@@ -14,18 +14,27 @@ mod series;
 
 use super::matrix::largest;
 use crate::math::arm::{Arm, State};
+use crate::math::count::length_in_f64;
 use crate::math::integrator::two_sum;
 use series::{ORDER, Series};
 
 /// The least tolerance that makes a difference: below it rounding is all that is left.
 pub const ROUNDING: f64 = 1e-16;
 
-/// Coefficients after which a span is given up: the motion is too wild to be followed.
+/// Coefficients after which a span is given up: the motion is too wild to be followed. They are a thousand steps.
 const MAX_COEFFICIENTS: u64 = 20_000;
 
-/// A step that its series does not bear is tried that much shorter, and the next one that much longer than the last.
-const SHORTER: f64 = 0.9;
+/// Terms that have to be small before a series is believed to have come to its end. An arm that is let go at rest and
+/// stretched along the horizontal has three in a row that vanish between two that do not.
+const LAST: usize = 4;
+
+/// A step may be that much longer than the last.
 const LONGER: f64 = 1.25;
+
+/// A step that its series does not bear is tried that much shorter; where its last terms are [`MUCH`] too large, the
+/// other.
+const SHORTER: [f64; 2] = [0.95, 0.25];
+const MUCH: f64 = 1e9;
 
 /// A motion that is followed, rounding errors carried along.
 #[derive(Debug, Clone)]
@@ -35,10 +44,14 @@ pub struct Follower<const N: usize> {
     tolerance: f64,
     /// Order of the series where no span ends.
     order: usize,
+    /// Factors of [`SHORTER`], and what they leave of the last terms.
+    shorter: [(f64, f64); 2],
+    /// How many times the tolerance each of the last terms may be: a term of lower order is not asked for as much.
+    allowances: [f64; LAST],
     /// Parts that a step and a span are cut into, beyond what the tolerance asks for.
     cuts: f64,
     coefficients: u64,
-    /// The last step's length, as its series would have allowed it \[s\].
+    /// The last length of a step that a series allowed \[s\].
     step: f64,
     ahead: Ahead,
     series: Series<N>,
@@ -47,10 +60,10 @@ pub struct Follower<const N: usize> {
 /// The rest of a span.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Ahead {
+    /// The whole span \[s\].
+    span: f64,
     /// How much of it is left \[s\], and what rounding took from that.
     rest: (f64, f64),
-    /// The longest step \[s\].
-    longest: f64,
     /// Coefficients after which it is given up.
     bound: u64,
 }
@@ -62,16 +75,22 @@ impl<const N: usize> Follower<N> {
         Self::within(state, ROUNDING)
     }
 
-    /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; a
-    /// tolerance below [`ROUNDING`] is that.
+    /// An arm in the given state. A step leaves out at most `tolerance` times the way that the joints turn in it; it is
+    /// held between [`ROUNDING`] and 1.
     #[must_use]
     pub fn within(state: State<N>, tolerance: f64) -> Self {
-        let tolerance = tolerance.max(ROUNDING);
+        let tolerance = tolerance.max(ROUNDING).min(1.0);
+        let order = order_for(tolerance);
         Self {
             state,
             carry: State::rest(),
             tolerance,
-            order: order_for(tolerance),
+            order,
+            shorter: SHORTER.map(|factor| (factor, power(factor, order - LAST))),
+            allowances: std::array::from_fn(|i| {
+                let missing = length_in_f64(LAST - 1 - i) / length_in_f64(order);
+                tolerance.powf(-missing)
+            }),
             cuts: 1.0,
             coefficients: 0,
             step: f64::INFINITY,
@@ -111,8 +130,8 @@ impl<const N: usize> Follower<N> {
     /// A span \[s\] lies ahead, to be followed by [`Follower::go_on`].
     pub(super) fn begin(&mut self, span: f64) {
         self.ahead = Ahead {
+            span,
             rest: (span, 0.0),
-            longest: span / self.cuts,
             bound: self.coefficients.saturating_add(MAX_COEFFICIENTS),
         };
     }
@@ -138,26 +157,34 @@ impl<const N: usize> Follower<N> {
     }
 
     fn step(&mut self, arm: &Arm<N>, effort: &[f64; N]) {
-        let Ahead { rest, longest, .. } = self.ahead;
-        let whole = longest.min(rest.0);
+        let Ahead { span, rest, .. } = self.ahead;
+        let whole = (span / self.cuts).min(rest.0);
         self.series.begin(arm, &self.state, effort);
-        // A short span needs no long series.
         let mut small = 0;
-        let mut power = whole;
-        while self.series.order() < self.order && small < 2 {
-            self.series.extend();
-            power *= whole;
-            let excess = self.excess(self.series.order(), whole, power);
-            small = if excess <= 1.0 { small + 1 } else { 0 };
+        if whole > LONGER * LONGER * self.step {
+            while self.series.order() < self.order {
+                self.series.extend();
+            }
+        } else {
+            // A short step needs no long series.
+            let mut power = whole;
+            while self.series.order() < self.order && small < LAST {
+                self.series.extend();
+                power *= whole;
+                let term = self.excess(self.series.order(), whole, power);
+                small = if term <= 1.0 { small + 1 } else { 0 };
+            }
         }
         self.coefficients += self.series.order() as u64;
-        let is_whole = small == 2;
-        let h = if is_whole {
+        if small < LAST {
+            self.step = self.allowed((LONGER * self.step).min(span));
+        }
+        let cut = self.step / self.cuts;
+        let h = if small == LAST || cut >= whole {
             whole
         } else {
-            self.step = self.allowed((LONGER * self.step).min(whole));
             // Two steps of one length rather than a long one and a remnant.
-            (self.step / self.cuts).min(0.5 * rest.0)
+            cut.min(0.5 * rest.0)
         };
         let (dq, dv) = self.series.change(h);
         for i in 0..N {
@@ -174,40 +201,46 @@ impl<const N: usize> Follower<N> {
         };
     }
 
-    /// The longest step \[s\] up to `step` whose last two terms are as small as the tolerance asks for.
+    /// The longest step \[s\] up to `step` whose last terms are as small as the tolerance asks for.
     fn allowed(&self, mut step: f64) -> f64 {
-        let order = self.series.order();
-        loop {
-            let below = power(step, order - 1);
-            let excess = self.excess(order - 1, step, below).max(self.excess(order, step, below * step));
-            // What is not a number is not to be followed; the loop has to end.
-            if excess <= 1.0 || excess.is_nan() || step == 0.0 {
-                return step;
-            }
-            step *= if excess > 1e9 { 0.25 } else { SHORTER };
+        let first = self.order + 1 - LAST;
+        let mut of_order = power(step, first);
+        let mut excess = 0.0_f64;
+        for (order, allowance) in (first..).zip(self.allowances) {
+            excess = excess.max(self.excess(order, step, of_order) / allowance);
+            of_order *= step;
         }
+        // Terms fall with at least the power of the first of them, less 1 for what they are measured by.
+        while excess > 1.0 && step > 0.0 {
+            let (factor, of_terms) = self.shorter[usize::from(excess > MUCH)];
+            step *= factor;
+            excess *= of_terms;
+        }
+        step
     }
 
     /// How many times the terms of `order` in a step \[s\], of which that `power` is given, are what they may be.
     fn excess(&self, order: usize, step: f64, power: f64) -> f64 {
         let Series { angle, rate, .. } = &self.series;
         let of_angle = self.tolerance * step * (size(&rate[0]) + step * size(&rate[1]));
-        let of_rate = self.tolerance * step * (size(&rate[1]) + step * size(&rate[2])) + ROUNDING * size(&rate[0]);
+        let of_rate = self.tolerance * step * (size(&rate[1]) + step * size(&rate[2]))
+            + ROUNDING * size(&rate[0]);
         let angle = size(&angle[order]) * power / of_angle;
         let rate = size(&rate[order]) * power / of_rate;
         angle.max(rate)
     }
 }
 
-/// The order at which a step's length times its coefficients is cheapest for a tolerance (Jorba and Zou, section 3.3),
-/// and one more for what is estimated from the last two.
+/// The order at which the way that a step goes costs least for a tolerance: Jorba and Zou, section 3.3, where a
+/// coefficient costs in proportion to its order. Here it does so only in part, and a few orders more or less cost the
+/// same.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "between 1 and 20"
+    reason = "clamped to small whole numbers"
 )]
 fn order_for(tolerance: f64) -> usize {
-    ((1.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(4, ORDER)
+    ((1.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(6, ORDER)
 }
 
 fn power(base: f64, exponent: usize) -> f64 {

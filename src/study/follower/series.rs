@@ -29,8 +29,15 @@ pub(super) const ORDER: usize = 22;
 /// Coefficients of as many series as there are links.
 type PerLink<const N: usize> = [[f64; N]; ORDER + 1];
 
-/// Coefficients of one series for each two links, and one for each link with itself.
+/// Coefficients of a series for each two links: at `[d][i]` that of links `i` and `i - d`, or of link `i` alone for
+/// `d = 0`.
 type PerPair<const N: usize> = [[[f64; N]; N]; ORDER];
+
+/// Where the coefficient of an order stands in a series that is kept backwards, so that both factors of a convolution
+/// are read forwards.
+const fn backwards(order: usize) -> usize {
+    ORDER - 1 - order
+}
 
 /// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are reckoned from.
 #[derive(Debug, Clone)]
@@ -39,9 +46,10 @@ pub(super) struct Series<const N: usize> {
     order: usize,
     pub(super) angle: PerLink<N>,
     pub(super) rate: PerLink<N>,
-    acceleration: PerLink<N>,
-    squared_rate: PerLink<N>,
-    /// Of `φ_i - φ_j` and, for a link with itself, of `φ_i`: sine, cosine, and the rate of the angle.
+    /// Accelerations and squared rates, backwards.
+    acceleration: [[f64; N]; ORDER],
+    squared_rate: [[f64; N]; ORDER],
+    /// Sine and cosine of the angle from one link to the other, and its rate, backwards.
     sin: PerPair<N>,
     cos: PerPair<N>,
     turning: PerPair<N>,
@@ -51,7 +59,7 @@ pub(super) struct Series<const N: usize> {
 /// The constants of the equation of motion, and its matrix where the series begins.
 #[derive(Debug, Clone)]
 struct Equation<const N: usize> {
-    /// `K_ij` \[kg m²\]; on the diagonal `W_i` \[N m\] instead, the factor of `cos φ_i`.
+    /// At `[d][i]` the `K_ij` of links `i` and `i - d` \[kg m²\]; `W_i` \[N m\] for `d = 0`.
     factors: [[f64; N]; N],
     /// The matrix where the series begins, eliminated: inverse pivots on the diagonal, multipliers above it.
     eliminated: [[f64; N]; N],
@@ -63,8 +71,8 @@ impl<const N: usize> Series<N> {
             order: 0,
             angle: [[0.0; N]; ORDER + 1],
             rate: [[0.0; N]; ORDER + 1],
-            acceleration: [[0.0; N]; ORDER + 1],
-            squared_rate: [[0.0; N]; ORDER + 1],
+            acceleration: [[0.0; N]; ORDER],
+            squared_rate: [[0.0; N]; ORDER],
             sin: [[[0.0; N]; N]; ORDER],
             cos: [[[0.0; N]; N]; ORDER],
             turning: [[[0.0; N]; N]; ORDER],
@@ -86,95 +94,105 @@ impl<const N: usize> Series<N> {
         let (sin, cos) = trig::sin_cos(position);
         for i in 0..N {
             // The joints between two links turn one into the other: no angle is summed, and none loses digits.
-            let (mut s, mut c) = (0.0, 1.0);
-            for j in (0..=i).rev() {
-                if i != j {
-                    (self.sin[0][i][j], self.cos[0][i][j]) = (s, c);
-                    (self.sin[0][j][i], self.cos[0][j][i]) = (-s, c);
-                }
+            let (mut s, mut c) = (sin[i], cos[i]);
+            for d in 1..=i {
+                (self.sin[0][d][i], self.cos[0][d][i]) = (s, c);
+                let j = i - d;
                 (s, c) = (s * cos[j] + c * sin[j], c * cos[j] - s * sin[j]);
             }
-            (self.sin[0][i][i], self.cos[0][i][i]) = (s, c);
+            (self.sin[0][0][i], self.cos[0][0][i]) = (s, c);
         }
         self.equation.set(arm, &self.cos[0]);
         self.rate[0] = sums(velocity);
-        self.acceleration[0] = sums(&forward_dynamics(arm, position, velocity, effort));
-        self.order = 0;
-        self.close(0);
+        self.squared_rate[backwards(0)] = self.rate[0].map(|rate| rate * rate);
+        let acceleration = forward_dynamics(arm, position, velocity, effort);
+        self.close(0, sums(&acceleration));
     }
 
     /// Reckons the rates of the next order.
+    #[inline]
     pub(super) fn extend(&mut self) {
         let k = self.order;
+        let zero = [[0.0; N]; N];
+        // Of the sines, the cosines, and what links do to the one that is nearer to the tip, and to the base.
+        let (mut sine, mut cosine, mut square) = (zero, zero, [0.0; N]);
+        let (mut pull, mut push) = ((zero, zero), (zero, zero));
+        {
+            let (sin, cos, rate) = (&self.sin[..k], &self.cos[..k], &self.rate[1..=k]);
+            let turning = &self.turning[backwards(k - 1)..][..k];
+            let squared = &self.squared_rate[backwards(k)..][..k];
+            let acceleration = &self.acceleration[backwards(k)..][..k];
+            for m in 0..k {
+                for d in 0..N {
+                    for i in d..N {
+                        sine[d][i] += turning[m][d][i] * cos[m][d][i];
+                        cosine[d][i] += turning[m][d][i] * sin[m][d][i];
+                    }
+                }
+                for i in 0..N {
+                    square[i] += turning[m][0][i] * rate[m][i];
+                }
+                if m > 0 {
+                    for d in 1..N {
+                        for i in d..N {
+                            pull.0[d][i] += sin[m][d][i] * squared[m][i - d];
+                            pull.1[d][i] += cos[m][d][i] * acceleration[m][i - d];
+                            push.0[d][i] += sin[m][d][i] * squared[m][i];
+                            push.1[d][i] += cos[m][d][i] * acceleration[m][i];
+                        }
+                    }
+                }
+            }
+        }
         let per_k = 1.0 / length_in_f64(k);
-        let (mut sin, mut cos) = ([[0.0; N]; N], [[0.0; N]; N]);
-        let before = self.sin[..k].iter().zip(&self.cos[..k]).rev();
-        for (turning, (s, c)) in self.turning[..k].iter().zip(before) {
-            for i in 0..N {
-                for j in 0..N {
-                    sin[i][j] += turning[i][j] * c[i][j];
-                    cos[i][j] += turning[i][j] * s[i][j];
+        let (first_square, first) = (
+            self.squared_rate[backwards(0)],
+            self.acceleration[backwards(0)],
+        );
+        let mut right = [0.0; N];
+        for i in 0..N {
+            square[i] += self.rate[0][i] * self.rate[k][i];
+        }
+        self.squared_rate[backwards(k)] = square;
+        for d in 0..N {
+            for i in d..N {
+                let (sin, cos) = (sine[d][i] * per_k, -(cosine[d][i] * per_k));
+                (self.sin[k][d][i], self.cos[k][d][i]) = (sin, cos);
+                let factor = self.equation.factors[d][i];
+                if d == 0 {
+                    right[i] -= factor * cos;
+                } else {
+                    let (j, at_start) = (i - d, self.sin[0][d][i]);
+                    let across = pull.0[d][i] + (at_start * square[j] + sin * first_square[j]);
+                    right[i] -= factor * (across + (pull.1[d][i] + cos * first[j]));
+                    let across = push.0[d][i] + (at_start * square[i] + sin * first_square[i]);
+                    right[j] -= factor * ((push.1[d][i] + cos * first[i]) - across);
                 }
             }
         }
-        self.sin[k] = sin.map(|row| row.map(|sum| sum * per_k));
-        self.cos[k] = cos.map(|row| row.map(|sum| -(sum * per_k)));
-        self.close_square(k);
-
-        let mut sum = [[0.0; N]; N];
-        let squares = self.squared_rate[..=k].iter().rev();
-        for (sin, square) in self.sin[..=k].iter().zip(squares) {
-            for i in 0..N {
-                for j in 0..N {
-                    sum[i][j] += sin[i][j] * square[j];
-                }
-            }
-        }
-        let accelerations = self.acceleration[..k].iter().rev();
-        for (cos, acceleration) in self.cos[1..=k].iter().zip(accelerations) {
-            for i in 0..N {
-                for j in 0..N {
-                    sum[i][j] += cos[i][j] * acceleration[j];
-                }
-            }
-        }
-        let factors = &self.equation.factors;
-        let right = std::array::from_fn(|i| {
-            let mut right = factors[i][i] * self.cos[k][i][i];
-            for j in (0..N).filter(|&j| j != i) {
-                right += factors[i][j] * sum[i][j];
-            }
-            -right
-        });
-        self.acceleration[k] = self.equation.solve(right);
-        self.close(k);
+        let acceleration = self.equation.solve(right);
+        self.close(k, acceleration);
     }
 
     /// What follows from the accelerations of order `k`.
-    fn close(&mut self, k: usize) {
-        if k == 0 {
-            self.close_square(0);
-        }
+    #[inline(always)]
+    fn close(&mut self, k: usize, acceleration: [f64; N]) {
+        self.acceleration[backwards(k)] = acceleration;
         let next = 1.0 / length_in_f64(k + 1);
-        for i in 0..N {
-            self.angle[k + 1][i] = self.rate[k][i] * next;
-            self.rate[k + 1][i] = self.acceleration[k][i] * next;
-            for j in 0..N {
-                let other = if i == j { 0.0 } else { self.rate[k][j] };
-                self.turning[k][i][j] = self.rate[k][i] - other;
+        let rate = self.rate[k];
+        self.angle[k + 1] = rate.map(|rate| rate * next);
+        self.rate[k + 1] = acceleration.map(|acceleration| acceleration * next);
+        let turning = &mut self.turning[backwards(k)];
+        for d in 0..N {
+            for i in d..N {
+                turning[d][i] = if d == 0 {
+                    rate[i]
+                } else {
+                    rate[i] - rate[i - d]
+                };
             }
         }
         self.order = k + 1;
-    }
-
-    fn close_square(&mut self, k: usize) {
-        let mut sum = [0.0; N];
-        for (one, other) in self.rate[..=k].iter().zip(self.rate[..=k].iter().rev()) {
-            for i in 0..N {
-                sum[i] += one[i] * other[i];
-            }
-        }
-        self.squared_rate[k] = sum;
     }
 
     /// By how much positions and velocities of the joints change in a time \[s\].
@@ -188,7 +206,10 @@ impl<const N: usize> Series<N> {
             }
             differences(&value.map(|value| value * time))
         };
-        (change(&self.angle, self.order), change(&self.rate, self.order))
+        (
+            change(&self.angle, self.order),
+            change(&self.rate, self.order),
+        )
     }
 }
 
@@ -201,12 +222,10 @@ impl<const N: usize> Equation<N> {
             let (first, second) = (m[i] / 2.0 + beyond, m[i] / 3.0 + beyond);
             for j in 0..i {
                 let coupling = first * l[i] * l[j];
-                self.factors[i][j] = coupling;
-                self.factors[j][i] = coupling;
-                matrix[i][j] = coupling * cos[i][j];
-                matrix[j][i] = matrix[i][j];
+                self.factors[i - j][i] = coupling;
+                matrix[i][j] = coupling * cos[i - j][i];
             }
-            self.factors[i][i] = arm.gravity() * first * l[i];
+            self.factors[0][i] = arm.gravity() * first * l[i];
             matrix[i][i] = second * l[i] * l[i];
             beyond += m[i];
         }
@@ -252,5 +271,11 @@ fn sums<const N: usize>(joints: &[f64; N]) -> [f64; N] {
 
 /// Rates of the joints from those of the links.
 fn differences<const N: usize>(links: &[f64; N]) -> [f64; N] {
-    std::array::from_fn(|i| if i == 0 { links[i] } else { links[i] - links[i - 1] })
+    std::array::from_fn(|i| {
+        if i == 0 {
+            links[i]
+        } else {
+            links[i] - links[i - 1]
+        }
+    })
 }

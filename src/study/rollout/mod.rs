@@ -3,8 +3,8 @@
 //! The run is the live loop, [`Simulation`], from any state. Its reference obeys the very same control law, looked at
 //! on the same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what
 //! is left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost
-//! an error of first order that no method can mend.) A second reference, in steps half as long, says how far the first
-//! can be trusted: on a chaotic swing not beyond some twenty seconds.
+//! an error of first order that no method can mend.) A second reference, in steps half as long and of an arm
+//! that differs in its last digits, says how far the first can be trusted: on a chaotic swing not beyond some twenty seconds.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -87,6 +87,11 @@ impl<const N: usize> Rollout<N> {
         let simulation = plan.control.simulation(plan.start);
         let references = plan.reference.then(|| {
             [1, 2].map(|cuts| Reference {
+                arm: if cuts == 1 {
+                    plan.control.arm
+                } else {
+                    neighbour(&plan.control.arm)
+                },
                 follower: Follower::new(plan.start).cut(cuts),
                 pid: simulation.pid().clone(),
                 lost: false,
@@ -126,10 +131,9 @@ impl<const N: usize> Rollout<N> {
                     reference.fall_behind(timestep, taken);
                 }
             }
-            let arm = *self.simulation.arm();
             let mut left = bound.saturating_sub(self.all_evaluations());
             for reference in self.references.iter_mut().flatten() {
-                left = left.saturating_sub(reference.follow(&arm, left));
+                left = left.saturating_sub(reference.follow(left));
             }
             let at_sample = self.simulation.steps() == self.next_sample();
             if at_sample && !self.is_behind() && self.simulation.divergence().is_none() {
@@ -267,6 +271,7 @@ impl<const N: usize> Rollout<N> {
 /// The motion that the run ought to be.
 #[derive(Debug, Clone)]
 struct Reference<const N: usize> {
+    arm: Arm<N>,
     follower: Follower<N>,
     pid: Pid<N>,
     /// Whether the motion was too wild to be followed.
@@ -313,7 +318,7 @@ impl<const N: usize> Reference<N> {
     }
 
     /// Follows the run with about `work` evaluations at most, and says with how many.
-    fn follow(&mut self, arm: &Arm<N>, work: u64) -> u64 {
+    fn follow(&mut self, work: u64) -> u64 {
         let before = self.follower.coefficients();
         let bound = before.saturating_add(work);
         while self.behind.steps > 0 {
@@ -327,7 +332,7 @@ impl<const N: usize> Reference<N> {
                 self.follower.begin(timestep);
                 self.behind.begun = true;
             }
-            match self.follower.go_on(arm, &self.behind.effort, bound) {
+            match self.follower.go_on(&self.arm, &self.behind.effort, bound) {
                 None => break,
                 Some(false) => {
                     self.lost = true;
@@ -339,6 +344,16 @@ impl<const N: usize> Reference<N> {
         }
         self.follower.coefficients() - before
     }
+}
+
+/// An arm that differs in the last digit of a length and a mass: what the equations of motion lose by rounding their
+/// constants is of that size, and the same in every step, so that steps of another length would not show it.
+fn neighbour<const N: usize>(arm: &Arm<N>) -> Arm<N> {
+    let (mut lengths, mut masses) = (*arm.lengths(), *arm.masses());
+    if let (Some(length), Some(mass)) = (lengths.first_mut(), masses.last_mut()) {
+        (*length, *mass) = (length.next_up(), mass.next_up());
+    }
+    Arm::new(lengths, masses, arm.gravity()).unwrap_or(*arm)
 }
 
 /// Largest difference of a joint position \[rad\].
