@@ -161,8 +161,10 @@ struct Bracket {
 impl<const N: usize> Planning<N> {
     /// The most memory that a plan takes, in bytes: two tracks, each of which may have grown to twice its length, and
     /// their differences.
-    pub const MOST_BYTES: usize =
-        size_of::<Self>() + LimitSearch::<N>::MOST_BYTES + 5 * MAX_SAMPLES * size_of::<DVec2>();
+    pub const MOST_BYTES: usize = size_of::<Self>()
+        + size_of::<Swing<N>>()
+        + LimitSearch::<N>::MOST_BYTES
+        + 5 * MAX_SAMPLES * size_of::<DVec2>();
 
     /// A plan about to be made.
     ///

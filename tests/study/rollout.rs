@@ -167,8 +167,8 @@ fn a_run_in_slices_gives_the_same_bits_as_one_made_at_once() {
 #[test]
 fn a_slice_is_as_short_as_it_is_asked_to_be_however_wild_the_motion() {
     const WORK: u64 = 1000;
-    // A step of the run and one of each reference: 4 evaluations, and twice 20 coefficients.
-    const LOOK: u64 = 4 + 2 * 20;
+    // A step of the run and one of each reference: 4 evaluations, and twice 22 coefficients.
+    const LOOK: u64 = 4 + 2 * 22;
     for plan in [swing(), reach()] {
         let mut wild = plan;
         wild.control.timestep = 0.5;

@@ -79,7 +79,11 @@ impl<const N: usize> Follower<N> {
     /// held between [`ROUNDING`] and 1.
     #[must_use]
     pub fn within(state: State<N>, tolerance: f64) -> Self {
-        let tolerance = tolerance.max(ROUNDING).min(1.0);
+        let tolerance = if tolerance > ROUNDING {
+            tolerance.min(1.0)
+        } else {
+            ROUNDING
+        };
         let order = order_for(tolerance);
         Self {
             state,
@@ -231,16 +235,15 @@ impl<const N: usize> Follower<N> {
     }
 }
 
-/// The order at which the way that a step goes costs least for a tolerance: Jorba and Zou, section 3.3, where a
-/// coefficient costs in proportion to its order. Here it does so only in part, and a few orders more or less cost the
-/// same.
+/// The order at which the way that a step goes costs least for a tolerance: two more than in Jorba and Zou, section 3.3,
+/// who take the cost of a step to grow with the square of its order; every step begins with an evaluation besides.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "clamped to small whole numbers"
 )]
 fn order_for(tolerance: f64) -> usize {
-    ((1.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(6, ORDER)
+    ((3.0 - 0.5 * tolerance.ln()).ceil() as usize).clamp(6, ORDER)
 }
 
 fn power(base: f64, exponent: usize) -> f64 {

@@ -114,8 +114,8 @@ impl<const N: usize> Rollout<N> {
         Ok(rollout)
     }
 
-    /// Goes on until about `work` evaluations of the dynamics are made, those of the references among them, and says
-    /// how many that were: 0 once the run is over.
+    /// Goes on until about `work` evaluations of the dynamics are made, a coefficient of a reference counted as one, and
+    /// says how many that were: 0 once the run is over.
     pub fn advance(&mut self, work: u64) -> u64 {
         let before = self.all_evaluations();
         let bound = before.saturating_add(work.max(1));
@@ -317,7 +317,7 @@ impl<const N: usize> Reference<N> {
         };
     }
 
-    /// Follows the run with about `work` evaluations at most, and says with how many.
+    /// Follows the run with about `work` coefficients at most, and says with how many.
     fn follow(&mut self, work: u64) -> u64 {
         let before = self.follower.coefficients();
         let bound = before.saturating_add(work);
