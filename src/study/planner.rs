@@ -5,9 +5,9 @@
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //!
-//! The truth is followed with ever smaller steps, or that of an arm left to itself within ever smaller tolerances, until
-//! two of them agree to a part of the allowed error. Then each
-//! method is run as the live arm runs it, with ever smaller steps until it stays within the rest at all samples, and a
+//! The truth is followed with ever smaller steps, that of an arm left to itself within ever smaller tolerances, until
+//! two of them agree to a part of the allowed error. Then each method is run as the live arm runs it, with ever smaller
+//! steps until it stays within the rest at all samples, and a
 //! little larger again by bisection. The cheapest run, in evaluations of the dynamics, is the plan: it has been run,
 //! and its error is that which was seen. A run that could only be dearer than another is not made.
 //!
@@ -24,7 +24,7 @@ use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::follower::ROUNDING;
 use super::limits::LimitSearch;
-use super::track::{Followed, Swing, apart};
+use super::track::{Followed, FreeMotion, apart};
 use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -144,7 +144,7 @@ enum Fineness {
 #[derive(Debug, Clone)]
 enum PlanStage<const N: usize> {
     Truth(Box<Followed<ContinuousLoop<N>>>),
-    FreeTruth(Box<Swing<N>>),
+    FreeTruth(Box<FreeMotion<N>>),
     Limiting(Method, Box<LimitSearch<N>>),
     Running(Bracket, Box<Followed<Simulation<N>>>),
     Done(Result<Planned, PlanError>),
@@ -162,7 +162,7 @@ impl<const N: usize> Planning<N> {
     /// The most memory that a plan takes, in bytes: two tracks, each of which may have grown to twice its length, and
     /// their differences.
     pub const MOST_BYTES: usize = size_of::<Self>()
-        + size_of::<Swing<N>>()
+        + size_of::<FreeMotion<N>>()
         + LimitSearch::<N>::MOST_BYTES
         + 5 * MAX_SAMPLES * size_of::<DVec2>();
 
@@ -190,7 +190,7 @@ impl<const N: usize> Planning<N> {
             })),
         };
         planning.follow(if task.control.is_free() {
-            // The part of the way that a tip at arm's length may be off by after half a turn or so.
+            // So much of half a turn moves the end effector of the stretched arm by the part of the error.
             let reach = task.control.arm.reach();
             Fineness::Tolerance(PART_OF_TRUTH * task.error / (PI * reach))
         } else {
@@ -210,10 +210,10 @@ impl<const N: usize> Planning<N> {
                     self.compare(finite.then_some(track), fineness);
                 }
             }
-            PlanStage::FreeTruth(swing) => {
-                if let Some(followed) = swing.advance(self.samples) {
-                    let track = std::mem::take(&mut swing.track);
-                    let fineness = Fineness::Tolerance(swing.tolerance);
+            PlanStage::FreeTruth(motion) => {
+                if let Some(followed) = motion.advance(self.samples) {
+                    let track = std::mem::take(&mut motion.track);
+                    let fineness = Fineness::Tolerance(motion.tolerance);
                     self.compare(followed.then_some(track), fineness);
                 }
             }
@@ -252,8 +252,8 @@ impl<const N: usize> Planning<N> {
                 PlanStage::Truth(Box::new(Followed::new(truth, per_sample)))
             }
             Fineness::Tolerance(tolerance) => {
-                let swing = Swing::new(control.arm, start, self.spacing, tolerance);
-                PlanStage::FreeTruth(Box::new(swing))
+                let motion = FreeMotion::new(control.arm, start, self.spacing, tolerance);
+                PlanStage::FreeTruth(Box::new(motion))
             }
         };
     }

@@ -87,7 +87,7 @@ impl<S: Steppable> Followed<S> {
 
 /// An arm left to itself, on its way within a tolerance, with the end effector at the samples so far.
 #[derive(Debug, Clone)]
-pub(super) struct Swing<const N: usize> {
+pub(super) struct FreeMotion<const N: usize> {
     arm: Arm<N>,
     follower: Follower<N>,
     pub(super) tolerance: f64,
@@ -99,7 +99,7 @@ pub(super) struct Swing<const N: usize> {
     pub(super) track: Vec<DVec2>,
 }
 
-impl<const N: usize> Swing<N> {
+impl<const N: usize> FreeMotion<N> {
     pub(super) fn new(arm: Arm<N>, start: State<N>, spacing: f64, tolerance: f64) -> Self {
         Self {
             arm,
@@ -124,8 +124,8 @@ impl<const N: usize> Swing<N> {
                 return Some(false);
             }
             self.begun = false;
-            let tip = forward(self.arm.lengths(), &self.follower.state().position);
-            self.track.push(tip.position);
+            let pose = forward(self.arm.lengths(), &self.follower.state().position);
+            self.track.push(pose.position);
         }
         Some(true)
     }

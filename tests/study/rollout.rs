@@ -66,7 +66,17 @@ fn halving_the_timestep_divides_the_error_by_two_to_the_order() {
 /// The two references agree to rounding: a second of this motion amplifies errors some ten times.
 #[test]
 fn the_references_agree_to_rounding() {
-    for plan in [swing(), reach()] {
+    let stiff = Gains {
+        kp: [1e5; 2],
+        ki: [1e3; 2],
+        kd: [1e3; 2],
+    };
+    let control = ControlLoop::new(Arm::default(), stiff, Setpoint::at([1.0, -0.5]));
+    let stiff = Plan {
+        control: control.with_timestep(1e-4),
+        ..swing()
+    };
+    for plan in [swing(), reach(), stiff] {
         let rollout = run(plan);
         let deviation = rollout.deviation().unwrap();
         assert_eq!(deviation.uncertainties.len(), 11);

@@ -16,7 +16,7 @@ use super::matrix::largest;
 use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::two_sum;
-use series::{ORDER, Series};
+use series::{ORDER, PowerSeries};
 
 /// The least tolerance that makes a difference: below it rounding is all that is left.
 pub const ROUNDING: f64 = 1e-16;
@@ -54,7 +54,7 @@ pub struct Follower<const N: usize> {
     /// The last length of a step that a series allowed \[s\].
     step: f64,
     ahead: Ahead,
-    series: Series<N>,
+    series: PowerSeries<N>,
 }
 
 /// The rest of a span.
@@ -99,7 +99,7 @@ impl<const N: usize> Follower<N> {
             coefficients: 0,
             step: f64::INFINITY,
             ahead: Ahead::default(),
-            series: Series::new(),
+            series: PowerSeries::new(),
         }
     }
 
@@ -225,7 +225,7 @@ impl<const N: usize> Follower<N> {
 
     /// How many times the terms of `order` in a step \[s\], of which that `power` is given, are what they may be.
     fn excess(&self, order: usize, step: f64, power: f64) -> f64 {
-        let Series { angle, rate, .. } = &self.series;
+        let PowerSeries { angle, rate, .. } = &self.series;
         let of_angle = self.tolerance * step * (size(&rate[0]) + step * size(&rate[1]));
         let of_rate = self.tolerance * step * (size(&rate[1]) + step * size(&rate[2]))
             + ROUNDING * size(&rate[0]);
@@ -235,8 +235,8 @@ impl<const N: usize> Follower<N> {
     }
 }
 
-/// The order at which the way that a step goes costs least for a tolerance: two more than in Jorba and Zou, section 3.3,
-/// who take the cost of a step to grow with the square of its order; every step begins with an evaluation besides.
+/// The order at which a motion costs least for a tolerance: two more than in Jorba and Zou, section 3.3, who take the
+/// cost of a step to grow with the square of its order; every step begins with an evaluation besides.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -6,8 +6,8 @@
 //!
 //! Sine and cosine of an angle cost one recurrence each, `s' = c φ'` and `c' = -s φ'`, products of series are
 //! convolutions, and the accelerations' coefficients solve one linear system after the other, always with the same
-//! matrix. The first of them comes from the arm's own kernel, which loses fewer digits. Known limit: a tip of a billion
-//! times the mass of two links that it folds costs a digit or two beyond those that no digits of its start can tell.
+//! matrix. The first of them comes from the arm's own kernel, which loses fewer digits. Known limit: a last link of
+//! a billion times the mass of the two that it folds costs a digit or two beyond those that its start can't tell.
 //!
 //! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
 //! methods*, Experimental Mathematics 14 (2005).
@@ -41,9 +41,9 @@ const fn backwards(order: usize) -> usize {
     ORDER - 1 - order
 }
 
-/// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are reckoned from.
+/// PowerSeries of the angles of the links \[rad\], their rates \[rad/s\], and what they are reckoned from.
 #[derive(Debug, Clone)]
-pub(super) struct Series<const N: usize> {
+pub(super) struct PowerSeries<const N: usize> {
     /// Order up to which rates are known.
     order: usize,
     pub(super) angle: PerLink<N>,
@@ -67,7 +67,7 @@ struct Equation<const N: usize> {
     eliminated: [[f64; N]; N],
 }
 
-impl<const N: usize> Series<N> {
+impl<const N: usize> PowerSeries<N> {
     pub(super) fn new() -> Self {
         Self {
             order: 0,
@@ -116,7 +116,7 @@ impl<const N: usize> Series<N> {
     pub(super) fn extend(&mut self) {
         let k = self.order;
         let zero = [[0.0; N]; N];
-        // Of the sines, the cosines, and what links do to the one that is nearer to the tip, and to the base.
+        // Sums for sines, cosines and squares, and for what a link does to one farther out, and to one farther in.
         let (mut sine, mut cosine, mut square) = (zero, zero, [0.0; N]);
         let (mut pull, mut push) = ((zero, zero), (zero, zero));
         {
@@ -176,7 +176,7 @@ impl<const N: usize> Series<N> {
         self.close(k, acceleration);
     }
 
-    /// What follows from the accelerations of order `k`.
+    /// Keeps the accelerations of order `k`, and what follows from them.
     #[inline(always)]
     fn close(&mut self, k: usize, acceleration: [f64; N]) {
         self.acceleration[backwards(k)] = acceleration;

@@ -4,7 +4,8 @@
 //! on the same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what
 //! is left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost
 //! an error of first order that no method can mend.) A second reference, in steps half as long and of an arm
-//! that differs in its last digits, says how far the first can be trusted: on a chaotic swing not beyond some twenty seconds.
+//! that differs in its last digits, says how far the first can be trusted: on a chaotic swing not beyond some twenty
+//! seconds.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -114,8 +115,8 @@ impl<const N: usize> Rollout<N> {
         Ok(rollout)
     }
 
-    /// Goes on until about `work` evaluations of the dynamics are made, a coefficient of a reference counted as one, and
-    /// says how many that were: 0 once the run is over.
+    /// Goes on until about `work` evaluations of the dynamics are made, a coefficient of a reference counted as one,
+    /// and says how many that were: 0 once the run is over.
     pub fn advance(&mut self, work: u64) -> u64 {
         let before = self.all_evaluations();
         let bound = before.saturating_add(work.max(1));
