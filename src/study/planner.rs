@@ -7,9 +7,9 @@
 //!
 //! The truth is followed with ever smaller steps, that of an arm left to itself within ever smaller tolerances, until
 //! two of them agree to a part of the allowed error. Then each method is run as the live arm runs it, with ever smaller
-//! steps until it stays within the rest at all samples, and a
-//! little larger again by bisection. The cheapest run, in evaluations of the dynamics, is the plan: it has been run,
-//! and its error is that which was seen. A run that could only be dearer than another is not made.
+//! steps until it stays within the rest at all samples, and a little larger again by bisection. The cheapest run, in
+//! evaluations of the dynamics, is the plan: it has been run, and its error is that which was seen. A run that could
+//! only be dearer than another is not made.
 //!
 //! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
 //! every pose, since the error of one move says nothing about the next.

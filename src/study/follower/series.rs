@@ -41,7 +41,7 @@ const fn backwards(order: usize) -> usize {
     ORDER - 1 - order
 }
 
-/// PowerSeries of the angles of the links \[rad\], their rates \[rad/s\], and what they are reckoned from.
+/// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are reckoned from.
 #[derive(Debug, Clone)]
 pub(super) struct PowerSeries<const N: usize> {
     /// Order up to which rates are known.
