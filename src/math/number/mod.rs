@@ -7,11 +7,13 @@
 //! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next: so
 //! that a lane has the bits of the arm that is stepped alone, on every machine and in registers of every width.
 
+mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
 pub(super) use register::Register;
 
