@@ -8,7 +8,7 @@
 //! | [`continuous`] | the same loop with its law in every stage |
 //! | [`gains`] | gains for an arm and a timestep, stable in every pose, that settle in time |
 //! | [`planner`] | the cheapest method and timestep for an allowed error at the end effector |
-//! | [`rollout`] | an offline run with its error against a reference ([`extrapolation`]) |
+//! | [`rollout`] | an offline run with its error against a reference ([`follower`]) |
 //! | [`error_estimate`] | the local error of the step about to be taken |
 //!
 //! Everything steps through [`crate::math`], the live arm's own code.
@@ -20,7 +20,7 @@ pub mod control_loop;
 mod critical;
 mod equilibrium;
 pub mod error_estimate;
-pub mod extrapolation;
+pub mod follower;
 pub mod gains;
 mod limits;
 pub mod linear;

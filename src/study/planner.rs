@@ -5,22 +5,26 @@
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //!
-//! The truth is followed with ever smaller steps until two of them agree to a part of the allowed error. Then each
-//! method is run as the live arm runs it, with ever smaller steps until it stays within the rest at all samples, and a
-//! little larger again by bisection. The cheapest run, in evaluations of the dynamics, is the plan: it has been run,
-//! and its error is that which was seen. A run that could only be dearer than another is not made.
+//! The truth is followed with ever smaller steps, that of an arm left to itself within ever smaller tolerances, until
+//! two of them agree to a part of the allowed error. Then each method is run as the live arm runs it, with ever smaller
+//! steps until it stays within the rest at all samples, and a little larger again by bisection. The cheapest run, in
+//! evaluations of the dynamics, is the plan: it has been run, and its error is that which was seen. A run that could
+//! only be dearer than another is not made.
 //!
 //! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
 //! every pose, since the error of one move says nothing about the next.
 //!
 //! **Invariant:** the work is bounded when a plan is asked for, and every candidate that is answered has been run.
 
+use std::f64::consts::PI;
+
 use glam::DVec2;
 
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
+use super::follower::ROUNDING;
 use super::limits::LimitSearch;
-use super::track::{Followed, apart};
+use super::track::{Followed, FreeMotion, apart};
 use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
@@ -43,6 +47,9 @@ const MAX_SAMPLES: usize = 20_001;
 
 /// The part of the allowed error that the truth itself may be off by.
 const PART_OF_TRUTH: f64 = 0.05;
+
+/// The next tolerance's part of one that was too large: two digits more, for less than half as much work again.
+const FINER: f64 = 0.01;
 
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -125,9 +132,19 @@ pub struct Planning<const N: usize> {
     stage: PlanStage<N>,
 }
 
+/// How finely a truth is followed.
+#[derive(Debug, Clone, Copy)]
+enum Fineness {
+    /// With so many steps between two samples.
+    Steps(u64),
+    /// Within a tolerance.
+    Tolerance(f64),
+}
+
 #[derive(Debug, Clone)]
 enum PlanStage<const N: usize> {
     Truth(Box<Followed<ContinuousLoop<N>>>),
+    FreeTruth(Box<FreeMotion<N>>),
     Limiting(Method, Box<LimitSearch<N>>),
     Running(Bracket, Box<Followed<Simulation<N>>>),
     Done(Result<Planned, PlanError>),
@@ -144,8 +161,10 @@ struct Bracket {
 impl<const N: usize> Planning<N> {
     /// The most memory that a plan takes, in bytes: two tracks, each of which may have grown to twice its length, and
     /// their differences.
-    pub const MOST_BYTES: usize =
-        size_of::<Self>() + LimitSearch::<N>::MOST_BYTES + 5 * MAX_SAMPLES * size_of::<DVec2>();
+    pub const MOST_BYTES: usize = size_of::<Self>()
+        + size_of::<FreeMotion<N>>()
+        + LimitSearch::<N>::MOST_BYTES
+        + 5 * MAX_SAMPLES * size_of::<DVec2>();
 
     /// A plan about to be made.
     ///
@@ -170,7 +189,13 @@ impl<const N: usize> Planning<N> {
                 uncertainty: f64::INFINITY,
             })),
         };
-        planning.follow(4);
+        planning.follow(if task.control.is_free() {
+            // So much of half a turn moves the end effector of the stretched arm by the part of the error.
+            let reach = task.control.arm.reach();
+            Fineness::Tolerance(PART_OF_TRUTH * task.error / (PI * reach))
+        } else {
+            Fineness::Steps(4)
+        });
         Ok(planning)
     }
 
@@ -181,8 +206,15 @@ impl<const N: usize> Planning<N> {
             PlanStage::Truth(run) => {
                 if let Some(finite) = run.advance(self.samples) {
                     let track = std::mem::take(&mut run.track);
-                    let per_sample = run.per_sample;
-                    self.compare(finite, track, per_sample);
+                    let fineness = Fineness::Steps(run.per_sample);
+                    self.compare(finite.then_some(track), fineness);
+                }
+            }
+            PlanStage::FreeTruth(motion) => {
+                if let Some(followed) = motion.advance(self.samples) {
+                    let track = std::mem::take(&mut motion.track);
+                    let fineness = Fineness::Tolerance(motion.tolerance);
+                    self.compare(followed.then_some(track), fineness);
                 }
             }
             PlanStage::Limiting(method, search) => {
@@ -207,30 +239,46 @@ impl<const N: usize> Planning<N> {
         None
     }
 
-    /// Follows the truth with so many steps between two samples.
-    fn follow(&mut self, per_sample: u64) {
-        let timestep = self.spacing / in_f64(per_sample);
-        let control = self.task.control.with_method(Method::Rk4);
-        let truth = ContinuousLoop {
-            control: control.with_timestep(timestep),
-            state: self.task.start,
-            integral: [0.0; N],
+    fn follow(&mut self, fineness: Fineness) {
+        let Task { control, start, .. } = self.task;
+        self.stage = match fineness {
+            Fineness::Steps(per_sample) => {
+                let timestep = self.spacing / in_f64(per_sample);
+                let truth = ContinuousLoop {
+                    control: control.with_method(Method::Rk4).with_timestep(timestep),
+                    state: start,
+                    integral: [0.0; N],
+                };
+                PlanStage::Truth(Box::new(Followed::new(truth, per_sample)))
+            }
+            Fineness::Tolerance(tolerance) => {
+                let motion = FreeMotion::new(control.arm, start, self.spacing, tolerance);
+                PlanStage::FreeTruth(Box::new(motion))
+            }
         };
-        self.stage = PlanStage::Truth(Box::new(Followed::new(truth, per_sample)));
     }
 
-    /// Compares a truth with the one before, which took steps twice as long.
-    fn compare(&mut self, finite: bool, track: Vec<DVec2>, per_sample: u64) {
-        if finite {
+    /// Compares a truth, if it could be followed, with the one before, which was followed less finely.
+    fn compare(&mut self, track: Option<Vec<DVec2>>, fineness: Fineness) {
+        let followed = track.is_some();
+        if let Some(track) = track {
             if self.truth.len() == track.len() {
                 self.uncertainty = apart(&track, &self.truth);
             }
             self.truth = track;
         }
+        let finer = match fineness {
+            Fineness::Steps(steps) => {
+                (2 * steps * self.samples <= MAX_STEPS).then_some(Fineness::Steps(2 * steps))
+            }
+            Fineness::Tolerance(tolerance) => {
+                (followed && tolerance > ROUNDING).then_some(Fineness::Tolerance(FINER * tolerance))
+            }
+        };
         if self.uncertainty <= PART_OF_TRUTH * self.task.error {
             self.next_method();
-        } else if 2 * per_sample * self.samples <= MAX_STEPS {
-            self.follow(2 * per_sample);
+        } else if let Some(finer) = finer {
+            self.follow(finer);
         } else {
             let uncertainty = self.uncertainty;
             self.stage = PlanStage::Done(Err(PlanError::Unknown { uncertainty }));

@@ -5,12 +5,20 @@
 use glam::DVec2;
 
 use super::continuous::ContinuousLoop;
+use super::follower::Follower;
 use super::matrix::largest;
+use crate::math::arm::{Arm, State};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
 
 /// Steps between two returns to the caller.
 const STEPS_PER_PIECE: u64 = 500;
+
+/// Coefficients of a followed arm's series between two returns to the caller, and some more.
+const COEFFICIENTS_PER_PIECE: u64 = 2000;
+
+/// Most coefficients of a followed arm: seconds of one core.
+const MAX_COEFFICIENTS: u64 = 20_000_000;
 
 /// A loop that can be stepped and seen.
 pub(super) trait Steppable {
@@ -74,6 +82,52 @@ impl<S: Steppable> Followed<S> {
             }
         }
         None
+    }
+}
+
+/// An arm left to itself, on its way within a tolerance, with the end effector at the samples so far.
+#[derive(Debug, Clone)]
+pub(super) struct FreeMotion<const N: usize> {
+    arm: Arm<N>,
+    follower: Follower<N>,
+    pub(super) tolerance: f64,
+    /// Time between two samples \[s\].
+    spacing: f64,
+    /// Whether the way to the next sample is begun.
+    begun: bool,
+    /// The end effector at the samples so far \[m\].
+    pub(super) track: Vec<DVec2>,
+}
+
+impl<const N: usize> FreeMotion<N> {
+    pub(super) fn new(arm: Arm<N>, start: State<N>, spacing: f64, tolerance: f64) -> Self {
+        Self {
+            arm,
+            follower: Follower::within(start, tolerance),
+            tolerance,
+            spacing,
+            begun: false,
+            track: Vec::new(),
+        }
+    }
+
+    /// Goes on by a piece: `None` while there is more to come, `Some(false)` if it can not be followed.
+    pub(super) fn advance(&mut self, samples: u64) -> Option<bool> {
+        let bound = self.follower.coefficients() + COEFFICIENTS_PER_PIECE;
+        while (self.track.len() as u64) < samples {
+            if !self.begun {
+                self.follower.begin(self.spacing);
+                self.begun = true;
+            }
+            let followed = self.follower.go_on(&self.arm, &[0.0; N], bound)?;
+            if !followed || self.follower.coefficients() > MAX_COEFFICIENTS {
+                return Some(false);
+            }
+            self.begun = false;
+            let pose = forward(self.arm.lengths(), &self.follower.state().position);
+            self.track.push(pose.position);
+        }
+        Some(true)
     }
 }
 

@@ -20,6 +20,7 @@
 mod equilibrium;
 mod error;
 mod experiments;
+mod follower;
 mod gains;
 mod growth;
 mod motion;

@@ -9,17 +9,17 @@ use pendularm::report::experiments::reference::{
 };
 use serde_json::Value;
 
-fn stored() -> Value {
+pub(crate) fn stored() -> Value {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/trajectories.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
 }
 
-fn numbers(value: &Value) -> Vec<f64> {
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     let values = value.as_array().unwrap();
     values.iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
-fn array<const N: usize>(value: &Value) -> [f64; N] {
+pub(crate) fn array<const N: usize>(value: &Value) -> [f64; N] {
     numbers(value).try_into().unwrap()
 }
 

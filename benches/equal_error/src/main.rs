@@ -17,7 +17,7 @@ use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
 use pendularm::math::simulation::step_under;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
-use pendularm::study::extrapolation::Follower;
+use pendularm::study::follower::Follower;
 
 /// How long the arm swings \[s\].
 const DURATION: f64 = 4.0;
@@ -115,23 +115,17 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
             }
         }
     }
-    // To rounding, whatever is asked: no setting, but spans of several lengths.
-    for spans in [1, 2, 4, 8, 16, 32, 64] {
-        line(
-            truth,
-            "pendularm extrapolation",
-            DURATION / f64::from(spans),
-            || {
-                let mut follower = Follower::new(black_box(start::<N>()));
-                let whole = (0..spans)
-                    .all(|_| follower.follow(&arm, &[0.0; N], DURATION / f64::from(spans)));
-                whole.then(|| follower.state().position)
-            },
-        );
+    for tolerance in tolerances() {
+        line(truth, "pendularm reference", tolerance, || {
+            let mut follower = Follower::within(black_box(start::<N>()), tolerance);
+            follower
+                .follow(&arm, &[0.0; N], DURATION)
+                .then(|| follower.state().position)
+        });
     }
     line(
         truth,
-        "pendularm double-double Taylor (twice)",
+        "pendularm in twice the digits (twice)",
         1e-32,
         || {
             let motion =

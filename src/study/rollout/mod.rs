@@ -3,8 +3,9 @@
 //! The run is the live loop, [`Simulation`], from any state. Its reference obeys the very same control law, looked at
 //! on the same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what
 //! is left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost
-//! an error of first order that no method can mend.) A second reference, cut into other spans, says how far the first
-//! can be trusted: on a chaotic swing not beyond some twenty seconds.
+//! an error of first order that no method can mend.) A second reference, in steps half as long and of an arm
+//! that differs in its last digits, says how far the first can be trusted: on a chaotic swing not beyond some twenty
+//! seconds.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -18,7 +19,7 @@ mod plan;
 
 pub use plan::{MAX_SAMPLES, MAX_STEPS, Plan, RolloutError};
 
-use super::extrapolation::Follower;
+use super::follower::Follower;
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::energy;
@@ -87,9 +88,13 @@ impl<const N: usize> Rollout<N> {
         let simulation = plan.control.simulation(plan.start);
         let references = plan.reference.then(|| {
             [1, 2].map(|cuts| Reference {
-                follower: Follower::new(plan.start),
+                arm: if cuts == 1 {
+                    plan.control.arm
+                } else {
+                    neighbour(&plan.control.arm)
+                },
+                follower: Follower::new(plan.start).cut(cuts),
                 pid: simulation.pid().clone(),
-                cuts,
                 lost: false,
                 behind: Behind::default(),
             })
@@ -110,8 +115,8 @@ impl<const N: usize> Rollout<N> {
         Ok(rollout)
     }
 
-    /// Goes on until about `work` evaluations of the dynamics are made, those of the references among them, and says
-    /// how many that were: 0 once the run is over.
+    /// Goes on until about `work` evaluations of the dynamics are made, a coefficient of a reference counted as one,
+    /// and says how many that were: 0 once the run is over.
     pub fn advance(&mut self, work: u64) -> u64 {
         let before = self.all_evaluations();
         let bound = before.saturating_add(work.max(1));
@@ -127,10 +132,9 @@ impl<const N: usize> Rollout<N> {
                     reference.fall_behind(timestep, taken);
                 }
             }
-            let arm = *self.simulation.arm();
             let mut left = bound.saturating_sub(self.all_evaluations());
             for reference in self.references.iter_mut().flatten() {
-                left = left.saturating_sub(reference.follow(&arm, left));
+                left = left.saturating_sub(reference.follow(left));
             }
             let at_sample = self.simulation.steps() == self.next_sample();
             if at_sample && !self.is_behind() && self.simulation.divergence().is_none() {
@@ -218,7 +222,7 @@ impl<const N: usize> Rollout<N> {
         let references = self.references.iter().flatten();
         self.evaluations()
             + references
-                .map(|one| one.follower.evaluations())
+                .map(|one| one.follower.coefficients())
                 .sum::<u64>()
     }
 
@@ -268,10 +272,9 @@ impl<const N: usize> Rollout<N> {
 /// The motion that the run ought to be.
 #[derive(Debug, Clone)]
 struct Reference<const N: usize> {
+    arm: Arm<N>,
     follower: Follower<N>,
     pid: Pid<N>,
-    /// Spans that every stretch is cut into.
-    cuts: u32,
     /// Whether the motion was too wild to be followed.
     lost: bool,
     behind: Behind<N>,
@@ -284,8 +287,8 @@ struct Behind<const N: usize> {
     steps: u64,
     /// Length of each \[s\].
     stretch: f64,
-    /// Spans that are left of the stretch that is being followed; 0 before one is begun.
-    spans: u32,
+    /// Whether the stretch is being followed.
+    begun: bool,
     /// The effort that drives the arm in it.
     effort: [f64; N],
 }
@@ -295,7 +298,7 @@ impl<const N: usize> Default for Behind<N> {
         Self {
             steps: 0,
             stretch: 0.0,
-            spans: 0,
+            begun: false,
             effort: [0.0; N],
         }
     }
@@ -315,40 +318,43 @@ impl<const N: usize> Reference<N> {
         };
     }
 
-    /// Follows the run with about `work` evaluations at most, and says with how many.
-    fn follow(&mut self, arm: &Arm<N>, work: u64) -> u64 {
-        let before = self.follower.evaluations();
+    /// Follows the run with about `work` coefficients at most, and says with how many.
+    fn follow(&mut self, work: u64) -> u64 {
+        let before = self.follower.coefficients();
         let bound = before.saturating_add(work);
         while self.behind.steps > 0 {
-            let timestep = self.behind.stretch;
-            let part = timestep / f64::from(self.cuts);
-            if self.behind.spans == 0 {
+            if !self.behind.begun {
+                let timestep = self.behind.stretch;
                 if self.pid.is_enabled() {
                     let control = self.pid.control(self.follower.state(), timestep);
                     self.behind.effort = control.effort;
                     self.pid.commit(control.integral);
                 }
-                self.behind.spans = self.cuts;
-                self.follower.begin(part);
+                self.follower.begin(timestep);
+                self.behind.begun = true;
             }
-            match self.follower.go_on(arm, &self.behind.effort, bound) {
+            match self.follower.go_on(&self.arm, &self.behind.effort, bound) {
                 None => break,
                 Some(false) => {
                     self.lost = true;
                     self.behind.steps = 0;
-                    break;
                 }
-                Some(true) => {}
+                Some(true) => self.behind.steps -= 1,
             }
-            self.behind.spans -= 1;
-            if self.behind.spans == 0 {
-                self.behind.steps -= 1;
-            } else {
-                self.follower.begin(part);
-            }
+            self.behind.begun = false;
         }
-        self.follower.evaluations() - before
+        self.follower.coefficients() - before
     }
+}
+
+/// An arm that differs in the last digit of a length and a mass: what the equations of motion lose by rounding their
+/// constants is of that size, and the same in every step, so that steps of another length would not show it.
+fn neighbour<const N: usize>(arm: &Arm<N>) -> Arm<N> {
+    let (mut lengths, mut masses) = (*arm.lengths(), *arm.masses());
+    if let (Some(length), Some(mass)) = (lengths.first_mut(), masses.last_mut()) {
+        (*length, *mass) = (length.next_up(), mass.next_up());
+    }
+    Arm::new(lengths, masses, arm.gravity()).unwrap_or(*arm)
 }
 
 /// Largest difference of a joint position \[rad\].

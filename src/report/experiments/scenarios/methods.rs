@@ -14,7 +14,7 @@ use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
 use crate::math::simulation::step_under;
 use crate::study::error_estimate::estimate_step;
-use crate::study::extrapolation::Follower;
+use crate::study::follower::Follower;
 use crate::study::linear::Linear;
 use crate::study::matrix::largest;
 use crate::study::stability::{Sampling, step_matrix};
