@@ -37,7 +37,7 @@ const ROW: Duration = Duration::from_millis(200);
 const TIMESTEP: f64 = 1e-3;
 
 /// Steps that arms in lanes take in a call; what it takes to put them there is shared by so many.
-const ADVANCE: u64 = 50;
+const ADVANCE: u64 = 200;
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
