@@ -121,16 +121,11 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     }
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
-    let base = if WEIGHS { *gravity } else { zero };
-    let mut tip = Planar::new(zero, base);
+    let mut tip = Planar::new(zero, if WEIGHS { *gravity } else { zero });
     let mut inner = zero;
     entries!(zero, i => {
         let x_axis = Planar::new(cos[i], sin[i]);
-        let joint = if i == 0 {
-            Planar::new(sin[0] * base, cos[0] * base)
-        } else {
-            Planar::new(x_axis.dot(tip), x_axis.perp_dot(tip))
-        };
+        let joint = Planar::new(x_axis.dot(tip), x_axis.perp_dot(tip));
         let along = joint.x - w[i];
         let mut across = hinges[i].free - hinges[i].across * joint.y;
         if i + 1 < N {

@@ -1,7 +1,7 @@
 //! Two registers full of numbers, each as wide as the machine's are.
 //!
-//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations ahead, then
-//! always has one to do while the other waits for its result.
+//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations ahead,
+//! then always has one to do while the other waits for its result.
 //!
 //! **Invariant:** as in [`super`]: a lane has the bits of one number.
 

@@ -4,8 +4,8 @@
 //! state, parameters, gains, setpoint, timestep, disturbance and number of steps are each arm's own. What the processor
 //! has decides at run time how many lanes there are: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
 //!
-//! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time, and a few such
-//! pairs take each step in turn, so that the processor works at one while another waits for its own results.
+//! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time, and a few
+//! such pairs take each step in turn, so that the processor works at one while another waits for its own results.
 //!
 //! **Invariant:** every simulation is afterwards what [`Simulation::advance`] would have made of it, bit for bit,
 //! whoever stands beside it.
