@@ -26,9 +26,10 @@ run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARG
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
+# Tests of the wire wait more than they reckon: as many again run beside those that have a processor.
 test: ## Run every test but those of the page
 	@echo "make test: unit, property, wire and documentation tests"
-	$(CARGO) test --locked
+	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$((2 * $$(getconf _NPROCESSORS_ONLN)))} $(CARGO) test --locked
 
 test-slow: ## Run the tests of faults that take a minute or two; needs Debian's libfaketime
 	@echo "make test-slow: a gigabyte of waiting answers, memory under attack, a wall clock that jumps"

@@ -18,29 +18,35 @@ CARGO = os.environ.get("CARGO", "cargo")
 README = ROOT / "README.md"
 MARKS = re.compile(r"(<!-- scripts/features.py -->\n).*?(<!-- end -->)", re.DOTALL)
 BUILDS = (
-    ("default", "", "program"),
-    ("without the report", "--no-default-features --features web,record,cli", "program"),
-    ("without the record", "--no-default-features --features web,report,cli", "program"),
-    ("without the web", "--no-default-features --features report,cli", "program"),
-    ("without the commands", "--no-default-features --features web,report,record", "program"),
-    ("`runtime` alone", "--no-default-features --features runtime", "program"),
-    ("no features: the library", "--no-default-features --lib", "library"),
+    ("default", None, "program"),
+    ("without the report", "web,record,cli", "program"),
+    ("without the record", "web,report,cli", "program"),
+    ("without the web", "report,cli", "program"),
+    ("without the commands", "web,report,record", "program"),
+    ("`runtime` alone", "runtime", "program"),
+    ("no features: the library", "", "library"),
 )
 
 
-def crates(flags):
+def selection(features):
+    """Flags that choose these features, and no others; the default ones for `None`."""
+    return [] if features is None else ["--no-default-features", "--features", features]
+
+
+def crates(features):
     """How many crates are compiled for the build, this one left out."""
-    flags = [flag for flag in flags.split() if flag != "--lib"]
-    tree = subprocess.run([CARGO, "tree", "--locked", "--edges", "normal,build", "--prefix", "none", "--format", "{p}", *flags],
+    tree = subprocess.run([CARGO, "tree", "--locked", "--edges", "normal,build", "--prefix", "none", "--format", "{p}",
+                           *selection(features)],
                           cwd=ROOT, check=True, capture_output=True, text=True).stdout
     return len({line.removesuffix(" (*)") for line in tree.splitlines() if line.strip()}) - 1
 
 
-def build(flags, kind):
+def build(features, kind):
     """Size in MB and processor time in s."""
     with tempfile.TemporaryDirectory() as target:
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        subprocess.run([CARGO, "build", "--release", "--locked", "--quiet", *flags.split()], cwd=ROOT, check=True,
+        only = ["--lib"] if kind == "library" else []
+        subprocess.run([CARGO, "build", "--release", "--locked", "--quiet", *selection(features), *only], cwd=ROOT, check=True,
                        env={**os.environ, "CARGO_TARGET_DIR": target})
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -49,11 +55,11 @@ def build(flags, kind):
 
 
 def table(builds):
-    head = ["build", "flags", "crates"] + (["program", "processor time"] if builds else [])
+    head = ["build", "features", "crates"] + (["program", "processor time"] if builds else [])
     rows = [head, ["---"] * len(head)]
-    for name, flags, kind in BUILDS:
-        measured = build(flags, kind) if builds else ()
-        rows.append([name, f"`{flags}`" if flags else "", str(crates(flags)), *measured])
+    for name, features, kind in BUILDS:
+        measured = build(features, kind) if builds else ()
+        rows.append([name, f"`{features}`" if features else "", str(crates(features)), *measured])
     return "".join("| " + " | ".join(row) + " |\n" for row in rows)
 
 

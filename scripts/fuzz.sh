@@ -31,9 +31,9 @@ done
 
 say "building"
 if [ -n "$runs" ]; then
-    # A build without the counters of coverage.
-    "${CARGO:-cargo}" build --release --locked --manifest-path fuzz/Cargo.toml --target-dir "$folder/plain"
-    programs=$folder/plain/release
+    # A build without the counters of coverage, in the tests' profile and folder, where dependencies are built already.
+    "${CARGO:-cargo}" build --locked --manifest-path fuzz/Cargo.toml --target-dir "${CARGO_TARGET_DIR:-target}"
+    programs=${CARGO_TARGET_DIR:-target}/debug
 else
     cargo fuzz --version >/dev/null 2>&1 || fail "cargo-fuzz is missing: cargo install cargo-fuzz --locked"
     cargo fuzz build --sanitizer none --target-dir "$folder/build"

@@ -13,6 +13,8 @@
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.1; for Verlet, Swope
 //! et al., *J. Chem. Phys.* 76 (1982), with the velocity predicted by `v + h a₁` for the second evaluation.
 //!
+//! All that is known of a method by itself stands here: its facts and its steps, over any numbers.
+//!
 //! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
 
 #![allow(
@@ -23,7 +25,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::number::{Number, entries};
+use super::number::{Arithmetic, entries};
 
 /// One of the selectable one-step methods.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -45,36 +47,67 @@ impl Method {
     /// All methods, in the order in which they are taught.
     pub const ALL: [Self; 4] = [Self::Euler, Self::Midpoint, Self::Verlet, Self::Rk4];
 
+    const fn facts(self) -> Facts {
+        match self {
+            Self::Euler => Facts {
+                name: "euler",
+                order: 1,
+                evaluations: 1,
+                turn_per_step: 0.4,
+            },
+            Self::Midpoint => Facts {
+                name: "midpoint",
+                order: 2,
+                evaluations: 2,
+                turn_per_step: 0.3,
+            },
+            Self::Verlet => Facts {
+                name: "verlet",
+                order: 2,
+                evaluations: 2,
+                turn_per_step: 0.8,
+            },
+            Self::Rk4 => Facts {
+                name: "rk4",
+                order: 4,
+                evaluations: 4,
+                turn_per_step: 1.25,
+            },
+        }
+    }
+
     /// The name that requests and messages use.
     #[must_use]
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Euler => "euler",
-            Self::Midpoint => "midpoint",
-            Self::Verlet => "verlet",
-            Self::Rk4 => "rk4",
-        }
+        self.facts().name
     }
 
     /// Order of the global error in the timestep.
     #[must_use]
     pub const fn order(self) -> u32 {
-        match self {
-            Self::Euler => 1,
-            Self::Midpoint | Self::Verlet => 2,
-            Self::Rk4 => 4,
-        }
+        self.facts().order
     }
 
     /// Acceleration evaluations that one step makes.
     #[must_use]
     pub const fn evaluations(self) -> u32 {
-        match self {
-            Self::Euler => 1,
-            Self::Midpoint | Self::Verlet => 2,
-            Self::Rk4 => 4,
-        }
+        self.facts().evaluations
     }
+
+    /// How far the fastest link of an arm may turn in a step \[rad\]: a method that cannot follow a turn within a step
+    /// feeds energy into the arm. Seen, not derived: `study::motion` says on which arms.
+    #[must_use]
+    pub const fn turn_per_step(self) -> f64 {
+        self.facts().turn_per_step
+    }
+}
+
+/// All that is known of a method, beside its steps.
+struct Facts {
+    name: &'static str,
+    order: u32,
+    evaluations: u32,
+    turn_per_step: f64,
 }
 
 impl fmt::Display for Method {
@@ -108,7 +141,7 @@ pub type Increment<const N: usize, T = f64> = ([T; N], [T; N]);
 /// Increments, not states, are returned, so that a caller can sum them with compensation ([`two_sum`]). What is not
 /// finite is passed on: judging it is the caller's.
 #[inline(always)]
-pub fn increment<T: Number, const N: usize>(
+pub fn increment<T: Arithmetic, const N: usize>(
     method: Method,
     acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
     t: T,
@@ -125,7 +158,7 @@ pub fn increment<T: Number, const N: usize>(
 }
 
 #[inline(always)]
-fn euler<T: Number, const N: usize>(
+fn euler<T: Arithmetic, const N: usize>(
     mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
     t: T,
     q: &[T; N],
@@ -137,7 +170,7 @@ fn euler<T: Number, const N: usize>(
 }
 
 #[inline(always)]
-fn midpoint<T: Number, const N: usize>(
+fn midpoint<T: Arithmetic, const N: usize>(
     mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
     t: T,
     q: &[T; N],
@@ -153,7 +186,7 @@ fn midpoint<T: Number, const N: usize>(
 }
 
 #[inline(always)]
-fn verlet<T: Number, const N: usize>(
+fn verlet<T: Arithmetic, const N: usize>(
     mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
     t: T,
     q: &[T; N],
@@ -170,7 +203,7 @@ fn verlet<T: Number, const N: usize>(
 }
 
 #[inline(always)]
-fn rk4<T: Number, const N: usize>(
+fn rk4<T: Arithmetic, const N: usize>(
     mut acceleration: impl FnMut(T, &[T; N], &[T; N]) -> [T; N],
     t: T,
     q: &[T; N],
@@ -197,18 +230,18 @@ fn rk4<T: Number, const N: usize>(
 /// Carrying what was left out into the next addition makes a million small steps as good as one.
 #[inline(always)]
 #[must_use]
-pub fn two_sum<T: Number>(a: T, b: T) -> (T, T) {
+pub fn two_sum<T: Arithmetic>(a: T, b: T) -> (T, T) {
     let sum = a + b;
     let b_in_sum = sum - a;
     (sum, (a - (sum - b_in_sum)) + (b - b_in_sum))
 }
 
 #[inline(always)]
-fn scaled<T: Number, const N: usize>(h: T, x: &[T; N]) -> [T; N] {
+fn scaled<T: Arithmetic, const N: usize>(h: T, x: &[T; N]) -> [T; N] {
     entries!(h, i => h * x[i])
 }
 
 #[inline(always)]
-fn moved<T: Number, const N: usize>(x: &[T; N], h: T, rate: &[T; N]) -> [T; N] {
+fn moved<T: Arithmetic, const N: usize>(x: &[T; N], h: T, rate: &[T; N]) -> [T; N] {
     entries!(h, i => x[i] + h * rate[i])
 }

@@ -2,7 +2,7 @@
 //!
 //! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
 //! until numbers end. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
-//! fastest link. [`Motion::turn_per_step`] is what every method was seen to carry.
+//! fastest link. [`turn_per_step`] is what every method was seen to carry.
 //!
 //! | motion | speed Ω assumed |
 //! | --- | --- |
@@ -18,6 +18,8 @@
 //! dampings the speed assumed was 0.5 to 2.9 times the true one.
 //!
 //! **Invariant:** pure and cheap, some 3 µs: it is asked for at every tick.
+//!
+//! [`turn_per_step`]: crate::math::integrator::Method::turn_per_step
 
 #![allow(
     clippy::indexing_slicing,
@@ -30,7 +32,6 @@ use std::ops::RangeInclusive;
 use super::control_loop::ControlLoop;
 use crate::math::arm::{Arm, State};
 use crate::math::dynamics::{energy, forward_dynamics, potential_energy};
-use crate::math::integrator::Method;
 
 /// A speed, and the timestep that it allows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,17 +43,6 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// How far the fastest link may turn in a step \[rad\].
-    #[must_use]
-    pub const fn turn_per_step(method: Method) -> f64 {
-        match method {
-            Method::Euler => 0.4,
-            Method::Midpoint => 0.3,
-            Method::Verlet => 0.8,
-            Method::Rk4 => 1.25,
-        }
-    }
-
     /// The motion that is ahead of an arm in this state, under this loop.
     #[must_use]
     pub fn ahead<const N: usize>(control: &ControlLoop<N>, state: &State<N>) -> Self {
@@ -82,7 +72,7 @@ impl Motion {
             by_energy
         };
         // NaN, of an arm too extreme to reckon with, limits nothing.
-        let timestep = Self::turn_per_step(*method) / speed;
+        let timestep = method.turn_per_step() / speed;
         if speed > 0.0 && timestep > 0.0 {
             Self { speed, timestep }
         } else {

@@ -141,6 +141,38 @@ fn nothing_is_cut_up_for_a_client_that_does_not_read() {
     });
 }
 
+/// A series waits to be cut up as one piece, and goes as one; each message in it counts.
+#[test]
+fn each_message_of_a_series_that_had_to_go_is_counted() {
+    const MESSAGES: u64 = 2000;
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
+        subscribe_in_pieces(&mut subscriber, 4096).await;
+        publisher.advertise("/t").await;
+        let pad = "x".repeat(8 * 1024);
+        let mut lines = String::new();
+        for n in 0..MESSAGES {
+            let _ = writeln!(
+                lines,
+                "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{{\"n\":{n},\"pad\":\"{pad}\"}}}}"
+            );
+        }
+        publisher.send_text(&lines).await;
+        sleep(Duration::from_secs(60)).await;
+        let (mut came, mut last) = (0, 0);
+        while last + 1 < MESSAGES {
+            last = next_message(&mut subscriber).await.0["msg"]["n"]
+                .as_u64()
+                .unwrap();
+            came += 1;
+        }
+        let dropped = gateway.gauges.messages_dropped();
+        assert_eq!(came + dropped, MESSAGES, "each has come or is counted");
+        assert!(dropped > MESSAGES / 4, "{dropped} were too many to be kept");
+    });
+}
+
 #[test]
 fn of_a_series_a_throttled_subscriber_hears_the_first_and_then_the_newest() {
     const MESSAGES: u64 = 1200;

@@ -38,3 +38,4 @@ against roslibrust/target/debug/pendularm-client-roslibrust
 records=$(mktemp -d)
 timeout 300 .venv/bin/python python/record_readers.py "$program" "$records/whole.mcap" "$records/killed.mcap"
 timeout 120 node node/mcap_core.mjs "$records/whole.mcap" "$records/killed.mcap"
+timeout 120 .venv/bin/python python/rerun_reader.py "$records/whole.mcap" "$records/killed.mcap"

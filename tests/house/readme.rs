@@ -9,6 +9,7 @@ use std::process::Command;
 
 use crate::limits::sources;
 use crate::papers::{table, text};
+use pendularm::math::integrator::Method;
 use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic};
 
 /// The texts between the code marks of a cell, in order.
@@ -163,6 +164,12 @@ fn the_papers_list_every_service_with_its_fields_in_order() {
             .map(|name| (name, !row[1].contains(&format!("*`{name}`*"))))
             .collect();
         assert_eq!(written, expected, "{}", service.name());
+        if service == Service::SetIntegrator {
+            let methods = codes(&row[2])
+                .into_iter()
+                .filter_map(|name| name.parse().ok());
+            assert_eq!(methods.collect::<Vec<Method>>(), Method::ALL);
+        }
     }
 }
 

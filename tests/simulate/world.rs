@@ -121,8 +121,8 @@ impl World {
 
     /// Turns until nothing has moved in any pipe for a while: all that was sent has been read and answered.
     pub async fn until_quiet(&self) {
-        // A flood of a megabyte a client takes some dozens of these.
-        for _ in 0..200 {
+        // A flood of a megabyte a client takes some dozens of these; two, in pieces of a hundred bytes, four hundred.
+        for _ in 0..1000 {
             let before = self.moved.get();
             self.turns(300).await;
             if self.moved.get() == before {

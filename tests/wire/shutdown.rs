@@ -235,6 +235,10 @@ fn steps_by_hand_that_are_not_taken_yet_are_told_that_the_program_is_shutting_do
     for client in &mut clients {
         client.send_bytes(calls.as_bytes());
     }
+    // Once the first is taken, the next is at the arm.
+    for client in &mut clients {
+        client.receive();
+    }
     ends_on(&mut runtime, "TERM");
     let mut told = 0;
     for client in &mut clients {

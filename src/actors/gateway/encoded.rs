@@ -57,9 +57,9 @@ impl Encoded {
         }
     }
 
-    /// How long it is as it came, in bytes.
-    pub(super) fn plain_length(&self) -> usize {
-        self.plain.len()
+    /// The message or messages as they came.
+    pub(super) fn plain(&self) -> &Bytes {
+        &self.plain
     }
 
     /// The messages, if they have been made, or are so short that they can be at once.

@@ -237,11 +237,11 @@ pub enum Frames {
 }
 
 impl Frames {
-    /// How long they are as they came, in bytes.
-    pub(super) fn plain_length(&self) -> usize {
+    /// They as they came.
+    pub(super) fn plain(&self) -> &Bytes {
         match self {
-            Self::Plain(frame) | Self::Feedback(frame) => frame.len(),
-            Self::Encoded(encoded, _) => encoded.plain_length(),
+            Self::Plain(frame) | Self::Feedback(frame) => frame,
+            Self::Encoded(encoded, _) => encoded.plain(),
         }
     }
 }

@@ -8,11 +8,13 @@
 //! where that changes nothing: so that a lane has the bits of the arm that is stepped alone, on every machine and in
 //! registers of every width.
 
+mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
 pub(super) use register::RegisterPair;
 

@@ -169,8 +169,8 @@ impl Floquet {
             "floquet",
             "Floquet multipliers along a periodic swing",
             "2 links swing from rest on one side through the hanging pose to rest on the other and back, without \
-             control. Left: the true multiplier of the pair beside the swing; above 1 the swing is unstable \
-             by itself. Right: how far from the unit circle a method puts it, by timestep; the table says to which \
+             control. First: the true multiplier of the pair beside the swing; above 1 the swing is unstable \
+             by itself. Second: how far from the unit circle a method puts it, by timestep; the table says to which \
              side.",
             &Key::methods(),
             &[by_amplitude, by_timestep],

@@ -36,16 +36,24 @@ pub(crate) enum Marker {
     Square,
     Triangle,
     Diamond,
+    Wedge,
 }
 
 impl Marker {
+    /// The shapes of methods, by their place in [`Method::ALL`].
+    const OF_METHODS: [Self; 5] = [
+        Self::Circle,
+        Self::Square,
+        Self::Triangle,
+        Self::Diamond,
+        Self::Wedge,
+    ];
+
     pub(crate) fn of(method: Method) -> Self {
-        match method {
-            Method::Euler => Self::Circle,
-            Method::Midpoint => Self::Square,
-            Method::Verlet => Self::Triangle,
-            Method::Rk4 => Self::Diamond,
-        }
+        let shapes = Self::OF_METHODS.into_iter().cycle();
+        let mut of = Method::ALL.into_iter().zip(shapes);
+        of.find(|(one, _)| *one == method)
+            .map_or(Self::None, |(_, shape)| shape)
     }
 
     /// The shape about `(x, y)` as a path.
@@ -60,6 +68,7 @@ impl Marker {
             ),
             Self::Square => format!("M{:.1} {:.1}h6.4v6.4h-6.4z", x - 3.2, y - 3.2),
             Self::Triangle => format!("M{x:.1} {:.1}l4.2 7.4h-8.4z", y - 4.6),
+            Self::Wedge => format!("M{x:.1} {:.1}l4.2 -7.4h-8.4z", y + 4.6),
             Self::Diamond => format!("M{x:.1} {:.1}l4.6 4.6l-4.6 4.6l-4.6 -4.6z", y - 4.6),
         }
     }

@@ -28,6 +28,8 @@ pub const PERIOD: Duration = Duration::from_millis(5);
 
 /// The error for a client that cancels a goal which it has not sent, or which has ended.
 const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
+/// Why a goal ends whose arm is put back to the start.
+const RESET: &str = "the arm was reset";
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -152,6 +154,11 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ActivePath<N> {
+    /// Whether the arm has been reset since the goal began.
+    fn is_before_reset(&self, motion: &JointMotion<N>) -> bool {
+        motion.before_reset.to_bits() != self.before_reset.to_bits()
+    }
+
     fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
         self.follower.conclude(&result(code, why), status);
     }
@@ -203,8 +210,8 @@ impl<const N: usize> PathFollower<N> {
         let Some(goal) = &mut self.active else {
             return;
         };
-        if motion.before_reset.to_bits() != goal.before_reset.to_bits() {
-            return self.abort("the arm was reset");
+        if goal.is_before_reset(motion) {
+            return self.abort(RESET);
         }
         let time = motion.time - goal.began;
         let desired = goal.course.path.at(time);
@@ -231,7 +238,7 @@ impl<const N: usize> PathFollower<N> {
     /// The setpoint has been moved, or was somebody else's.
     fn moved(&mut self, is_ours: bool, standing: Standing, ctx: &mut Context<Self>) {
         if !is_ours {
-            return self.abort("another setpoint has taken its place");
+            return self.tell_why(ctx);
         }
         let (status, code, why) = match standing {
             Standing::Underway => {
@@ -254,6 +261,22 @@ impl<const N: usize> PathFollower<N> {
         if let Some(goal) = self.active.take() {
             goal.end(status, code, &why);
         }
+    }
+
+    /// Ends the goal, whose setpoint somebody else's has replaced, or a reset that came since the arm was looked at.
+    fn tell_why(&self, ctx: &mut Context<Self>) {
+        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
+        ctx.wait(motion.map(|motion, node, _| {
+            let goal = node.active.as_ref();
+            let reset = goal
+                .zip(motion.ok())
+                .is_some_and(|(goal, motion)| goal.is_before_reset(&motion));
+            node.abort(if reset {
+                RESET
+            } else {
+                "another setpoint has taken its place"
+            });
+        }));
     }
 
     /// Ends the goal, whose setpoint is gone.

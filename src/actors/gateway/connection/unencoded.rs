@@ -6,6 +6,7 @@ use std::collections::VecDeque;
 
 use crate::actors::gateway::messages::Deliver;
 use crate::protocol::outbox::{MAX_TOPIC_BYTES, PLACE_BYTES};
+use crate::protocol::wire::series;
 
 /// The messages of one connection that wait.
 #[derive(Default)]
@@ -18,19 +19,21 @@ pub(super) struct Unencoded {
 }
 
 impl Unencoded {
-    /// Adds a message; gives how many had to go for it.
+    /// Adds a message, or a series of them; gives how many messages had to go for it.
     pub(super) fn push(&mut self, message: Deliver) -> u64 {
-        self.bytes += message.frames.plain_length();
+        self.bytes += message.frames.plain().len();
         self.waiting.push_back(message);
         self.keep(MAX_TOPIC_BYTES)
     }
 
-    /// Drops the oldest messages until those that are left, and their places, take no more than `most` bytes; gives
-    /// how many went.
+    /// Drops the oldest until those that are left, and their places, take no more than `most` bytes; gives how many
+    /// messages went.
     pub(super) fn keep(&mut self, most: usize) -> u64 {
         let mut dropped = 0;
-        while self.bytes + self.waiting.len() * PLACE_BYTES > most && self.pop().is_some() {
-            dropped += 1;
+        while self.bytes + self.waiting.len() * PLACE_BYTES > most
+            && let Some(oldest) = self.pop()
+        {
+            dropped += series::messages(oldest.frames.plain().clone()).count() as u64;
         }
         dropped
     }
@@ -42,7 +45,7 @@ impl Unencoded {
 
     pub(super) fn pop(&mut self) -> Option<Deliver> {
         let message = self.waiting.pop_front()?;
-        self.bytes -= message.frames.plain_length();
+        self.bytes -= message.frames.plain().len();
         Some(message)
     }
 }

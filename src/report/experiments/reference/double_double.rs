@@ -7,11 +7,13 @@
 //! Source: Dekker, *Numer. Math.* 18 (1971); Hida, Li and Bailey, *Library for double-double and quad-double
 //! arithmetic* (2007).
 //!
-//! **Invariant:** shares nothing with the arm's own kernel but [`two_sum`], so that a mistake cannot be in both.
+//! **Invariant:** shares nothing with the arm's own dynamics, and [`two_sum`] with its sums, so that a mistake is not
+//! in both.
 
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 use crate::math::integrator::two_sum;
+use crate::math::number::Arithmetic;
 
 /// A number of about 106 bits. Magnitudes beyond 1e300 are not meant to work: splitting overflows there.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -163,6 +165,31 @@ impl Div for DoubleDouble {
         let third = rest.hi / other.hi;
         let (hi, lo) = fast_two_sum(first, second);
         Self { hi, lo } + Self::from(third)
+    }
+}
+
+impl Add<f64> for DoubleDouble {
+    type Output = Self;
+
+    #[inline]
+    fn add(self, other: f64) -> Self {
+        self + Self::from(other)
+    }
+}
+
+impl Mul<f64> for DoubleDouble {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, other: f64) -> Self {
+        self * Self::from(other)
+    }
+}
+
+impl Arithmetic for DoubleDouble {
+    #[inline]
+    fn like(self, value: f64) -> Self {
+        Self::from(value)
     }
 }
 

@@ -64,12 +64,12 @@ fn closed_form(method: Method, w: f64, d: f64) -> bool {
             det < 1.0 && 1.0 + trace + det > 0.0 && 1.0 - trace + det > 0.0
         }
         Method::Verlet => d < 2.0 && w < 4.0 - 2.0 * d + d * d,
-        Method::Rk4 => {
-            // |R(s)|² of the two roots s = -d/2 ± sqrt(d²/4 - w).
+        // |R(s)| of the roots s = -d/2 ± sqrt(d²/4 - w), for Runge-Kutta methods of as many evaluations as their order.
+        _ => {
             let half = d * d / 4.0 - w;
             let r = |re: f64, im: f64| {
                 let (mut sum, mut power) = ((1.0, 0.0), (1.0, 0.0));
-                for k in [1.0, 2.0, 3.0, 4.0] {
+                for k in (1..=method.order()).map(f64::from) {
                     power = (
                         (power.0 * re - power.1 * im) / k,
                         (power.0 * im + power.1 * re) / k,

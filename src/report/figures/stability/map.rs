@@ -142,7 +142,7 @@ impl Map {
             ),
             "2 links at their setpoint, default gains stiffened by a factor (kp by it, kd by its root, ki by its power \
              of 3/2: the same motion, faster). Colour: whether a nudge of the arm itself dies out (blue) or grows \
-             (orange), the darker the faster. LimitRow: the predicted limit. Dots: cells where the two disagree. Grey: \
+             (orange), the darker the faster. Line: the predicted limit. Dots: cells where the two disagree. Grey: \
              not judged, because by the prediction the slowest mode changes its energy by less than a factor e in the \
              4000 steps watched; that is asked of every cell alike, before looking at whether it agrees. In the lowest \
              rows the gains are too weak to carry the arm against gravity: no timestep is stable.",

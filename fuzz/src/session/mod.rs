@@ -1,0 +1,305 @@
+//! Clients that do as a script says, and what must hold of all that they hear.
+//!
+//! - Every frame is one line of strict JSON (or CBOR, where that was asked for) with an `op` that the runtime sends.
+//! - A call gets exactly one response with its `id`, as long as its client stays, reads, and breaks no rule; never two.
+//! - Of one client's messages on a topic another hears each at most once, in the order in which they were sent, as they were sent.
+//! - A provider hears what its caller asked, and the caller what its provider answered.
+//! - In the end, when nobody is in anybody's way, every message and every call between those who are left arrives.
+//! - A connection ends when its client has ended, and nothing else ends it but the rules that say so.
+//! - When all have left, nothing is counted as held for anybody.
+//!
+//! All of it holds too where all clients together have little room.
+
+mod ending;
+mod frames;
+mod player;
+mod script;
+mod text;
+
+pub use script::{Deed, Payload, Step};
+
+use std::cell::RefCell;
+use std::collections::{BTreeMap, HashMap};
+use std::fmt::Write;
+use std::rc::Rc;
+use std::time::Duration;
+
+use arbitrary::Arbitrary;
+use pendularm::actors::gateway::connection::gate::Gate;
+use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
+use pendularm::actors::resources::budget::Memory;
+use pendularm::protocol::catalog::{Rosapi, Service, Topic};
+use pendularm::web::serve::TAKE_TIME;
+use pendularm_client::websocket;
+use tokio::time::sleep;
+
+use crate::book::Book;
+use crate::cbor;
+use crate::client::{Client, Door, Received};
+use crate::json::Json;
+use crate::stage::{Manner, Stage, run, run_apart, scarce};
+use text::{TOPICS, VALUES, fitting, put, quoted, service_name, service_of, topic_of};
+
+/// Most steps of one execution, and its number of clients.
+const MAX_STEPS: usize = 48;
+const CLIENTS: usize = 3;
+/// Virtual time, in milliseconds, that the arm's clients let pass in one execution, and at a time: an arm of tiny timesteps
+/// computes for five milliseconds of the processor's in every one.
+const ARM_TIME: u16 = 200;
+const ARM_WAIT: u16 = 48;
+/// Longest that a caller lets a provider take; all is answered by then.
+const LONGEST_TIMEOUT: Duration = Duration::from_secs(66);
+/// Every id of a call begins so; garbage must not, or it would be a call.
+const ID: &str = "call-";
+/// Messages of each client in the end, on a topic that nobody has named before.
+const LAST_MESSAGES: u64 = 3;
+const LAST_TOPIC: &str = "/in/the/end";
+
+/// Plays a script with clients of one kind, and one node that serves everything.
+pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
+    run(async {
+        let stage = Stage::new(Gate::default(), memory(is_scarce)).await;
+        Session::new(door, Cast::Stub, is_scarce, stage)
+            .perform_all(steps)
+            .await;
+    });
+}
+
+/// Plays a script with the runtime's own nodes. In less time: an arm of tiny timesteps computes for as long as it may.
+pub fn play_with_arm(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
+    run_apart(async {
+        let stage = Stage::with_arm(Gate::default(), memory(is_scarce)).await;
+        Session::new(door, Cast::Arm, is_scarce, stage)
+            .perform_all(steps)
+            .await;
+    });
+}
+
+fn memory(is_scarce: bool) -> Memory {
+    if is_scarce {
+        scarce()
+    } else {
+        Memory::default()
+    }
+}
+
+/// Who serves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cast {
+    Stub,
+    Arm,
+}
+
+struct Session {
+    door: Door,
+    cast: Cast,
+    stage: Stage,
+    players: Vec<Player>,
+    /// Milliseconds left of [`ARM_TIME`].
+    left: u16,
+    /// Calls and messages so far: their numbers tell them apart.
+    calls: u64,
+    messages: u64,
+    /// All that clients say, for all to look up.
+    book: Rc<RefCell<Book>>,
+    is_scarce: bool,
+}
+
+/// A client, and what it may expect.
+struct Player {
+    client: Client,
+    /// How often each of its calls was answered.
+    answered: BTreeMap<String, u32>,
+    /// Calls that came for it as a provider: id, service, and the caller's own id.
+    forwarded: Vec<(String, String, String)>,
+    /// The messages that it heard in the end: whose, and which.
+    last: Vec<(u64, u64)>,
+    book: Rc<RefCell<Book>>,
+    /// The last message of each topic and sender.
+    latest: HashMap<(String, u64), u64>,
+    /// Fragments of a message, by its id.
+    pieces: HashMap<String, Vec<String>>,
+    /// It has broken a rule, or left: the runtime owes it nothing and may end it.
+    is_excused: bool,
+    has_ended: bool,
+    /// How long it has not been reading, in a row.
+    idle: Duration,
+}
+
+impl Session {
+    fn new(door: Door, cast: Cast, is_scarce: bool, stage: Stage) -> Self {
+        let mut session = Self {
+            door,
+            cast,
+            stage,
+            players: Vec::new(),
+            left: ARM_TIME,
+            calls: 0,
+            messages: 0,
+            book: Rc::default(),
+            is_scarce,
+        };
+        for _ in 0..CLIENTS {
+            let player = session.enter(2, 255);
+            session.players.push(player);
+        }
+        session
+    }
+
+    fn enter(&self, room: u8, piece: u8) -> Player {
+        let room = [64, 1024, 16 * 1024, 1 << 20][usize::from(room) % 4];
+        let piece = if piece == 255 {
+            1 << 20
+        } else {
+            usize::from(piece)
+        };
+        let client = Client::new(self.door, self.stage.connect(room), piece);
+        // So that nothing that follows opens like another protocol.
+        client.send("{\"op\":\"set_level\",\"level\":\"info\"}", 0);
+        Player::new(client, Rc::clone(&self.book))
+    }
+
+    async fn perform_all(mut self, steps: &[Step<'_>]) {
+        for step in steps.iter().take(MAX_STEPS) {
+            self.perform(step).await;
+            self.hear();
+        }
+        self.end().await;
+    }
+
+    async fn perform(&mut self, step: &Step<'_>) {
+        match step {
+            Step::Do {
+                client,
+                style,
+                deed,
+            } => {
+                if let Some(frame) = self.frame(*client, deed) {
+                    self.player(*client).client.send(&frame, *style);
+                }
+            }
+            Step::InPieces {
+                client,
+                style,
+                size,
+                deed,
+            } => {
+                if let Some(frame) = self.frame(*client, deed) {
+                    self.send_pieces(*client, *style, (*size).max(8).into(), &frame);
+                }
+            }
+            Step::Garbage { client, bytes } => self.send_garbage(*client, bytes),
+            Step::Noise { client, bytes } => {
+                let door = self.door;
+                let player = self.player(*client);
+                // A line that is not ended would swallow what follows, and a frame may be a close frame.
+                player.is_excused = true;
+                player.note_forgery(bytes);
+                player.client.send_bytes(bytes.to_vec());
+                if door == Door::Plain {
+                    player.client.send_bytes(b"\n".to_vec());
+                }
+            }
+            Step::Wait(milliseconds) => {
+                let milliseconds = match self.cast {
+                    Cast::Stub => *milliseconds,
+                    Cast::Arm => (milliseconds % ARM_WAIT).min(self.left),
+                };
+                self.left -= milliseconds.min(self.left);
+                self.pass(Duration::from_millis(milliseconds.into())).await;
+            }
+            Step::Pause { client, paused } => self.player(*client).client.pause(*paused),
+            Step::HalfClose { client } => {
+                let player = self.player(*client);
+                player.client.finish();
+                player.is_excused = true;
+            }
+            Step::Replace {
+                client,
+                room,
+                piece,
+            } => {
+                let player = self.enter(*room, *piece);
+                let place = usize::from(*client) % CLIENTS;
+                self.players[place] = player;
+            }
+            Step::Behave(manner) => {
+                let manners = [
+                    Manner::Prompt,
+                    Manner::Holding,
+                    Manner::Late,
+                    Manner::Forgetful,
+                ];
+                self.stage.behave(manners[usize::from(*manner) % 4]);
+            }
+            Step::Release => self.stage.release(),
+            Step::Publish { topic } => {
+                self.messages += 1;
+                let topic = Topic::ALL[usize::from(*topic) % Topic::ALL.len()];
+                self.stage.publish(topic, self.messages);
+            }
+        }
+        for _ in 0..4 {
+            tokio::task::yield_now().await;
+        }
+    }
+
+    fn player(&mut self, client: u8) -> &mut Player {
+        &mut self.players[usize::from(client) % CLIENTS]
+    }
+
+    /// Lets time pass, in which clients answer pings.
+    async fn pass(&mut self, time: Duration) {
+        let mut left = time;
+        while !left.is_zero() {
+            let step = left.min(Duration::from_secs(5));
+            sleep(step).await;
+            left -= step;
+            for player in &mut self.players {
+                if player.client.is_paused() {
+                    player.idle += step;
+                }
+            }
+            self.hear();
+            // A client that reads again has taken all there was by now, and given its signs of life: it has not stalled.
+            for player in &mut self.players {
+                if !player.client.is_paused() {
+                    player.idle = Duration::ZERO;
+                }
+            }
+        }
+    }
+
+    /// Looks at all that came.
+    fn hear(&mut self) {
+        // Where room is scarce, whoever holds most is cut off.
+        let someone_gave_way = self.stage.gauges.memory().cut_off() > 0;
+        for player in &mut self.players {
+            for received in player.client.take() {
+                match received {
+                    Received::Json(line) => player.hear(&line),
+                    Received::Binary(bytes) => player.hear_binary(&bytes),
+                }
+            }
+            if player.client.has_ended() && !player.has_ended {
+                player.has_ended = true;
+                let patience = if player.client.is_greeted() {
+                    STALL_LIMIT
+                } else {
+                    TAKE_TIME
+                };
+                let stalled = player.idle >= patience || someone_gave_way;
+                assert!(
+                    player.is_excused || stalled,
+                    "ended for no reason: {}",
+                    player.client.rest()
+                );
+                assert!(
+                    stalled || player.client.ended_in_order(),
+                    "ended within a frame: {}",
+                    player.client.rest()
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! Scripts: all that clients do, as the fuzzer draws it.
+
+use super::*;
+
+/// One thing that happens.
+#[derive(Debug, Arbitrary)]
+pub enum Step<'a> {
+    /// A client sends a frame.
+    Do {
+        client: u8,
+        style: u8,
+        deed: Deed<'a>,
+    },
+    /// A client sends a frame in pieces of so many bytes.
+    InPieces {
+        client: u8,
+        style: u8,
+        size: u8,
+        deed: Deed<'a>,
+    },
+    /// A client sends anything, up to the end of a line or message.
+    Garbage { client: u8, bytes: &'a [u8] },
+    /// A client sends bytes that need be no message at all.
+    Noise { client: u8, bytes: &'a [u8] },
+    /// So many milliseconds pass.
+    Wait(u16),
+    /// A client stops or goes on reading.
+    Pause { client: u8, paused: bool },
+    /// A client ends, and reads on.
+    HalfClose { client: u8 },
+    /// A client is gone, and another in its place.
+    Replace { client: u8, room: u8, piece: u8 },
+    /// The runtime's node treats calls otherwise.
+    Behave(u8),
+    /// It answers a call that it has kept.
+    Release,
+    /// It publishes.
+    Publish { topic: u8 },
+}
+
+/// A frame, roughly.
+#[derive(Debug, Arbitrary)]
+pub enum Deed<'a> {
+    Advertise {
+        topic: u8,
+    },
+    Unadvertise {
+        topic: u8,
+    },
+    Publish {
+        topic: u8,
+        payload: Payload<'a>,
+    },
+    Subscribe {
+        topic: u8,
+        id: Option<u8>,
+        throttle_ms: Option<u16>,
+        queue_length: u8,
+        compression: u8,
+        size: Option<u8>,
+    },
+    Unsubscribe {
+        topic: u8,
+        id: Option<u8>,
+    },
+    Provide {
+        service: u8,
+    },
+    Withdraw {
+        service: u8,
+    },
+    Call {
+        service: u8,
+        timeout: Option<u16>,
+        args: Payload<'a>,
+    },
+    /// As a provider, of a call that came: the one of that number.
+    Respond {
+        which: u8,
+        result: bool,
+        values: Payload<'a>,
+    },
+    Level(u8),
+    Goal {
+        id: u8,
+        args: Payload<'a>,
+    },
+    Cancel {
+        id: u8,
+    },
+}
+
+/// A JSON value, roughly.
+#[derive(Debug, Arbitrary)]
+pub enum Payload<'a> {
+    Absent,
+    Known(u8),
+    Text(&'a str),
+    Number(f64),
+    Numbers(Vec<f64>),
+    Long(u16),
+    Deep(u8),
+    /// To a call: every field with a value of its kind, but for those whose bit is set.
+    Fitting([f64; 4], u8),
+}

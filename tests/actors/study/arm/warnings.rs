@@ -1,0 +1,156 @@
+//! Words about a timestep, and the estimated error.
+
+use super::*;
+
+#[test]
+fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
+    in_virtual_time(async {
+        let stage = Stage::new(0.004).await;
+        stage.ask(enable(true)).await;
+        stage.want(Topic::Diagnostics, true).await;
+        sleep(Duration::from_millis(2100)).await;
+        for message in stage.said(Topic::Diagnostics) {
+            assert_eq!(message["status"][0]["level"], 0);
+            assert_eq!(
+                (
+                    value(&message, "timestep_limit"),
+                    value(&message, "warning")
+                ),
+                ("0.004", "")
+            );
+        }
+        for paused in [false, true] {
+            let state = if paused { "paused" } else { "running" };
+            stage.ask(pause(paused)).await;
+            for (timestep, level) in [(0.005, 1), (0.004, 0)] {
+                // Within a tick of the change, not a second later.
+                sleep(Duration::from_millis(5)).await;
+                stage.said(Topic::Diagnostics);
+                stage.ask(integrator(Some(timestep), None)).await;
+                sleep(Duration::from_millis(20)).await;
+                let told = stage.said(Topic::Diagnostics);
+                let status = &told[0]["status"][0];
+                assert_eq!(
+                    (&status["level"], &status["message"]),
+                    (&json!(level), &json!(state))
+                );
+                let warning = value(&told[0], "warning");
+                assert_eq!(
+                    warning,
+                    if level == 1 {
+                        "the timestep 0.005 s exceeds 0.004 s, up to which rk4 is predicted to be stable at the present setpoint"
+                    } else {
+                        ""
+                    }
+                );
+            }
+        }
+        stage.oracle.limit.set(0.0);
+        stage.ask(enable(false)).await;
+        sleep(Duration::from_millis(300)).await;
+        let told = stage.said(Topic::Diagnostics);
+        assert_eq!(
+            value(told.last().unwrap(), "warning"),
+            "rk4 is predicted to be unstable at every timestep with the controller off"
+        );
+    });
+}
+
+#[test]
+fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
+    in_virtual_time(async {
+        let stage = Stage::new(f64::INFINITY).await;
+        stage.want(Topic::Diagnostics, true).await;
+        stage.ask(pause(true)).await;
+        // At rest without gravity, so that nothing moves either.
+        stage.ask(gravity(0.0)).await;
+        stage.ask(Reset::default()).await;
+        stage.ask(integrator(Some(1e6), None)).await;
+        sleep(Duration::from_secs(2)).await;
+        let told = stage.said(Topic::Diagnostics);
+        let message = told.last().unwrap();
+        assert_eq!(
+            (value(message, "timestep_limit"), value(message, "warning")),
+            ("inf", "")
+        );
+    });
+}
+
+/// A free arm with nothing to be unstable about, and yet spun so fast, or falling so far, that the method cannot follow: the
+/// smaller of the two limits warns.
+#[test]
+fn a_motion_too_fast_for_the_timestep_is_warned_of() {
+    in_virtual_time(async {
+        let stage = Stage::new(0.2).await;
+        stage.want(Topic::Diagnostics, true).await;
+        stage.ask(pause(true)).await;
+        for (timestep, warned) in [(0.05, false), (0.15, true)] {
+            stage.ask(integrator(Some(timestep), None)).await;
+            sleep(Duration::from_secs(2)).await;
+            let told = stage.said(Topic::Diagnostics);
+            let message = told.last().unwrap();
+            let limit: f64 = value(message, "timestep_limit_motion").parse().unwrap();
+            assert!((0.05..0.15).contains(&limit), "{limit}");
+            let warning = value(message, "warning");
+            assert_eq!(!warning.is_empty(), warned, "{warning}");
+            let said = "up to which rk4 is predicted to carry a motion of 16.4 rad/s";
+            assert_eq!(warning.contains(said), warned, "{warning}");
+        }
+        // Beyond both limits the smaller one is told.
+        stage.ask(integrator(Some(0.3), None)).await;
+        sleep(Duration::from_secs(2)).await;
+        let told = stage.said(Topic::Diagnostics);
+        let warning = value(told.last().unwrap(), "warning").to_owned();
+        assert!(warning.contains("16.4 rad/s"), "{warning}");
+    });
+}
+
+#[test]
+fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
+    in_virtual_time(async {
+        let stage = Stage::new(0.004).await;
+        stage.ask(integrator(None, Some(Method::Midpoint))).await;
+        stage.want(Topic::ErrorEstimate, true).await;
+        sleep(Duration::from_secs(3)).await;
+        let told = stage.said(Topic::ErrorEstimate);
+        assert!((29..=31).contains(&told.len()), "{}", told.len());
+        assert_eq!(stage.gauges.error_estimates(), told.len() as u64);
+        stage.ask(pause(true)).await;
+        sleep(Duration::from_millis(200)).await;
+        let simulation = stage.arm.send(TakeSnapshot::<2>).await.unwrap().0;
+        let expected = estimate(&simulation).unwrap();
+        assert!(expected.local_error > 0.0);
+        assert_eq!(
+            *stage.said(Topic::ErrorEstimate).last().unwrap(),
+            json!({"method": "midpoint", "timestep": 0.001, "local_error": expected.local_error,
+                "velocity_error": expected.velocity_error, "error_per_second": expected.error_per_second, "predicted_limit": 0.004})
+        );
+        stage.want(Topic::ErrorEstimate, false).await;
+        let before = stage.gauges.error_estimates();
+        sleep(Duration::from_secs(3)).await;
+        assert_eq!(stage.gauges.error_estimates(), before);
+    });
+}
+
+#[test]
+fn an_arm_that_has_diverged_has_no_local_error() {
+    in_virtual_time(async {
+        let stage = Stage::new(f64::INFINITY).await;
+        stage.want(Topic::ErrorEstimate, true).await;
+        stage
+            .ask(SetGains {
+                kp: Some([1e200; 2]),
+                ..SetGains::default()
+            })
+            .await;
+        stage.set_setpoint([1.0, 1.0]).await;
+        stage.ask(integrator(Some(0.01), Some(Method::Euler))).await;
+        stage.ask(enable(true)).await;
+        sleep(Duration::from_secs(1)).await;
+        let told = stage.said(Topic::ErrorEstimate);
+        assert_eq!(
+            *told.last().unwrap(),
+            json!({"method": "euler", "timestep": 0.01, "local_error": null, "velocity_error": null, "error_per_second": null, "predicted_limit": null})
+        );
+    });
+}

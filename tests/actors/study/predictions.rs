@@ -1,0 +1,233 @@
+//! Limits, advice and plans: the study's own, with what is left out taken from the arm; and the refusal of fields.
+
+use super::*;
+
+/// The values that the service gives of these limits and this motion.
+fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Value {
+    let critical = limits.critical.unwrap();
+    let bears = Some(motion.timestep).filter(|timestep| timestep.is_finite());
+    let advised = [limits.advised, bears.map(|timestep| 0.8 * timestep)];
+    json!({
+        "timestep_limit_held": limits.held,
+        "timestep_limit_continuous": limits.continuous,
+        "equilibrium": limits.equilibrium.to_vec(),
+        "equilibrium_kind": limits.rest.name(),
+        "minimum_over_poses_held": limits.minimum_held,
+        "minimum_over_poses_continuous": limits.minimum_continuous,
+        "minimum_over_poses_bound": limits.bound,
+        "certified": limits.certified,
+        "worst_pose": limits.worst_pose.map(|pose| pose.to_vec()),
+        "critical": {
+            "growth_per_step": critical.growth_per_step,
+            "frequency": critical.frequency,
+            "joint": critical.joint,
+        },
+        "timestep_limit_motion": bears,
+        "motion_speed": motion.speed,
+        "advised_timestep": advised.into_iter().flatten().reduce(f64::min),
+    })
+}
+
+async fn assert_predictions_are_the_studys<const N: usize>() {
+    let mut bench = Bench::<N>::new();
+    let Present { control, state } = settings::<N>();
+    let expected = limits(&control);
+    let motion = Motion::ahead(&control, &state);
+    assert!(expected.held.is_some_and(|limit| limit > 0.0));
+    let predicted = bench.ask(PredictStability::default()).await.unwrap();
+    assert_eq!((predicted.limits, predicted.motion), (expected, motion));
+    let written = stability_values(&expected, &motion);
+    let all = settings_as_args::<N>();
+    let nulls =
+        json!({"integrator": null, "gains": {"kp": null}, "params": null, "setpoint": null});
+    for args in [json!({}), all, nulls] {
+        assert_eq!(bench.values(Service::Stability, &args).await, written);
+    }
+}
+
+#[test]
+fn the_predictions_are_the_studys_and_what_is_left_out_is_the_arms_own() {
+    System::new().block_on(async {
+        assert_predictions_are_the_studys::<2>().await;
+        assert_predictions_are_the_studys::<3>().await;
+    });
+}
+
+#[test]
+fn members_that_are_left_out_of_an_object_are_the_arms_own() {
+    System::new().block_on(async {
+        let bench = Bench::<2>::new();
+        let predicted = bench
+            .ask(PredictStability {
+                gains: Some(SetGains {
+                    kd: Some([9.0, 4.0]),
+                    ..SetGains::default()
+                }),
+                params: Some(gravity(0.0)),
+                method: Some(Method::Rk4),
+                setpoint: None,
+            })
+            .await
+            .unwrap();
+        let mut control = settings::<2>().control.with_method(Method::Rk4);
+        control.arm = Arm::new(*control.arm.lengths(), *control.arm.masses(), 0.0).unwrap();
+        control.gains.kd = [9.0, 4.0];
+        assert_eq!(predicted.limits, limits(&control));
+    });
+}
+
+/// Without gravity and control nothing limits; Euler on a free swing is stable at no timestep.
+#[test]
+fn no_limit_is_null_and_no_stable_timestep_is_zero() {
+    System::new().block_on(async {
+        let mut bench = Bench::<2>::new();
+        let none = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
+        let args = json!({"gains": none, "params": {"gravity": 0}});
+        let values = bench.values(Service::Stability, &args).await;
+        for limit in [
+            "timestep_limit_held",
+            "timestep_limit_continuous",
+            "minimum_over_poses_held",
+            "minimum_over_poses_continuous",
+            "minimum_over_poses_bound",
+            "worst_pose",
+            "critical",
+        ] {
+            assert!(values[limit].is_null(), "{limit} {values}");
+        }
+        // The motion alone limits: 0.2 and 0.4 rad/s of the links, all of whose energy one of them might have.
+        let speed = values["motion_speed"].as_f64().unwrap();
+        assert!((0.4..2.0).contains(&speed), "{values}");
+        assert_eq!(values["timestep_limit_motion"], 0.3 / speed);
+        assert_eq!(values["advised_timestep"], 0.8 * (0.3 / speed));
+        let args = json!({"gains": none, "integrator": "euler"});
+        let values = bench.values(Service::Stability, &args).await;
+        assert_eq!(values["timestep_limit_held"], 0.0, "{values}");
+        assert_eq!(values["advised_timestep"], 0.0, "{values}");
+    });
+}
+
+/// The search for gains and for a plan are the library's; what is left out is the arm's own.
+#[test]
+fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
+    System::new().block_on(async {
+        let mut bench = Bench::<2>::new();
+        let Present { control, state } = settings::<2>();
+        let wish = Wish {
+            settling_time: 4.0,
+            margin: 1.25,
+        };
+        let mut search = GainsSearch::new(&control, wish).unwrap();
+        let found = loop {
+            if let Some(found) = search.advance() {
+                break found.unwrap();
+            }
+        };
+        let suggested = bench.ask(SuggestGains::default()).await.unwrap();
+        assert_eq!(suggested.found, found);
+        assert_eq!(suggested.timestep, control.timestep);
+        let values = bench.values(Service::SuggestGains, &json!({})).await;
+        assert_eq!(values["kp"], json!(found.gains.kp));
+        assert_eq!(values["timestep_limit"], json!(found.limit));
+        let task = Task {
+            control,
+            start: state,
+            duration: 4.0,
+            error: 0.05,
+        };
+        let mut planning = Planning::new(task).unwrap();
+        let planned = loop {
+            if let Some(planned) = planning.advance() {
+                break planned.unwrap();
+            }
+        };
+        let run = bench.ask(plan_with(0.05)).await.unwrap();
+        assert_eq!(run.planned, planned);
+        assert!(run.controlled);
+        let args = json!({"error": 0.05, "servo": true});
+        let values = bench.values(Service::Plan, &args).await;
+        let best = planned.best().unwrap();
+        assert_eq!(values["integrator"], best.method.name());
+        assert_eq!(values["timestep"], json!(best.timestep));
+        assert_eq!(
+            bench
+                .refusal(Service::Plan, &json!({"error": -1, "servo": 1}))
+                .await,
+            "error must be greater than 0, got -1; servo must be true or false, got 1"
+        );
+        let tiny = SuggestGains {
+            timestep: Some(2_f64.powi(-20)),
+            ..SuggestGains::default()
+        };
+        let refused = bench.ask(tiny).await.unwrap_err();
+        assert_eq!(
+            refused.to_string(),
+            "settling_time / timestep must be at most 1e6 steps, got 4.194304e6"
+        );
+        let too_long = PlanRun {
+            duration: Some(1e9),
+            ..plan_with(0.05)
+        };
+        let refused = bench.ask(too_long).await.unwrap_err();
+        assert!(matches!(refused, NotPlanned::Plan(_)), "{refused}");
+    });
+}
+
+/// A servo's plan of which only the allowed error is said.
+fn plan_with(error: f64) -> PlanRun<2> {
+    PlanRun {
+        error,
+        duration: None,
+        servo: true,
+        q0: None,
+        qdot0: None,
+        params: None,
+        gains: None,
+        setpoint: None,
+    }
+}
+
+#[test]
+fn every_field_that_is_wrong_is_named_members_with_their_object() {
+    System::new().block_on(async {
+        let mut bench = Bench::<2>::new();
+        let common = [
+            (json!({"gains": {"kp": [1, -2]}}), "gains.kp[1] must be at least 0, got -2"),
+            (json!({"gains": {"ki": [1]}}), "gains.ki must have 2 entries, got 1"),
+            (json!({"gains": {"kd": 3}}), "gains.kd must be an array of 2 numbers, got 3"),
+            (json!({"gains": [1, 2, 3]}), "gains must be an object, got an array"),
+            (json!({"gains": true}), "gains must be an object, got true"),
+            (json!({"params": {"masses": [0, 1]}}), "params.masses[0] must be greater than 0, got 0"),
+            (json!({"params": {"lengths": ["a", 1]}}), "params.lengths[0] must be a number, got \"a\""),
+            (json!({"params": {"gravity": -1}}), "params.gravity must be at least 0, got -1"),
+            (json!({"setpoint": [1, 2, 3]}), "setpoint must have 2 entries, got 3"),
+            (json!({"integrator": "heun"}), "integrator must be one of euler, midpoint, verlet, rk4, got \"heun\""),
+            (json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),
+             "integrator must be one of euler, midpoint, verlet, rk4, got 1; gains.kp must be an array of 2 numbers, got 1; \
+              params.gravity must be a number, got \"g\"; setpoint must be an array of 2 numbers, got 0"),
+        ];
+        for (args, why) in &common {
+            assert_eq!(bench.refusal(Service::Stability, args).await, *why);
+        }
+        for (args, why) in &common[..10] {
+            assert_eq!(bench.refusal(Service::Rollout, args).await, *why);
+        }
+        for (args, why) in [
+            (json!({"q0": [1]}), "q0 must have 2 entries, got 1"),
+            (json!({"qdot0": [1, true]}), "qdot0[1] must be a number, got true"),
+            (json!({"duration": 0}), "duration must be greater than 0, got 0"),
+            (json!({"timestep": -1}), "timestep must be greater than 0, got -1"),
+            (json!({"samples": 0}), "samples must be an integer, at least 1, got 0"),
+            (json!({"samples": 1}), "samples must be between 2 and 100000, got 1"),
+            (json!({"samples": 100_001}), "samples must be at most 100000, got 100001"),
+            (json!({"samples": 2.5}), "samples must be an integer, at least 1, got 2.5"),
+            (json!({"reference": 1}), "reference must be true or false, got 1"),
+            (json!({"duration": 1, "timestep": 2}), "duration must be at least the timestep 2, got 1"),
+            (json!({"duration": 20, "timestep": 1e-6}), "duration / timestep must be at most 10000000 steps, got 20000000"),
+        ] {
+            assert_eq!(bench.refusal(Service::Rollout, &args).await, why);
+        }
+        let too_long = RunOffline { duration: Some(20.0), timestep: Some(1e-6), ..RunOffline::default() };
+        assert!(matches!(bench.ask(too_long).await, Err(NotRun::Plan(_))));
+    });
+}

@@ -1,0 +1,146 @@
+//! Light requests beside heavy ones, on the pool.
+
+use super::*;
+
+/// Minutes of work in an unoptimised build; no test waits for its end.
+fn heavy() -> RunOffline<2> {
+    RunOffline {
+        duration: Some(10.0),
+        timestep: Some(1e-6),
+        reference: Some(true),
+        gains: Some(SetGains {
+            kp: Some([1.0; 2]),
+            ..SetGains::default()
+        }),
+        ..RunOffline::default()
+    }
+}
+
+/// Ten steps.
+fn short<const N: usize>() -> RunOffline<N> {
+    RunOffline {
+        duration: Some(0.01),
+        timestep: Some(0.001),
+        ..RunOffline::default()
+    }
+}
+
+#[test]
+fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
+    System::new().block_on(async {
+        let mut bench = Bench::<2>::new();
+        let heavy = bench.call(1, heavy());
+        bench.call(2, short());
+        bench.call(3, short());
+        let mut light = [bench.next().await, bench.next().await];
+        light.sort_unstable();
+        assert_eq!(light, [2, 3]);
+        // A prediction is cut into slices too.
+        let mut three = Bench::<3>::new();
+        three.call(1, PredictStability::default());
+        three.call(2, short());
+        assert_eq!(three.next().await, 2);
+        assert_eq!(three.next().await, 1);
+        heavy.gone.store(true, Ordering::Relaxed);
+        assert!(timeout(PATIENCE, heavy.ended).await.is_ok());
+        assert_eq!(bench.next().await, 1);
+        assert!(matches!(heavy.answer.await, Ok(Err(Unserved::CallerGone))));
+    });
+}
+
+/// Turns of one worker until a client has its million steps, while so many others have begun heavy rollouts.
+async fn turns_until_integrated(others: u64) -> u32 {
+    let (answered, mut order) = mpsc::unbounded_channel();
+    let pool = WorkerPool::without_threads();
+    let study = Study::new(SettledArm::<2>.start().recipient(), pool.clone())
+        .start()
+        .recipient();
+    let integration = Integration::new(pool.clone()).start().recipient();
+    for connection in 1..=others {
+        call(&study, connection, &answered, heavy());
+    }
+    // The study asks the arm first; a moment of virtual time passes when all wait.
+    pass(ms(1)).await;
+    for _ in 0..10 * others {
+        assert!(pool.turn());
+    }
+    let step = IntegrationStep {
+        function: Some("sin(t)".to_owned()),
+        x0: Some(0.5),
+        dt: Some(1e-3),
+        steps: Some(1_000_000),
+        method: Some(Method::Rk4),
+        ..IntegrationStep::default()
+    };
+    let mut honest = call(&integration, 100, &answered, step);
+    pass(ms(1)).await;
+    let mut turns = 0;
+    while honest.ended.try_recv() == Err(oneshot::error::TryRecvError::Empty) {
+        assert!(pool.turn());
+        turns += 1;
+    }
+    assert_eq!(order.recv().await, Some(100));
+    assert!(matches!(honest.answer.await, Ok(Ok(Ok(_)))));
+    pool.close("the test is over");
+    turns
+}
+
+/// Each look at the clock costs the same here, so that turns can be counted on any machine.
+#[test]
+fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
+    in_virtual_time(async {
+        work_clock::count(Duration::from_micros(100));
+        let alone = turns_until_integrated(0).await;
+        let among_six = turns_until_integrated(5).await;
+        assert!(alone > 10, "{alone} turns: too few to be shared");
+        let fair = 5 * alone..=6 * (alone + 1);
+        assert!(
+            fair.contains(&among_six),
+            "{among_six} turns instead of {alone}"
+        );
+    });
+}
+
+#[test]
+fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
+    System::new().block_on(async {
+        let mut bench = Bench::<2>::new();
+        let (first, third) = (bench.call(1, heavy()), bench.call(3, heavy()));
+        bench.call(2, PredictStability::default());
+        while bench.pool.is_idle() {
+            tokio::task::yield_now().await;
+        }
+        bench.pool.close("shutting down");
+        let late = bench.call(4, heavy());
+        let mut heard = Vec::new();
+        for _ in 1..=4 {
+            heard.push(bench.next().await);
+        }
+        heard.sort_unstable();
+        assert_eq!(heard, [1, 2, 3, 4]);
+        for refused in [first, third, late] {
+            let answer = refused.answer.await.unwrap();
+            assert!(matches!(answer, Err(Unserved::Refused("shutting down"))));
+        }
+        let control = settings::<2>().control;
+        assert_eq!(bench.study.send(HeldLimit(control)).await.unwrap(), None);
+    });
+}
+
+#[test]
+fn the_arms_own_question_is_answered_by_the_pool() {
+    System::new().block_on(async {
+        let bench = Bench::<2>::new();
+        let control = settings::<2>().control;
+        let limit = bench.study.send(HeldLimit(control)).await.unwrap();
+        assert_eq!(limit, limit_held(&control));
+        let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
+        let free = ControlLoop {
+            arm,
+            gains: no_control(),
+            ..control
+        };
+        let limit = bench.study.send(HeldLimit(free)).await.unwrap();
+        assert_eq!(limit, Some(f64::INFINITY));
+    });
+}

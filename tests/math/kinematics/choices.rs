@@ -1,0 +1,245 @@
+//! Which of several solutions is chosen.
+
+use super::*;
+
+#[test]
+fn the_elbow_that_moves_the_joints_less_is_chosen() {
+    let lengths = [1.0, 0.8];
+    for bend in [0.2, 1.0, 2.9] {
+        let DVec2 { x, y } = forward(&lengths, &[0.6, bend]).position;
+        for present in [
+            [0.6, bend],
+            [0.9, 0.1],
+            [-3.0, 2.0],
+            [2.0, -0.4],
+            [100.0, -7.0],
+        ] {
+            let chosen = solve(&lengths, &present, &at(x, y)).unwrap();
+            // The other elbow mirrors the triangle about the target's bearing.
+            let plus = [0.6, bend];
+            let minus = [wrap(2.0 * y.atan2(x) - plus[0]), -bend];
+            assert!(miss(&lengths, &minus, &at(x, y)) < 1e-15);
+            let nearer = if cost(&plus, &present) < cost(&minus, &present) {
+                plus
+            } else {
+                minus
+            };
+            assert!(
+                (chosen[1] - nearer[1]).abs() < 1e-13,
+                "{bend} {present:?}: {chosen:?}"
+            );
+            assert!(
+                (chosen[0] - nearer[0]).abs() < 1e-13,
+                "{bend} {present:?}: {chosen:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn two_elbows_equally_near_give_the_one_with_a_positive_second_joint() {
+    // Straight along the target's bearing the two are mirror images; rounding must not decide between them.
+    for bearing in [0.0, 0.1, 0.7, 1.9, -2.4, 3.0] {
+        for distance in [0.01, 0.5, 1.3, 1.999] {
+            let DVec2 { x, y } = distance * DVec2::from_angle(bearing);
+            for turns in [0.0, 3.0] {
+                let present = [bearing + TAU * turns, 0.0];
+                let q = solve(&[1.0, 1.0], &present, &at(x, y)).unwrap();
+                assert!(q[1] > 0.0, "{bearing} {distance}: {q:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn an_elbow_that_is_nearer_by_a_millionth_of_a_radian_is_not_taken_for_a_tie() {
+    // Near full stretch the elbows differ by 2e-7 rad; squares of that are far below the rounding of a squared radian.
+    let lengths = [1.0, 1.0];
+    let pose = [0.3, -1e-7];
+    let DVec2 { x, y } = forward(&lengths, &pose).position;
+    let q = solve(&lengths, &pose, &at(x, y)).unwrap();
+    assert!(q[1] < 0.0, "{q:?}");
+}
+
+/// Admissible headings by looking at each of many: how far the nearest one is from `present`.
+fn scanned(lengths: &[f64; 3], target: DVec2, present: f64, samples: u32) -> Option<f64> {
+    let [l1, l2, l3] = *lengths;
+    let range = (l1 - l2).abs()..=l1 + l2;
+    (0..samples)
+        .map(|i| PI * f64::from(i) / f64::from(samples - 1))
+        .find(|away| {
+            [present + away, present - away]
+                .iter()
+                .any(|phi| range.contains(&(target - l3 * DVec2::from_angle(*phi)).length()))
+        })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(2000))]
+
+    #[test]
+    fn the_orientation_is_the_admissible_one_nearest_to_the_present_one(
+        lengths in [0.1..2.0f64, 0.1..2.0f64, 0.1..2.0f64],
+        distance in 0.0..6.0f64,
+        bearing in -PI..=PI,
+        present in [-10.0..10.0f64, -10.0..10.0f64, -10.0..10.0f64],
+    ) {
+        const SAMPLES: u32 = 20_001;
+        let position = distance * DVec2::from_angle(bearing);
+        let along = heading(&present);
+        let now = along.y.atan2(along.x);
+        let found = solve(&lengths, &present, &at(position.x, position.y));
+        let scanned = scanned(&lengths, position, now, SAMPLES);
+        let Ok(q) = found else {
+            prop_assert!(scanned.is_none(), "refused although {scanned:?} away is admissible");
+            return Ok(());
+        };
+        let away = turn(now, forward(&lengths, &q).orientation).abs();
+        // The scan may step over arcs narrower than its grain, so that what it finds is an upper bound; that the answer
+        // is admissible at all is what the hand's place shows.
+        if let Some(scanned) = scanned {
+            prop_assert!(away <= scanned + 1e-12, "{away} although {scanned} would do");
+            if scanned == 0.0 {
+                prop_assert!(away <= 1e-14, "an admissible orientation is kept");
+            }
+        }
+        prop_assert!(miss(&lengths, &q, &at(position.x, position.y)) <= INTERIOR);
+    }
+}
+
+#[test]
+fn a_present_orientation_at_the_very_edge_of_what_is_admissible_is_kept() {
+    // Links 1 and 2 stretched or folded: the wrist is at an edge, and the hand is where it already is.
+    for q2 in [0.0, PI] {
+        for q3 in [0.4, -2.0, 1.5] {
+            for wound in [0.0, 50.0] {
+                let lengths = [1.0, 0.7, 0.5];
+                let present = [0.9 + wound, q2, q3];
+                let DVec2 { x, y } = forward(&lengths, &present).position;
+                let q = nearest_turn(&solve(&lengths, &present, &at(x, y)).unwrap(), &present);
+                let before = forward(&lengths, &present).orientation;
+                assert!(
+                    (forward(&lengths, &q).orientation - before).abs() < 1e-13,
+                    "{q:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_present_orientation_is_kept_to_the_last_digit_where_its_range_is_narrowest() {
+    // Near full stretch the range of orientations is as narrow as the root of what is left of the reach: its ends,
+    // though right to every digit of the distance, are good to 1e-8 rad only.
+    for lengths in [[1.0, 0.7, 0.5], [1.0, 0.7, 2.5]] {
+        for hair in [1e-7, 1e-8, 1e-9, 1e-12] {
+            for present in [[0.3, 0.0, hair], [0.3, hair, 0.0], [-2.0, hair, -hair]] {
+                let DVec2 { x, y } = forward(&lengths, &present).position;
+                let q = solve(&lengths, &present, &at(x, y)).unwrap();
+                let before = forward(&lengths, &present).orientation;
+                let after = forward(&lengths, &q).orientation;
+                assert!(turn(before, after).abs() < 1e-15, "{present:?}: {q:?}");
+            }
+        }
+    }
+    // And so it is near the hole in the middle, with everything folded.
+    let lengths = [2.0, 0.5, 0.6];
+    for hair in [1e-8, 1e-9, 1e-12] {
+        for present in [
+            [0.3, PI, PI - hair],
+            [0.3, PI - hair, PI],
+            [-2.0, PI - hair, hair - PI],
+        ] {
+            let DVec2 { x, y } = forward(&lengths, &present).position;
+            let q = solve(&lengths, &present, &at(x, y)).unwrap();
+            let before = forward(&lengths, &present).orientation;
+            let after = forward(&lengths, &q).orientation;
+            assert!(turn(before, after).abs() < 4e-15, "{present:?}: {q:?}");
+        }
+    }
+}
+
+#[test]
+fn two_orientations_equally_near_give_the_counter_clockwise_one() {
+    let lengths = [1.0, 0.5, 0.3];
+    // Along the target's bearing the wrist would be too close, against it too far; either way two are as near.
+    for (present, distance) in [([0.0, 0.0, 0.0], 0.5), ([0.0, 0.0, PI], 1.4)] {
+        let q = solve(&lengths, &present, &at(distance, 0.0)).unwrap();
+        let orientation = wrap(forward(&lengths, &q).orientation);
+        assert!(orientation > 0.1 && orientation < PI - 0.1, "{orientation}");
+    }
+}
+
+#[test]
+fn with_the_target_on_the_base_all_orientations_are_admissible_or_none() {
+    let present = [0.3, 1.0, -0.4];
+    let q = solve(&[1.0, 0.8, 0.5], &present, &at(0.0, 0.0)).unwrap();
+    assert!(turn(forward(&[1.0, 0.8, 0.5], &q).orientation, 0.9).abs() < 1e-15);
+    assert!(miss(&[1.0, 0.8, 0.5], &q, &at(0.0, 0.0)) < 1e-15);
+    assert!(matches!(
+        solve(&[1.0, 0.8, 2.5], &present, &at(0.0, 0.0)),
+        Err(Unreachable::TooClose { .. })
+    ));
+    // A hole so small that it counts as none.
+    let hole = [1.0, 0.5, 1.5 + 1e-9];
+    let q = solve(&hole, &present, &at(0.0, 0.0)).unwrap();
+    assert!(turn(forward(&hole, &q).orientation, 0.9).abs() < 1e-15);
+    assert!(miss(&hole, &q, &at(0.0, 0.0)) <= BOUNDARY);
+}
+
+#[test]
+fn two_links_ignore_an_orientation_whatever_it_is() {
+    let plain = solve(&[1.0, 1.0], &[0.0; 2], &at(1.0, 0.3)).unwrap();
+    for phi in [0.0, 3.0, 1e300, f64::NAN, f64::INFINITY] {
+        assert_eq!(
+            solve(&[1.0, 1.0], &[0.0; 2], &aimed(1.0, 0.3, phi)),
+            Ok(plain)
+        );
+    }
+}
+
+#[test]
+fn a_wound_up_arm_is_not_unwound() {
+    let lengths = [1.0, 1.0, 1.0];
+    let present = [1e8, -1e8, 3e7];
+    let q = solve(&lengths, &present, &at(1.2, 0.9)).unwrap();
+    let commanded = nearest_turn(&q, &present);
+    for (commanded, present) in commanded.iter().zip(&present) {
+        assert!((commanded - present).abs() <= PI + 1.5e-8);
+    }
+    // An angle of 1e8 has a last place of 1.5e-8, and half of that may be lost at each of two joints.
+    assert!(miss(&lengths, &commanded, &at(1.2, 0.9)) < 3e-8);
+    // Within half a turn nothing is shifted, bit for bit; exactly half a turn away neither.
+    assert_eq!(nearest_turn(&[0.1, PI], &[-2.0, 0.0]), [0.1, PI]);
+    assert_eq!(nearest_turn(&[0.1], &[f64::NAN]), [0.1]);
+}
+
+#[test]
+fn wrapping_takes_away_whole_turns_to_the_last_digit() {
+    // (angle, angle - 2π k) for k = 2²⁴ and ±15,915,494, computed in 60 digits. k times a rounded 2π would be 4e-9 off.
+    for (wound, expected) in [
+        (105_414_357.066_578_27, -4.109_232_774_600_752e-9),
+        (99_999_998.557_304_86, 0.499_999_993_665_391_44),
+        (-100_000_000.557_304_86, -2.499_999_993_665_391_6),
+    ] {
+        assert!((wrap(wound) - expected).abs() <= f64::EPSILON * expected.abs());
+    }
+    for angle in [0.0, 1.0, -3.0, PI, (-PI).next_up(), 1e-300] {
+        assert_eq!(wrap(angle), angle);
+    }
+    // Taken through its sine and cosine, every other one would come back with another last digit.
+    for thousandth in -3141..=3141 {
+        let angle = f64::from(thousandth) / 1000.0;
+        assert_eq!(wrap(angle), angle);
+    }
+    assert_eq!(wrap(-PI), PI);
+    // A rounded 3π is 9e-16 off a true one, on the side where half a turn stays positive.
+    assert!((wrap(3.0 * PI).abs() - PI).abs() < 1e-15);
+    assert!((wrap(-3.0 * PI).abs() - PI).abs() < 1e-15);
+    for angle in [1e16, -1e300, f64::MAX] {
+        assert!(wrap(angle).abs() <= PI);
+    }
+    assert_eq!(turn(1e8, 1e8 + 0.5), 0.5);
+    assert!((turn(3.0, -3.0) - (TAU - 6.0)).abs() < 1e-15);
+    assert!((turn(-3.0, 3.0) + (TAU - 6.0)).abs() < 1e-15);
+}

@@ -1,0 +1,165 @@
+//! At the edges of the reach, and of numbers.
+
+use super::*;
+
+/// Every place where a reach ends: lengths, a target exactly there, and the outward direction along it.
+fn edges() -> Vec<(Vec<f64>, Target, DVec2)> {
+    let mut edges = Vec::new();
+    for scale in [1e-6, 1.0, 1e6] {
+        for bearing in [0.0, 0.7, 2.0, -1.3, PI] {
+            let along = DVec2::from_angle(bearing);
+            let mut edge = |lengths: &[f64], distance: f64, outward: DVec2| {
+                let lengths = lengths.iter().map(|l| l * scale).collect();
+                let target = Target {
+                    position: scale * distance * along,
+                    orientation: None,
+                };
+                edges.push((lengths, target, outward));
+            };
+            edge(&[1.0, 1.0], 2.0, along);
+            edge(&[2.0, 0.5], 2.5, along);
+            edge(&[2.0, 0.5], 1.5, -along);
+            edge(&[0.5, 2.0], 1.5, -along);
+            edge(&[1.0, 0.5, 0.3], 1.8, along);
+            edge(&[2.0, 0.5, 0.3], 1.2, -along);
+            edge(&[0.3, 0.5, 2.0], 1.2, -along);
+            // The wrist's edges, with the last link across.
+            let across = bearing + FRAC_PI_2;
+            for (lengths, wrist, outward) in [
+                ([1.0, 0.5, 0.3], 1.5, along),
+                ([1.0, 0.5, 0.3], 0.5, -along),
+            ] {
+                let position = scale * (wrist * along + 0.3 * DVec2::from_angle(across));
+                let target = Target {
+                    position,
+                    orientation: Some(across),
+                };
+                edges.push((lengths.map(|l| l * scale).to_vec(), target, outward));
+            }
+        }
+    }
+    edges
+}
+
+fn solve_any(lengths: &[f64], target: &Target) -> Result<f64, Unreachable> {
+    match *lengths {
+        [l1, l2] => solve(&[l1, l2], &[0.3, -0.4], target).map(|q| miss(&[l1, l2], &q, target)),
+        [l1, l2, l3] => {
+            solve(&[l1, l2, l3], &[0.3, -0.4, 1.0], target).map(|q| miss(&[l1, l2, l3], &q, target))
+        }
+        _ => panic!("{} links", lengths.len()),
+    }
+}
+
+#[test]
+fn a_target_within_a_billionth_of_the_arm_outside_its_reach_is_solved_as_the_boundary() {
+    for (lengths, edge, outward) in edges() {
+        let sum: f64 = lengths.iter().sum();
+        for share in [-1.0, -0.5, -1e-3, -1e-6, 0.0, 1e-6, 1e-3, 0.5, 0.999] {
+            let moved = edge.position + share * BOUNDARY * sum * outward;
+            let target = Target {
+                position: moved,
+                ..edge
+            };
+            let off = solve_any(&lengths, &target).unwrap_or_else(|e| panic!("{lengths:?}: {e}"));
+            // The boundary itself: as far off as the target lies outside, and no farther.
+            let outside = BOUNDARY * f64::max(share, 0.0);
+            assert!(
+                (off - outside).abs() <= 1e-15,
+                "{lengths:?} {target:?} is {off:e} off"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_target_farther_outside_is_refused() {
+    for (lengths, edge, outward) in edges() {
+        let sum: f64 = lengths.iter().sum();
+        for share in [1.001, 2.0, 1e3, 1e6] {
+            let moved = edge.position + share * BOUNDARY * sum * outward;
+            let target = Target {
+                position: moved,
+                ..edge
+            };
+            assert!(
+                solve_any(&lengths, &target).is_err(),
+                "{lengths:?} {target:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn equal_links_folded_onto_the_base_keep_the_first_joint() {
+    // Any first joint is right there; the one that does not move is the nearest.
+    for first in [0.0, 0.4, -2.0, 3.0] {
+        let q = solve(&[1.0, 1.0], &[first, 0.3], &at(0.0, 0.0)).unwrap();
+        assert_eq!(q, [first, PI]);
+    }
+    let wound = solve(&[2.0, 2.0], &[0.5 + 10.0 * TAU, 0.3], &at(0.0, 0.0)).unwrap();
+    assert!((wound[0] - 0.5).abs() < 1e-13);
+    assert!(miss(&[2.0, 2.0], &wound, &at(0.0, 0.0)) < 1e-15);
+    // So with a wrist on the base: the last link alone points at the target.
+    let q = solve(&[1.0, 1.0, 0.5], &[0.4, 0.0, 0.0], &aimed(0.5, 0.0, 0.0)).unwrap();
+    assert_eq!(q[..2], [0.4, PI]);
+    assert!(miss(&[1.0, 1.0, 0.5], &q, &at(0.5, 0.0)) < 1e-15);
+}
+
+#[test]
+fn targets_a_hair_from_the_base_keep_their_direction() {
+    // Far below one rounding of the lengths nothing of the distance is left in the joints, but all of the bearing.
+    for distance in [1e-17, 1e-100, 1e-300, 5e-324] {
+        let q = solve(&[1.0, 1.0], &[0.0, 0.0], &at(0.0, distance)).unwrap();
+        assert!(q[1].abs() > 3.0);
+        assert!(
+            ((q[0] + q[1] / 2.0) - FRAC_PI_2).abs() < 1e-15 || q[1] < 0.0,
+            "{q:?}"
+        );
+        assert!(miss(&[1.0, 1.0], &q, &at(0.0, 0.0)) < 1e-15);
+    }
+}
+
+#[test]
+fn lengths_and_targets_at_the_ends_of_the_number_range_are_solved_or_refused() {
+    for scale in [1e-300, 1e-200, 1e200, 1e300] {
+        let two = [scale, scale];
+        let target = at(scale, 0.5 * scale);
+        assert!(miss(&two, &solve(&two, &[0.0; 2], &target).unwrap(), &target) < 1e-15);
+        let three = [scale, 0.5 * scale, 0.25 * scale];
+        assert!(miss(&three, &solve(&three, &[0.0; 3], &target).unwrap(), &target) < 1e-15);
+        let aimed = aimed(scale, 0.5 * scale, 0.2);
+        assert!(miss(&three, &solve(&three, &[0.0; 3], &aimed).unwrap(), &aimed) < 1e-15);
+    }
+    // A link that vanishes beside the other one still leaves the circle that the other one draws.
+    for lengths in [
+        [1e300, 1e-300],
+        [1e-300, 1e300],
+        [f64::MAX, 5e-324],
+        [5e-324, f64::MAX],
+    ] {
+        let far = lengths[0].max(lengths[1]);
+        let q = solve(&lengths, &[0.0; 2], &at(0.0, far)).unwrap();
+        assert!((forward(&lengths, &q).position.y / far - 1.0).abs() < 1e-15);
+    }
+    assert!(solve(&[5e-324, 5e-324], &[0.0; 2], &at(0.0, 5e-324)).is_ok());
+    assert!(solve(&[f64::MAX; 3], &[0.0; 3], &at(f64::MAX, f64::MAX)).is_ok());
+    for huge in [1e300, f64::MAX] {
+        for target in [at(huge, huge), at(-huge, 0.0), at(0.0, huge)] {
+            assert!(matches!(
+                solve(&[1.0, 1.0], &[0.0; 2], &target),
+                Err(Unreachable::Beyond { .. })
+            ));
+            let aimed = Target {
+                orientation: Some(1e300),
+                ..target
+            };
+            for lengths in [[1.0; 3], [1e-300; 3]] {
+                assert!(matches!(
+                    solve(&lengths, &[0.0; 3], &aimed),
+                    Err(Unreachable::Beyond { .. })
+                ));
+            }
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! Forward and inverse kinematics against stored 60-digit values, and against each other over the whole reachable set.
+
+mod choices;
+mod edges;
+mod reach;
+mod refusals;
+mod stored;
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use glam::{DVec2, dvec2};
+use pendularm::math::kinematics::{
+    BOUNDARY, Reach, Target, Unreachable, forward, heading, joints, nearest_turn, solve, turn, wrap,
+};
+use proptest::prelude::*;
+use serde_json::Value;
+
+/// Error that contract and oracle allow in a round trip, as a share of the sum of the lengths.
+const ROUND_TRIP: f64 = 1e-9;
+
+/// Error of the closed form on targets that are not moved onto a boundary: a dozen roundings of the wrist, the
+/// angles and their sines, each 2⁻⁵³ of a quantity no larger than the sum of the lengths or than π, and 1e-15 that is
+/// lost before when an orientation is asked for a whole turn away.
+const INTERIOR: f64 = 4e-15;
+
+fn oracle(kind: &str) -> Vec<Value> {
+    let text = include_str!("../../data/kinematics.json");
+    let document: Value = serde_json::from_str(text).unwrap();
+    let cases = document["cases"].as_array().unwrap();
+    let cases: Vec<_> = cases
+        .iter()
+        .filter(|case| case["type"] == kind)
+        .cloned()
+        .collect();
+    assert!(!cases.is_empty());
+    cases
+}
+
+fn numbers<const N: usize>(value: &Value) -> [f64; N] {
+    let list: Vec<f64> = value
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|x| x.as_f64().unwrap())
+        .collect();
+    list.try_into().unwrap()
+}
+
+fn at(x: f64, y: f64) -> Target {
+    Target {
+        position: dvec2(x, y),
+        orientation: None,
+    }
+}
+
+fn aimed(x: f64, y: f64, phi: f64) -> Target {
+    Target {
+        position: dvec2(x, y),
+        orientation: Some(phi),
+    }
+}
+
+/// Distance between the target and where the solution puts the hand, as a share of the sum of the lengths.
+fn miss<const N: usize>(lengths: &[f64; N], q: &[f64; N], target: &Target) -> f64 {
+    let off = forward(lengths, q).position - target.position;
+    off.x.hypot(off.y) / lengths.iter().sum::<f64>()
+}
+
+fn assert_wrapped<const N: usize>(q: &[f64; N]) {
+    assert!(q.iter().all(|q| -PI < *q && *q <= PI), "{q:?}");
+}
+
+/// Sum of squared wrapped differences: what the choice of the elbow is made by.
+fn cost<const N: usize>(q: &[f64; N], present: &[f64; N]) -> f64 {
+    q.iter()
+        .zip(present)
+        .map(|(q, p)| wrap(q - p).powi(2))
+        .sum()
+}

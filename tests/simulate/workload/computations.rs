@@ -1,0 +1,154 @@
+//! Requests that take their time: computations, goals, trials.
+
+use super::*;
+
+impl Desk<'_> {
+    pub(super) fn compute(&mut self) {
+        let method = self.court.below(Method::ALL.len());
+        let name = Method::ALL[method].name();
+        match self.court.below(40) {
+            0 => self.compute_long(),
+            1..16 => {
+                let q0: Vec<f64> = (0..self.plan.links)
+                    .map(|_| self.number(-1.0, 1.0))
+                    .collect();
+                let (duration, timestep) = (self.number(0.1, 1.0), 0.005);
+                let samples = 2 + self.court.below(40) as u64;
+                let arm = Arm::<3>::default();
+                let (masses, lengths) = (
+                    &arm.masses()[..self.plan.links],
+                    &arm.lengths()[..self.plan.links],
+                );
+                let gravity = arm.gravity();
+                let params =
+                    serde_json::json!({"gravity": gravity, "masses": masses, "lengths": lengths});
+                let q = Value::from(q0.clone());
+                let args = format!(
+                    "{{\"q0\":{q},\"duration\":{duration},\"timestep\":{timestep},\"integrator\":\"{name}\",\"params\":{params},\"samples\":{samples}}}"
+                );
+                let computed = Computed::Rollout {
+                    q0,
+                    duration,
+                    timestep,
+                    method,
+                    samples,
+                };
+                self.call("/study/rollout", &args, Expect::Computed(computed), false);
+            }
+            _ => {
+                let function = self.court.among(&FUNCTIONS);
+                let (x0, dt) = (self.number(-1.0, 1.0), self.number(0.001, 0.1));
+                let steps = 1 + self
+                    .court
+                    .below(if self.plan.room < 1000 { 20 } else { 1500 })
+                    as u64;
+                let args = format!(
+                    "{{\"function\":\"{function}\",\"x0\":{x0},\"dt\":{dt},\"steps\":{steps},\"integrator\":\"{name}\"}}"
+                );
+                let computed = Computed::Particle {
+                    function,
+                    x0,
+                    dt,
+                    steps,
+                    method,
+                };
+                self.call(
+                    "/arm_sim/integration_step",
+                    &args,
+                    Expect::Computed(computed),
+                    false,
+                );
+            }
+        }
+    }
+
+    /// The longest of all that clients compute: others' computations have their turns beside it.
+    pub fn compute_long(&mut self) {
+        let args = "{\"params\":{\"gravity\":9.81}}";
+        let expect = Expect::Member("advised_timestep");
+        self.call("/study/stability", args, expect, false);
+    }
+
+    pub(super) fn target(&self) -> String {
+        let reach = self.plan.links as f64 * 0.7;
+        let (y, x) = self.number(0.0, 6.0).sin_cos();
+        let reach = reach * self.number(0.5, 1.0);
+        format!("{{\"x\":{},\"y\":{}}}", reach * x, reach * y)
+    }
+
+    pub(super) fn action(&mut self) {
+        let goals = self.me().calls.iter();
+        let goals: Vec<String> = goals
+            .filter(|(_, call)| matches!(call.expect, Expect::Goal { .. }))
+            .map(|(id, _)| id.clone())
+            .collect();
+        if !goals.is_empty() && self.court.chance(0.4) {
+            let id = self.court.among(&goals);
+            if let Some(goal) = self.me().calls.get_mut(&id) {
+                goal.is_cancelled = true;
+            }
+            return self.cancel(&id);
+        }
+        let (id, args, has_feedback) = (self.id(), self.target(), self.court.chance(0.5));
+        self.send(&format!(
+            "{{\"op\":\"send_action_goal\",\"action\":\"/ik_action\",\"action_type\":\"pendularm_interfaces/action/MoveTo\",\
+             \"args\":{args},\"feedback\":{has_feedback},\"id\":{id}}}"
+        ));
+        let court = self.court;
+        let expect = Expect::Goal { has_feedback };
+        self.me()
+            .note_call(&id, &format!("/ik_action {args}"), expect, false, court);
+    }
+
+    pub(super) fn cancel(&mut self, id: &str) {
+        // It may have ended meanwhile.
+        self.me().mistakes += 1;
+        self.send(&format!(
+            "{{\"op\":\"cancel_action_goal\",\"action\":\"/ik_action\",\"id\":{id}}}"
+        ));
+    }
+
+    /// Asks for the end of a goal that another client has sent, which must not end it.
+    pub fn cancel_anothers(&mut self) {
+        let who = self.me().who;
+        let others = self.all.iter().filter(|one| one.who != who);
+        let goals: Vec<String> = others
+            .flat_map(|one| &one.calls)
+            .filter(|(_, call)| matches!(call.expect, Expect::Goal { .. }))
+            .map(|(id, _)| id.clone())
+            .collect();
+        if !goals.is_empty() {
+            let id = self.court.among(&goals);
+            self.cancel(&id);
+        }
+    }
+
+    pub(super) fn goal(&mut self) {
+        if self.court.chance(0.3) {
+            // This ends the active goal, whosever it is.
+            self.model.ends_any_goal = true;
+            return self.call("/ik_action/cancel_goal", "{}", Expect::Anything, true);
+        }
+        let args = self.target();
+        self.call("/ik_action/send_goal", &args, Expect::Anything, true);
+    }
+
+    pub(super) fn trial(&mut self) {
+        let (service, args) = self.court.among(&[
+            ("/ik_trial/start", "{\"duration\":5}"),
+            ("/ik_trial/skip", "{}"),
+            ("/ik_trial/stop", "{}"),
+        ]);
+        self.call(service, args, Expect::Anything, true);
+    }
+
+    pub(super) fn watch(&mut self) {
+        let topic = self.court.among(&WATCHED);
+        if self.me().watched.insert(topic.to_owned()) {
+            self.me().await_news(format!("subscribed to {topic}"));
+            return self.send(&format!("{{\"op\":\"subscribe\",\"topic\":\"{topic}\"}}"));
+        }
+        // Messages on their way may still come: they stay on the list of what may be heard.
+        self.send(&format!("{{\"op\":\"unsubscribe\",\"topic\":\"{topic}\"}}"));
+    }
+}

@@ -1,0 +1,252 @@
+//! Topics: messages published, and who has to hear them.
+
+use super::*;
+
+impl Desk<'_> {
+    /// Some JSON that must arrive as it is.
+    pub(super) fn payload(&self, depth: usize) -> String {
+        match self.court.below(if depth > 2 { 6 } else { 9 }) {
+            0 => "null".to_owned(),
+            1 => self
+                .court
+                .among(&["0", "-0.0", "1.50", "12345678901234567", "1e5", "-2.5E-3"])
+                .to_owned(),
+            2 => self
+                .court
+                .among(&[
+                    "\"\"",
+                    "\"a b\"",
+                    "\"\\u00e9\\n\"",
+                    "\"\u{e9}\u{1f600}\"",
+                    "\"}{][,:\"",
+                ])
+                .to_owned(),
+            3 => "true".to_owned(),
+            4 => format!(
+                "\"{}\"",
+                "x".repeat(
+                    self.court
+                        .below(if self.plan.room < 1000 { 60 } else { 3000 })
+                )
+            ),
+            5 => format!(
+                "[{},{},{}]",
+                self.number(-1.0, 1.0),
+                self.number(-1e9, 1e9),
+                self.court.below(9)
+            ),
+            6 => "{}".to_owned(),
+            7 => format!("[{},{}]", self.payload(depth + 1), self.payload(depth + 1)),
+            _ => format!(
+                "{{\"a\":{},\"b c\":{}}}",
+                self.payload(depth + 1),
+                self.payload(depth + 1)
+            ),
+        }
+    }
+
+    pub(super) fn publish(&mut self) {
+        let topic = self.court.among(&TOPICS);
+        self.advertise(topic);
+        let count = self.court.among(&[1, 2, 6, 40]);
+        self.publish_on(topic, count, |desk| desk.payload(0));
+    }
+
+    pub(super) fn advertise(&mut self, topic: &str) {
+        if self.me().advertised.insert(topic.to_owned()) {
+            let spelling = self.spelled(topic);
+            self.send(&format!(
+                "{{\"op\":\"advertise\",\"topic\":\"{spelling}\"}}"
+            ));
+        }
+    }
+
+    /// So many messages on a topic that this client advertises.
+    pub fn publish_on(&mut self, topic: &str, count: usize, payload: impl Fn(&Self) -> String) {
+        let (who, link) = (self.me().who, self.me().is_active());
+        for _ in 0..count {
+            let (number, more) = (self.numbers.next(), payload(self));
+            let body = format!("{{\"from\":{who},\"number\":{number},\"more\":{more}}}");
+            let spelling = self.spelled(topic);
+            let frame = match self.court.below(4) {
+                0 => format!(
+                    "{{\"op\":\"publish\",\"id\":\"m{number}\",\"topic\":\"{spelling}\",\"msg\":{body}}}"
+                ),
+                _ => format!("{{\"op\":\"publish\",\"topic\":\"{spelling}\",\"msg\":{body}}}"),
+            };
+            let size = if self.plan.room < 1000 {
+                0
+            } else {
+                self.court.below(20)
+            };
+            if size == 1 && body.len() > 200 {
+                let style = self.style();
+                self.me().send_pieces(&frame, 150, style);
+            } else {
+                self.court.note("sends", frame.as_bytes());
+                if self.plan.together {
+                    // Line behind line they go through as one.
+                    self.me().send_with_next(&frame);
+                } else {
+                    self.me().send(&frame, 0);
+                }
+            }
+            let message = Message {
+                topic: topic.to_owned(),
+                publisher: who,
+                body,
+            };
+            self.model.messages.insert(number, message);
+            let order = self.me().frames;
+            self.me().published.insert(number, order);
+            self.court.count("messages published");
+            for other in self.all.iter_mut() {
+                for one in other
+                    .subscriptions
+                    .values_mut()
+                    .filter(|one| one.topic == topic)
+                {
+                    let is_on = one.phase == Phase::On && link;
+                    let must = is_on && one.throttle.is_none();
+                    one.pending
+                        .entry(who)
+                        .or_default()
+                        .push_back((number, must));
+                    if is_on {
+                        one.newest.insert(who, number);
+                    }
+                }
+            }
+        }
+        self.me().flush();
+    }
+
+    /// One message, on a topic whose messages are throttled for somebody, if there is such; gives the least time between two.
+    pub fn stream(&mut self) -> Duration {
+        let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
+        let throttled = subscriptions
+            .filter_map(|one| one.throttle.map(|interval| (interval, one.topic.clone())))
+            .max();
+        let (interval, topic) =
+            throttled.unwrap_or_else(|| (Duration::from_millis(20), TOPICS[0].to_owned()));
+        self.advertise(&topic);
+        self.publish_on(&topic, 1, |desk| desk.payload(0));
+        interval
+    }
+
+    /// More than an outbox holds, for another client that subscribes to it; gives that one's place.
+    pub fn flood(&mut self) -> Option<usize> {
+        // A thousand pieces of each of its messages would take all the time there is, and hostile clients ask for pieces on one topic.
+        let subscriptions = self.all.iter().flat_map(|one| one.subscriptions.values());
+        let in_pieces: Vec<&str> = subscriptions
+            .filter(|one| one.is_in_pieces)
+            .map(|one| one.topic.as_str())
+            .chain([TOPICS[1]])
+            .collect();
+        let listens = |(place, one): (usize, &Honest)| {
+            let mut all = one.subscriptions.values();
+            let plain = all.find(|one| {
+                let is_on = one.phase == Phase::On && one.throttle.is_none();
+                is_on && !in_pieces.contains(&one.topic.as_str())
+            })?;
+            (place != self.at && one.is_active()).then(|| (place, plain.topic.clone()))
+        };
+        let (deaf, topic) = self.all.iter().enumerate().find_map(listens)?;
+        // Nobody takes so much at once: some of it may be dropped for those who read, too, and has to be counted.
+        for one in self.all.iter_mut() {
+            let mut all = one.subscriptions.values();
+            one.is_hampered |= all.any(|one| one.topic == topic);
+        }
+        self.advertise(&topic);
+        self.court.count("floods");
+        let long = format!("\"{}\"", "x".repeat(FLOODING));
+        self.publish_on(&topic, 3 * MAX_TOPIC_BYTES / 2 / FLOODING, |_| long.clone());
+        Some(deaf)
+    }
+
+    pub(super) fn subscribe(&mut self, feature: Feature) {
+        let topic = self.court.among(&TOPICS);
+        let spelling = self.spelled(topic);
+        let door = self.me().door;
+        let is_binary = feature == Feature::Cbor && door == Door::Socket;
+        let throttle = (feature == Feature::Throttle)
+            .then(|| Duration::from_millis(20 + self.court.below(300) as u64));
+        let known = self.me().subscriptions.get(&spelling);
+        let differs = known.is_some_and(|one| {
+            one.is_binary != is_binary || one.throttle != throttle || one.phase != Phase::On
+        });
+        let is_new = known.is_none();
+        if differs {
+            return;
+        }
+        let mut frame = format!("{{\"op\":\"subscribe\",\"topic\":\"{spelling}\"");
+        if let Some(interval) = throttle {
+            let queue = self.court.below(4);
+            frame += &format!(
+                ",\"throttle_rate\":{},\"queue_length\":{queue}",
+                interval.as_millis()
+            );
+        }
+        if feature == Feature::Pieces {
+            frame += &format!(",\"fragment_size\":{}", self.court.among(&PIECE_SIZES));
+        }
+        if is_binary {
+            frame += ",\"compression\":\"cbor\"";
+        }
+        self.send(&(frame + "}"));
+        self.me().await_news(format!("subscribed to {spelling}"));
+        if !is_new {
+            return;
+        }
+        let pending = self.under_way(topic);
+        let subscription = Subscription {
+            topic: topic.to_owned(),
+            phase: Phase::Asked,
+            throttle,
+            is_binary,
+            is_in_pieces: feature == Feature::Pieces,
+            pending,
+            last: None,
+            last_from: None,
+            newest: Default::default(),
+        };
+        self.me().subscriptions.insert(spelling, subscription);
+    }
+
+    /// Messages on a topic that were sent already, and may not have been handled yet.
+    pub(super) fn under_way(&self, topic: &str) -> BTreeMap<u64, VecDeque<(u64, bool)>> {
+        let mut pending: BTreeMap<u64, VecDeque<(u64, bool)>> = BTreeMap::new();
+        for (number, message) in &self.model.messages {
+            let publisher = self.all.iter().find(|one| one.who == message.publisher);
+            let order = publisher.and_then(|one| Some((one.published.get(number)?, one.handled)));
+            if message.topic == topic && order.is_none_or(|(order, handled)| *order >= handled) {
+                pending
+                    .entry(message.publisher)
+                    .or_default()
+                    .push_back((*number, false));
+            }
+        }
+        pending
+    }
+
+    pub(super) fn unsubscribe(&mut self) {
+        let spellings: Vec<String> = self.me().subscriptions.keys().cloned().collect();
+        if spellings.is_empty() {
+            return;
+        }
+        let spelling = self.court.among(&spellings);
+        self.send(&format!(
+            "{{\"op\":\"unsubscribe\",\"topic\":\"{spelling}\"}}"
+        ));
+        let order = self.me().frames;
+        if let Some(one) = self.me().subscriptions.get_mut(&spelling)
+            && !matches!(one.phase, Phase::Leaving(_))
+        {
+            one.phase = Phase::Leaving(order);
+            one.pending
+                .values_mut()
+                .flatten()
+                .for_each(|(_, must)| *must = false);
+        }
+    }
+}
