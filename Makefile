@@ -138,8 +138,8 @@ bench-load: ## Measure many clients' messages beside redis and mosquitto; ARGS=-
 	@echo "make bench-load: some minutes; installs redis-server and mosquitto from Debian as root if they are missing"
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/load/run.sh
 
-bench-peers: ## Measure beside Pinocchio, MuJoCo, scipy, heyoka and ode_solvers, installed into benches/peers/.venv; KEEP=1 as above
-	@echo "make bench-peers: downloads about 300 MB once, compiles, then some ten minutes"
+bench-peers: ## Measure beside Pinocchio and the C it generates, MuJoCo, scipy, heyoka and ode_solvers, installed into benches/peers/.venv; KEEP=1 as above
+	@echo "make bench-peers: downloads about 300 MB once, compiles for some minutes, then some ten minutes"
 	@KEEP="$(KEEP)" bash benches/peers/run.sh
 	@KEEP="$(KEEP)" bash benches/equal_error/run.sh
 

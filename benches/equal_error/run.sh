@@ -33,7 +33,7 @@ say "compiling"
 "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_C_SOURCE=200809L -isystem "$packages/mujoco/include" \
     "$here/mujoco.c" -o "$out/mujoco" "$mujoco" -lm -Wl,-rpath,"$(dirname "$mujoco")"
 # The definitions are those of Pinocchio's own CMake files; from the headers, with the flags of this machine, it is fastest.
-if [ ! "$out/pinocchio" -nt "$here/pinocchio.cpp" ] || [ ! "$out/pinocchio" -nt "$here/sweep.h" ]; then
+if [ ! -e "$out/pinocchio" ] || [ -n "$(find "$here" "$benches/peers/rod_arm.hpp" -maxdepth 1 -type f -newer "$out/pinocchio" -print -quit)" ]; then
     "$cxx" -std=c++17 -O3 -march=native -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30 \
         -DBOOST_MPL_CFG_NO_PREPROCESSED_HEADERS -DBOOST_FUSION_INVOKE_MAX_ARITY=12 \
         -isystem "$prefix/include" -isystem "$prefix/include/eigen3" \

@@ -1,7 +1,7 @@
 /* Parts that the programs of the peers share: the states that they are given, the timing, the lines that they print.
  *
  * Valid C11 and C++17. Times by the monotonic clock: runs of CALLS calls, of which the shortest and the median are printed, for other
- * work on the machine only ever adds time. `src/bin/peers.rs` does the same for pendularm and reads what is printed here.
+ * work on the machine only ever adds time. `src/bin/peers/` does the same for pendularm and reads what is printed here.
  *
  * Invariant: every program is given the same states, starts its chains at the same place, and makes as many calls in a run. */
 #ifndef HARNESS_H

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
-# `make bench-peers`: the same 2- and 3-link rod arm in pendularm, Pinocchio and MuJoCo, checked, then timed, in one run.
+# `make bench-peers`: the same 2- and 3-link rod arm in pendularm, Pinocchio, the C that Pinocchio generates for it (with CppADCodeGen), and
+# MuJoCo, checked, then timed, in one run.
 #
-# Installs both peers' headers and libraries from PyPI into benches/peers/.venv (nothing outside it is touched), compiles the programs
+# Installs the peers' headers and libraries from PyPI into benches/peers/.venv (nothing outside it is touched), compiles the programs
 # of this folder against them, compares all results, and only then times: every program in turn, PASSES times, on one
 # core. KEEP=1 keeps results and times in benches/results/<date>-<processor>/peers/. Needs python3, gcc and g++ (or CC, CXX).
 set -euo pipefail
@@ -28,11 +29,11 @@ prefix=$packages/cmeel.prefix
 mujoco=$(echo "$packages"/mujoco/libmujoco.so.*)
 [ -e "$mujoco" ] || fail "the wheel of MuJoCo has no library for this system"
 
-# Compiles $1 from the source $2 with the rest, unless it is newer than source, harness and this script.
+# Compiles $1 from the source $2 with the rest, unless it is newer than all that is written here.
 program() {
     local output=$benches/target/peers/$1 source=$here/$2
     shift 2
-    if [ ! "$output" -nt "$source" ] || [ ! "$output" -nt "$here/harness.h" ] || [ ! "$output" -nt "$here/run.sh" ]; then
+    if [ ! -e "$output" ] || [ -n "$(find "$here" -maxdepth 1 -type f -newer "$output" -print -quit)" ]; then
         say "compiling ${output##*/}"
         "$@" "$source" -o "$output" "${libraries[@]}"
     fi
@@ -50,6 +51,23 @@ program pinocchio-native pinocchio.cpp "${pinocchio[@]}" -march=native
 libraries=("$mujoco" -Wl,-rpath,"$(dirname "$mujoco")")
 program mujoco mujoco.c "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_C_SOURCE=200809L \
     -isystem "$packages/mujoco/include"
+# The C that Pinocchio generates, for each number of links: compiled as ours is, for any x86-64; for this machine; and with the flags
+# that Pinocchio gives its own, which let the compiler reorder sums and take sines side by side.
+libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
+program generate generate.cpp "${pinocchio[@]}" -O0
+for links in 2 3; do
+    forward=$benches/target/peers/forward-$links.h
+    "$benches/target/peers/generate" "$links" >"$forward"
+    generated() { # name, flags
+        local name=$1
+        shift
+        "$cc" -std=c11 -Wall -Wextra -D_POSIX_C_SOURCE=200809L "-DJOINTS=$links" "-DGENERATED=\"$forward\"" "$@" \
+            "$here/generated.c" -o "$benches/target/peers/generated-$name-$links" -lm
+    }
+    generated plain -O3
+    generated native -O3 -march=native
+    generated fast -Ofast -march=native
+done
 say "building ours (release)"
 (cd "$benches" && cargo build --release --locked --quiet --bin peers)
 
@@ -60,8 +78,8 @@ cd "$folder"
 {
     environment "make bench-peers"
     echo "compilers: $("$cc" --version | head -n 1); $("$cxx" --version | head -n 1)"
-    echo "peers:     $(sed -n '/^libpinocchio\|^cmeel-eigen\|^mujoco/p' "$here/requirements.txt" | paste -sd ' ')"
-    echo "flags:     wheel: -O3; native, mujoco: -O3 -march=native; the wheels' libraries as they come"
+    echo "peers:     $(sed -n '/^libpinocchio\|^cmeel-eigen\|^cmeel-cppad\|^mujoco/p' "$here/requirements.txt" | paste -sd ' ')"
+    echo "flags:     wheel, generated plain: -O3; native, mujoco: -O3 -march=native; generated fast: -Ofast -march=native; the wheels' libraries as they come"
     echo "passes:    $passes, one pinned core, every program in turn"
 } >environment.txt
 
@@ -72,13 +90,14 @@ system() {
         pendularm) "$built/peers" "$3" "$2" "$states" ;;
         "pinocchio wheel") "$benches/target/peers/pinocchio-wheel" "$1" "$2" "$states" "$3" ;;
         "pinocchio native") "$benches/target/peers/pinocchio-native" "$1" "$2" "$states" "$3" ;;
+        generated*) "$benches/target/peers/${1/ /-}-$2" "$1" "$2" "$states" "$3" ;;
         mujoco) "$benches/target/peers/mujoco" "$1" "$2" "$states" "$3" ;;
         "mujoco bare") "$benches/target/peers/mujoco" "$1" "$2" "$states" "$3" bare ;;
     esac
 }
 export -f system
 export built benches
-systems=(pendularm "pinocchio wheel" "pinocchio native" mujoco "mujoco bare")
+systems=(pendularm "pinocchio wheel" "pinocchio native" "generated plain" "generated native" "generated fast" mujoco "mujoco bare")
 
 for links in 2 3; do
     "$built/peers" states "$links" >"states-$links.txt"

@@ -66,10 +66,10 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     let any = angles[0];
     let shifted = entries!(any, i => angles[i] * FRAC_2_PI + ROUND);
     let k = entries!(any, i => shifted[i] + -ROUND);
-    let first = entries!(any, i => angles[i] - k[i] * HALF_PI[0]);
-    let second = entries!(any, i => k[i] * HALF_PI[1]);
-    let r = entries!(any, i => first[i] - second[i]);
-    let tail = entries!(any, i => ((first[i] - r[i]) - second[i]) - k[i] * HALF_PI[2]);
+    let first = entries!(any, i => angles[i].less_exact(k[i], HALF_PI[0]));
+    let r = entries!(any, i => first[i].less_exact(k[i], HALF_PI[1]));
+    let tail =
+        entries!(any, i => (first[i] - r[i]).less_exact(k[i], HALF_PI[1]) - k[i] * HALF_PI[2]);
 
     let r2 = entries!(any, i => r[i] * r[i]);
     let r4 = entries!(any, i => r2[i] * r2[i]);
@@ -80,9 +80,8 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
     let sine = entries!(any, i => r[i] + (tail[i] + r[i] * r2[i] * s[i]));
     let cosine = entries!(any, i => {
         let one = any.like(1.0);
-        let half = r2[i] * 0.5;
-        let head = one - half;
-        head + (((one - head) - half) + (r4[i] * c[i] - r[i] * tail[i]))
+        let head = one.less_exact(r2[i], 0.5);
+        head + ((one - head).less_exact(r2[i], 0.5) + (r4[i] * c[i] - r[i] * tail[i]))
     });
 
     let (mut sin, mut cos) = (sine, cosine);
@@ -106,10 +105,12 @@ fn polynomial<T: Number>(p: [f64; 6], r2: T, r4: T, r8: T) -> T {
 #[inline(never)]
 fn replace_far<T: Number, const N: usize>(angles: &[T; N], sin: &mut [T; N], cos: &mut [T; N]) {
     for i in 0..N {
-        let pairs = sin[i].lanes_mut().iter_mut().zip(cos[i].lanes_mut());
-        for (angle, (sin, cos)) in angles[i].lanes().iter().zip(pairs) {
+        for lane in 0..T::LANES {
+            let angle = angles[i].lane(lane);
             if angle.abs() > LIMIT || angle.is_nan() {
-                (*sin, *cos) = angle.sin_cos();
+                let (sine, cosine) = angle.sin_cos();
+                sin[i].set_lane(lane, sine);
+                cos[i].set_lane(lane, cosine);
             }
         }
     }

@@ -86,9 +86,11 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     } else {
         sin_cos_beyond_first(q)
     };
-    let mut rate = zero;
+    let mut rate = qd[0];
     let w = entries!(zero, i => {
-        rate = rate + qd[i];
+        if i > 0 {
+            rate = rate + qd[i];
+        }
         rods[i].length * rate * rate
     });
 
@@ -125,7 +127,10 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
         let x_axis = Planar::new(cos[i], sin[i]);
         let joint = Planar::new(x_axis.dot(tip), x_axis.perp_dot(tip));
         let along = joint.x - w[i];
-        let across = (hinges[i].free - hinges[i].across * joint.y) - hinges[i].along * along;
+        let mut across = hinges[i].free - hinges[i].across * joint.y;
+        if i + 1 < N {
+            across = across - hinges[i].along * along;
+        }
         tip = Planar::new(along, across);
         let link = (across - joint.y) * rods[i].per_length;
         let relative = link - inner;

@@ -1,11 +1,12 @@
-//! A number of the arm's formulas: one for one arm, or a register full of them, a lane for each of several arms.
+//! A number of the arm's formulas: one for one arm, or two registers full of them, a lane for each of several arms.
 //!
 //! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
 //! done in all lanes alike; the two that have to look at a lane by itself, the bound of an integral and the quadrant of
 //! an angle, select and do not branch.
 //!
-//! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next: so
-//! that a lane has the bits of the arm that is stepped alone, on every machine and in registers of every width.
+//! **Invariant:** every operation rounds once, to the nearest, as IEEE 754 has it, and none is fused with the next but
+//! where that changes nothing: so that a lane has the bits of the arm that is stepped alone, on every machine and in
+//! registers of every width.
 
 mod arithmetic;
 #[cfg(feature = "batch")]
@@ -15,7 +16,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
-pub(super) use register::Register;
+pub(super) use register::RegisterPair;
 
 /// An array with an entry for each `$i`, its length that of where it goes; `$any` is any number of the kind.
 ///
@@ -32,7 +33,7 @@ macro_rules! entries {
 }
 pub(super) use entries;
 
-/// A number, or as many as a register has lanes. Constants are the same in all lanes.
+/// A number, or as many as two registers have lanes. Constants are the same in all lanes.
 pub trait Number:
     Copy
     + Add<Output = Self>
@@ -43,9 +44,17 @@ pub trait Number:
     + Add<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
+    /// How many numbers these are.
+    const LANES: usize;
+
     /// `value` in as many lanes as `self` has.
     #[must_use]
     fn like(self, value: f64) -> Self;
+
+    /// `self - factor * other`, of a product that is exact, or so small that it changes nothing: whether it is rounded
+    /// by itself, or not, is the same.
+    #[must_use]
+    fn less_exact(self, factor: Self, other: f64) -> Self;
 
     /// The nearest number to `self` between `-limit` and `limit`; what is not a number stays so.
     #[must_use]
@@ -59,18 +68,25 @@ pub trait Number:
     #[must_use]
     fn turned(self, sine: Self, cosine: Self) -> (Self, Self);
 
-    /// The lanes, one by one.
-    fn lanes(&self) -> &[f64];
+    /// The number in a lane.
+    fn lane(&self, lane: usize) -> f64;
 
-    /// The lanes, one by one.
-    fn lanes_mut(&mut self) -> &mut [f64];
+    /// Puts a number into a lane.
+    fn set_lane(&mut self, lane: usize, value: f64);
 }
 
 /// One arm.
 impl Number for f64 {
+    const LANES: usize = 1;
+
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         value
+    }
+
+    #[inline(always)]
+    fn less_exact(self, factor: Self, other: f64) -> Self {
+        self - factor * other
     }
 
     #[inline(always)]
@@ -98,12 +114,12 @@ impl Number for f64 {
     }
 
     #[inline(always)]
-    fn lanes(&self) -> &[f64] {
-        std::slice::from_ref(self)
+    fn lane(&self, _: usize) -> f64 {
+        *self
     }
 
     #[inline(always)]
-    fn lanes_mut(&mut self) -> &mut [f64] {
-        std::slice::from_mut(self)
+    fn set_lane(&mut self, _: usize, value: f64) {
+        *self = value;
     }
 }

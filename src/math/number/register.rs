@@ -1,6 +1,14 @@
-//! A register full of numbers, as wide as the machine's are.
+//! Two registers full of numbers, each as wide as the machine's are.
 //!
-//! **Invariant:** as in [`super`]: nothing is fused, so that a lane has the bits of one number.
+//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations ahead,
+//! then always has one to do while the other waits for its result.
+//!
+//! **Invariant:** as in [`super`]: a lane has the bits of one number.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "lanes run over those of the two registers"
+)]
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -8,18 +16,18 @@ use fearless_simd::prelude::*;
 
 use super::Number;
 
-/// As many numbers as a register of `S` has lanes.
+/// As many numbers as two registers of `S` have lanes.
 #[derive(Clone, Copy)]
-pub(in crate::math) struct Register<S: Simd>(S::f64s);
+pub(in crate::math) struct RegisterPair<S: Simd>([S::f64s; 2]);
 
-impl<S: Simd> Register<S> {
-    /// How many lanes there are.
-    pub(in crate::math) const LANES: usize = S::f64s::LEN;
+impl<S: Simd> RegisterPair<S> {
+    /// How many lanes one of the two has.
+    pub(in crate::math) const WIDTH: usize = S::f64s::LEN;
 
     /// `value` in all lanes.
     #[inline(always)]
     pub(in crate::math) fn splat(simd: S, value: f64) -> Self {
-        Self(S::f64s::splat(simd, value))
+        Self([S::f64s::splat(simd, value); 2])
     }
 
     /// Whether all lanes of all values are finite.
@@ -29,25 +37,27 @@ impl<S: Simd> Register<S> {
             return true;
         };
         // Times 0 a finite number is 0, and any other is not a number.
-        let mut sum = *first * 0.0;
+        let mut sum = first.0[0] * 0.0;
         for value in some {
-            sum = sum + *value * 0.0;
+            sum = value.0[0].mul_add(0.0, sum);
+            sum = value.0[1].mul_add(0.0, sum);
         }
         for value in others {
-            sum = sum + *value * 0.0;
+            sum = value.0[0].mul_add(0.0, sum);
+            sum = value.0[1].mul_add(0.0, sum);
         }
-        sum.0.simd_eq(0.0).all_true()
+        sum.simd_eq(0.0).all_true()
     }
 }
 
 macro_rules! operator {
     ($operator:ident, $method:ident) => {
-        impl<S: Simd> $operator for Register<S> {
+        impl<S: Simd> $operator for RegisterPair<S> {
             type Output = Self;
 
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
-                Self(self.0.$method(other.0))
+                Self([self.0[0].$method(other.0[0]), self.0[1].$method(other.0[1])])
             }
         }
     };
@@ -58,16 +68,16 @@ operator!(Sub, sub);
 operator!(Mul, mul);
 operator!(Div, div);
 
-impl<S: Simd> Neg for Register<S> {
+impl<S: Simd> Neg for RegisterPair<S> {
     type Output = Self;
 
     #[inline(always)]
     fn neg(self) -> Self {
-        Self(-self.0)
+        Self([-self.0[0], -self.0[1]])
     }
 }
 
-impl<S: Simd> Add<f64> for Register<S> {
+impl<S: Simd> Add<f64> for RegisterPair<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -76,7 +86,7 @@ impl<S: Simd> Add<f64> for Register<S> {
     }
 }
 
-impl<S: Simd> Mul<f64> for Register<S> {
+impl<S: Simd> Mul<f64> for RegisterPair<S> {
     type Output = Self;
 
     #[inline(always)]
@@ -86,17 +96,29 @@ impl<S: Simd> Mul<f64> for Register<S> {
 }
 
 /// Several arms.
-impl<S: Simd> Number for Register<S> {
+impl<S: Simd> Number for RegisterPair<S> {
+    const LANES: usize = 2 * S::f64s::LEN;
+
     #[inline(always)]
     fn like(self, value: f64) -> Self {
-        Self::splat(self.0.token(), value)
+        Self::splat(self.0[0].token(), value)
+    }
+
+    #[inline(always)]
+    fn less_exact(self, factor: Self, other: f64) -> Self {
+        let minus = S::f64s::splat(self.0[0].token(), -other);
+        Self([
+            factor.0[0].mul_add(minus, self.0[0]),
+            factor.0[1].mul_add(minus, self.0[1]),
+        ])
     }
 
     #[inline(always)]
     fn clamped(self, limit: f64) -> Self {
-        let (least, most) = (self.like(-limit).0, self.like(limit).0);
-        let low = self.0.simd_lt(least).select(least, self.0);
-        Self(low.simd_gt(most).select(most, low))
+        Self([
+            clamped::<S>(self.0[0], limit),
+            clamped::<S>(self.0[1], limit),
+        ])
     }
 
     #[inline(always)]
@@ -104,36 +126,52 @@ impl<S: Simd> Number for Register<S> {
         let [first, ..] = values else {
             return true;
         };
-        let mut within = first.0.abs().simd_le(limit);
+        let mut within = first.0[0].abs().simd_le(limit);
         for value in values {
-            within &= value.0.abs().simd_le(limit);
+            within &= value.0[0].abs().simd_le(limit);
+            within &= value.0[1].abs().simd_le(limit);
         }
         within.all_true()
     }
 
     #[inline(always)]
     fn turned(self, sine: Self, cosine: Self) -> (Self, Self) {
-        let simd = self.0.token();
-        let (one, two) = (S::u64s::splat(simd, 1), S::u64s::splat(simd, 2));
-        let quadrant: S::u64s = self.0.bitcast();
-        let odd = (quadrant & one).simd_eq(one);
-        let sine_is_negative = (quadrant & two).simd_eq(two);
-        let cosine_is_negative = ((quadrant + one) & two).simd_eq(two);
-        let sin = odd.select(cosine.0, sine.0);
-        let cos = odd.select(sine.0, cosine.0);
-        (
-            Self(sine_is_negative.select(-sin, sin)),
-            Self(cosine_is_negative.select(-cos, cos)),
-        )
+        let first = turned::<S>(self.0[0], sine.0[0], cosine.0[0]);
+        let second = turned::<S>(self.0[1], sine.0[1], cosine.0[1]);
+        (Self([first.0, second.0]), Self([first.1, second.1]))
     }
 
     #[inline(always)]
-    fn lanes(&self) -> &[f64] {
-        self.0.as_slice()
+    fn lane(&self, lane: usize) -> f64 {
+        self.0[lane / Self::WIDTH].as_slice()[lane % Self::WIDTH]
     }
 
     #[inline(always)]
-    fn lanes_mut(&mut self) -> &mut [f64] {
-        self.0.as_mut_slice()
+    fn set_lane(&mut self, lane: usize, value: f64) {
+        self.0[lane / Self::WIDTH].as_mut_slice()[lane % Self::WIDTH] = value;
     }
+}
+
+#[inline(always)]
+fn clamped<S: Simd>(value: S::f64s, limit: f64) -> S::f64s {
+    let simd = value.token();
+    let (least, most) = (S::f64s::splat(simd, -limit), S::f64s::splat(simd, limit));
+    let low = value.simd_lt(least).select(least, value);
+    low.simd_gt(most).select(most, low)
+}
+
+#[inline(always)]
+fn turned<S: Simd>(shifted: S::f64s, sine: S::f64s, cosine: S::f64s) -> (S::f64s, S::f64s) {
+    let simd = shifted.token();
+    let (one, two) = (S::u64s::splat(simd, 1), S::u64s::splat(simd, 2));
+    let quadrant: S::u64s = shifted.bitcast();
+    let odd = (quadrant & one).simd_eq(one);
+    let sin: S::u64s = odd.select(cosine, sine).bitcast();
+    let cos: S::u64s = odd.select(sine, cosine).bitcast();
+    let negative_sine = (quadrant & two) << 62;
+    let negative_cosine = ((quadrant + one) & two) << 62;
+    (
+        (sin ^ negative_sine).bitcast(),
+        (cos ^ negative_cosine).bitcast(),
+    )
 }

@@ -1,11 +1,11 @@
-//! Arms in the lanes of a few registers, and their steps.
+//! Arms in the lanes of a few pairs of registers, and their steps.
 //!
 //! **Invariant:** a lane whose arm has left holds one that rests without gravity, so that it can go on stepping beside
 //! the others without ever diverging.
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "joints run over 0..N of arrays that have N elements, lanes over those of a register"
+    reason = "joints run over 0..N of arrays that have N elements, lanes over those of a pair of registers"
 )]
 
 use std::array::from_fn;
@@ -16,17 +16,17 @@ use super::seat::{Seat, StepKind};
 use crate::math::arm::{Rod, State};
 use crate::math::dynamics::recursion;
 use crate::math::integrator::Method;
-use crate::math::number::{Number, Register, entries};
+use crate::math::number::{Number, RegisterPair, entries};
 use crate::math::pid::{Control, Gains, Setpoint, law};
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::stepped;
 
-/// Registers that take each step in turn.
-pub(super) const REGISTERS: usize = 4;
+/// Pairs of registers that take each step in turn.
+pub(super) const PAIRS: usize = 2;
 
-/// A few registers' worth of arms of one kind.
+/// A few pairs' worth of arms of one kind.
 pub(super) struct Formation<'s, 'a, S: Simd, const N: usize> {
-    registers: [Lanes<Register<S>, N>; REGISTERS],
+    pairs: [Lanes<RegisterPair<S>, N>; PAIRS],
     seats: &'s mut [Seat<'a, N>],
 }
 
@@ -34,13 +34,13 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
     /// Gives every arm a lane; there are enough.
     #[inline(always)]
     pub(super) fn new(simd: S, seats: &'s mut [Seat<'a, N>]) -> Self {
-        let mut registers = [Lanes::resting(Register::splat(simd, 0.0)); REGISTERS];
-        for (lanes, seats) in registers.iter_mut().zip(seats.chunks(Register::<S>::LANES)) {
+        let mut pairs = [Lanes::resting(RegisterPair::splat(simd, 0.0)); PAIRS];
+        for (lanes, seats) in pairs.iter_mut().zip(seats.chunks(RegisterPair::<S>::LANES)) {
             for (lane, seat) in seats.iter().enumerate() {
                 lanes.seat(lane, seat);
             }
         }
-        Self { registers, seats }
+        Self { pairs, seats }
     }
 
     /// Takes all steps of all arms.
@@ -64,14 +64,14 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
 
     #[inline(always)]
     fn take_steps<const WEIGHS: bool>(&mut self, kind: StepKind, steps: u64) {
-        let used = self.seats.len().div_ceil(Register::<S>::LANES);
+        let used = self.seats.len().div_ceil(RegisterPair::<S>::LANES);
         for step in 0..steps {
-            for (index, lanes) in self.registers.iter_mut().take(used).enumerate() {
+            for (index, lanes) in self.pairs.iter_mut().take(used).enumerate() {
                 let mut next = lanes.next::<WEIGHS>(kind.method, kind.controlled);
-                if !Register::all_finite(&next.state.position, &next.state.velocity) {
+                if !RegisterPair::all_finite(&next.state.position, &next.state.velocity) {
                     // Moved out of the way, so that otherwise nothing has to be in memory.
                     let mut parted = next;
-                    let first = index * Register::<S>::LANES;
+                    let first = index * RegisterPair::<S>::LANES;
                     part(lanes, &mut parted, &mut self.seats[first..], step);
                     next = parted;
                 }
@@ -82,8 +82,8 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
 
     /// Counts the steps, has arms leave that have taken theirs, and ends disturbances.
     fn look(&mut self, steps: u64) {
-        let chunks = self.seats.chunks_mut(Register::<S>::LANES);
-        for (lanes, seats) in self.registers.iter_mut().zip(chunks) {
+        let chunks = self.seats.chunks_mut(RegisterPair::<S>::LANES);
+        for (lanes, seats) in self.pairs.iter_mut().zip(chunks) {
             for (lane, seat) in seats
                 .iter_mut()
                 .enumerate()
@@ -99,7 +99,7 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
                     lanes
                         .push
                         .iter_mut()
-                        .for_each(|push| push.lanes_mut()[lane] = -0.0);
+                        .for_each(|push| push.set_lane(lane, -0.0));
                 }
             }
         }
@@ -115,7 +115,7 @@ fn part<T: Number, const N: usize>(
     seats: &mut [Seat<'_, N>],
     step: u64,
 ) {
-    for (lane, seat) in (0..next.effort[0].lanes().len()).zip(seats) {
+    for (lane, seat) in (0..T::LANES).zip(seats) {
         if !next.is_finite(lane) {
             lanes.moving.write(lane, seat.arm);
             seat.end(seat.taken + step, true);
@@ -152,7 +152,7 @@ impl<T: Number, const N: usize> Moving<T, N> {
     fn set(&mut self, lane: usize, arm: &Moving<f64, N>) {
         let into = |lanes: &mut [T; N], values: &[f64; N]| {
             for (lanes, value) in lanes.iter_mut().zip(values) {
-                lanes.lanes_mut()[lane] = *value;
+                lanes.set_lane(lane, *value);
             }
         };
         into(&mut self.state.position, &arm.state.position);
@@ -164,7 +164,7 @@ impl<T: Number, const N: usize> Moving<T, N> {
     }
 
     fn write(&self, lane: usize, arm: &mut Simulation<N>) {
-        let from = |lanes: &[T; N]| from_fn(|i| lanes[i].lanes()[lane]);
+        let from = |lanes: &[T; N]| from_fn(|i| lanes[i].lane(lane));
         let state = |state: &State<N, T>| State {
             position: from(&state.position),
             velocity: from(&state.velocity),
@@ -180,11 +180,11 @@ impl<T: Number, const N: usize> Moving<T, N> {
         position
             .iter()
             .chain(velocity)
-            .all(|values| values.lanes()[lane].is_finite())
+            .all(|values| values.lane(lane).is_finite())
     }
 }
 
-/// As many arms as a register has lanes.
+/// As many arms as a pair of registers has lanes.
 #[derive(Clone, Copy)]
 struct Lanes<T, const N: usize> {
     moving: Moving<T, N>,
@@ -260,7 +260,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
     }
 
     fn set(&mut self, lane: usize, arm: &Lanes<f64, N>) {
-        let set = |lanes: &mut T, value: f64| lanes.lanes_mut()[lane] = value;
+        let set = |lanes: &mut T, value: f64| lanes.set_lane(lane, value);
         self.moving.set(lane, &arm.moving);
         for i in 0..N {
             set(&mut self.rods[i].length, arm.rods[i].length);

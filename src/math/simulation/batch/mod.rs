@@ -4,8 +4,8 @@
 //! state, parameters, gains, setpoint, timestep, disturbance and number of steps are each arm's own. What the processor
 //! has decides at run time how many lanes there are: 8 with AVX-512, 4 with AVX2, 2 with NEON or SSE2.
 //!
-//! Formulas are those of one arm, over another number ([`crate::math::number`]). A few registers take each step in
-//! turn, so that the processor works at one while another waits for its own results.
+//! Formulas are those of one arm, over another number ([`crate::math::number`]): two registers at a time, and a few
+//! such pairs take each step in turn, so that the processor works at one while another waits for its own results.
 //!
 //! **Invariant:** every simulation is afterwards what [`Simulation::advance`] would have made of it, bit for bit,
 //! whoever stands beside it.
@@ -17,10 +17,10 @@ use std::sync::OnceLock;
 
 use fearless_simd::{Level, Simd, dispatch};
 
-use self::lanes::{Formation, REGISTERS};
+use self::lanes::{Formation, PAIRS};
 use self::seat::{Seat, StepKind};
 use super::Simulation;
-use crate::math::number::Register;
+use crate::math::number::RegisterPair;
 
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
 const WORTH_A_LANE: u64 = 2;
@@ -69,7 +69,7 @@ impl Registers {
         self,
         arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>,
     ) {
-        let full = REGISTERS * self.lanes();
+        let full = 2 * PAIRS * self.lanes();
         let mut waiting: [Vec<Seat<'a, N>>; StepKind::COUNT] = std::array::from_fn(|_| Vec::new());
         for (arm, steps) in arms {
             if steps == 0 || arm.divergence.is_some() {
@@ -121,5 +121,5 @@ pub fn advance<'a, const N: usize>(arms: impl IntoIterator<Item = (&'a mut Simul
 
 #[inline(always)]
 fn lanes_of<S: Simd>(_: S) -> usize {
-    Register::<S>::LANES
+    RegisterPair::<S>::WIDTH
 }

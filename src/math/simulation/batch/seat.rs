@@ -105,16 +105,22 @@ impl<'a, const N: usize> Seat<'a, N> {
     }
 }
 
-/// How many of the next `steps` begin before the arm's disturbance ends.
+/// How many of the next `steps`, one at least, begin before the arm's disturbance ends.
 fn pushes<const N: usize>(arm: &Simulation<N>, steps: u64) -> u64 {
     let Some(disturbance) = arm.disturbance else {
         return 0;
     };
+    let acts = |step: u64| {
+        arm.base + in_f64(arm.steps_since_base + step) * arm.timestep < disturbance.ends
+    };
+    if acts(steps - 1) {
+        return steps;
+    }
     // Times do not fall from step to step, rounding included, so halving finds the first that is too late.
-    let (mut early, mut late) = (0, steps);
+    let (mut early, mut late) = (0, steps - 1);
     while early < late {
         let middle = early + (late - early) / 2;
-        if arm.base + in_f64(arm.steps_since_base + middle) * arm.timestep < disturbance.ends {
+        if acts(middle) {
             early = middle + 1;
         } else {
             late = middle;
