@@ -39,6 +39,7 @@ else
     cargo fuzz build --sanitizer none --target-dir "$folder/build"
     programs=$folder/build/$(rustc -vV | sed -n 's/^host: //p')/release
 fi
+mkdir -p "$folder"
 table=$folder/table.txt
 : >"$table"
 

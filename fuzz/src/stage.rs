@@ -74,7 +74,7 @@ pub enum Manner {
 
 /// The state that script and node share.
 #[derive(Default)]
-struct Desk {
+struct NodeState {
     manner: Cell<Option<Manner>>,
     held: RefCell<VecDeque<Caller>>,
 }
@@ -90,7 +90,7 @@ pub struct Stage {
     pub registry: Addr<Registry>,
     pub gauges: Arc<Gauges>,
     gate: Arc<Gate>,
-    desk: Rc<Desk>,
+    node_state: Rc<NodeState>,
 }
 
 impl Stage {
@@ -111,8 +111,8 @@ impl Stage {
     ) -> Self {
         let gauges = Arc::new(Gauges::with(memory));
         let registry = Registry::new(Arc::clone(&gauges)).start();
-        let desk = Rc::new(Desk::default());
-        let node = Node(Rc::clone(&desk)).start();
+        let node_state = Rc::new(NodeState::default());
+        let node = Node(Rc::clone(&node_state)).start();
         let mut nodes = Nodes::default();
         let rosapi = catalog::Rosapi::ALL.into_iter().map(Service::Rosapi);
         for service in Service::ALL.into_iter().chain(rosapi) {
@@ -134,7 +134,7 @@ impl Stage {
             registry,
             gauges,
             gate: Arc::new(gate),
-            desk,
+            node_state,
         }
     }
 
@@ -156,12 +156,12 @@ impl Stage {
 
     /// How the node treats calls from now on.
     pub fn behave(&self, manner: Manner) {
-        self.desk.manner.set(Some(manner));
+        self.node_state.manner.set(Some(manner));
     }
 
     /// The node answers the call that it has held for longest.
     pub fn release(&self) {
-        let caller = self.desk.held.borrow_mut().pop_front();
+        let caller = self.node_state.held.borrow_mut().pop_front();
         if let Some(mut caller) = caller {
             caller.succeed(&json!({}));
         }
@@ -170,7 +170,7 @@ impl Stage {
     /// From now on every call is answered, and so are all that were held.
     pub fn release_all(&self) {
         self.behave(Manner::Prompt);
-        while !self.desk.held.borrow().is_empty() {
+        while !self.node_state.held.borrow().is_empty() {
             self.release();
         }
     }
@@ -220,7 +220,7 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
 }
 
 /// The node.
-struct Node(Rc<Desk>);
+struct Node(Rc<NodeState>);
 
 impl Actor for Node {
     type Context = Context<Self>;

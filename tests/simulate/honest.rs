@@ -125,7 +125,7 @@ pub struct Honest {
     pub frames: u64,
     pub handled: u64,
     /// Answers that it owes as a provider: when, and the frame.
-    pub owed: Vec<(Instant, u64, String)>,
+    pub due_answers: Vec<(Instant, u64, String)>,
     /// The turn at which its last computation was answered: from then on the next one has its turns.
     pub computed: u64,
     /// Pieces of messages that have come, by id.
@@ -162,7 +162,7 @@ impl Honest {
             together: Vec::new(),
             frames: 0,
             handled: 0,
-            owed: Vec::new(),
+            due_answers: Vec::new(),
             computed: 0,
             pieces: BTreeMap::new(),
             news: BTreeMap::new(),
@@ -267,7 +267,7 @@ impl Honest {
     pub fn excuse(&mut self) {
         self.is_excused = true;
         self.calls.clear();
-        self.owed.clear();
+        self.due_answers.clear();
     }
 
     /// An answer has come: all frames before its call have been handled.

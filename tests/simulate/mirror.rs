@@ -56,7 +56,7 @@ impl<const N: usize> Tap<N> {
             mirror: Mirror {
                 simulation: Simulation::new(Arm::default(), gains),
                 paused: false,
-                by_hand: 0,
+                asked_steps: 0,
                 is_done: true,
                 anchor: None,
                 jumps: 0,
@@ -256,7 +256,7 @@ struct Mirror<const N: usize> {
     simulation: Simulation<N>,
     paused: bool,
     /// Steps that were asked for by hand and may still be taken: a resume and a pause at once do not end them.
-    by_hand: u64,
+    asked_steps: u64,
     /// Whether the last input, if its fields were good, has been followed as a whole.
     is_done: bool,
     /// A moment, and the simulation's time then.
@@ -276,12 +276,12 @@ impl<const N: usize> Mirror<N> {
             let words = "the arm has taken fewer steps than before without a reset";
             return self.court.wrong(words.to_owned());
         };
-        if self.paused && taken > self.by_hand {
+        if self.paused && taken > self.asked_steps {
             return self
                 .court
                 .wrong(format!("a paused arm has taken {taken} steps"));
         }
-        self.by_hand -= taken.min(self.by_hand);
+        self.asked_steps -= taken.min(self.asked_steps);
         self.simulation.advance(taken);
         if arm.divergence().is_some() && self.simulation.divergence().is_none() {
             self.simulation.advance(1);
@@ -437,7 +437,7 @@ impl<const N: usize> Mirror<N> {
         // A run that is longer than a row goes on between what others ask: its end is not foreseen.
         let steps = steps as u64;
         let taken = alone.advance(steps.min(STEPS_IN_A_ROW));
-        self.by_hand += steps;
+        self.asked_steps += steps;
         self.is_done = taken == steps;
         (steps <= STEPS_IN_A_ROW).then(|| json!({"steps": taken, "time": alone.time()}))
     }

@@ -14,7 +14,7 @@ use crate::hostile::Hostile;
 use crate::model::{Model, Provided};
 use crate::pipe::Fate;
 use crate::plan::{Burst, Fault, Feature, Plan};
-use crate::workload::{Desk, Numbers, waits};
+use crate::workload::{Numbers, Workload, waits};
 use crate::world::{SCARCE, World, in_virtual_time};
 
 /// Turns within which a light call is answered whose caller reads, all others' frames of those turns included.
@@ -170,10 +170,10 @@ impl Course {
             .iter()
             .any(|(one, _)| *one == Feature::CallOut);
         for at in 0..self.honest.len() {
-            self.desk(at).perform(Feature::Subscribe);
-            self.desk(at).perform(Feature::Subscribe);
+            self.workload(at).perform(Feature::Subscribe);
+            self.workload(at).perform(Feature::Subscribe);
             if provides && self.court.chance(0.7) {
-                self.desk(at).perform(Feature::Provide);
+                self.workload(at).perform(Feature::Provide);
             }
         }
         self.world.turns(100).await;
@@ -230,7 +230,7 @@ impl Course {
             return self.pass(Duration::from_millis(time)).await;
         }
         let at = self.somebody();
-        self.desk(at).perform(feature);
+        self.workload(at).perform(feature);
     }
 
     /// A client that can do something, by its place.
@@ -254,7 +254,7 @@ impl Course {
                     if self.honest[at].who != who || !self.honest[at].is_active() {
                         return;
                     }
-                    let interval = self.desk(at).stream();
+                    let interval = self.workload(at).stream();
                     let apart = interval.mul_f64(0.55 + 0.4 * self.court.fraction());
                     self.pass(apart).await;
                 }
@@ -267,12 +267,12 @@ impl Course {
                 {
                     return;
                 }
-                if let Some(deaf) = self.desk(at).flood() {
+                if let Some(deaf) = self.workload(at).flood() {
                     self.stall(deaf);
                 }
             }
-            Burst::LongComputation => self.desk(at).compute_long(),
-            Burst::CancelAnothers => self.desk(at).cancel_anothers(),
+            Burst::LongComputation => self.workload(at).compute_long(),
+            Burst::CancelAnothers => self.workload(at).cancel_anothers(),
         }
     }
 
@@ -285,8 +285,8 @@ impl Course {
         one.stalled_until = Some(Instant::now() + time);
     }
 
-    fn desk(&mut self, at: usize) -> Desk<'_> {
-        Desk {
+    fn workload(&mut self, at: usize) -> Workload<'_> {
+        Workload {
             court: &self.court,
             plan: &self.plan,
             model: &mut self.model,
@@ -394,7 +394,7 @@ impl Course {
                 self.world.jump(time).await;
                 // Providers now answer what they would have answered in the meantime.
                 let now = Instant::now();
-                for (due, number, _) in self.honest.iter().flat_map(|one| &one.owed) {
+                for (due, number, _) in self.honest.iter().flat_map(|one| &one.due_answers) {
                     if let Some(forward) = self.model.forwards.get_mut(number)
                         && let Some((when, ..)) = &mut forward.answered
                     {
@@ -449,7 +449,7 @@ impl Course {
                 self.model.hear(&self.court, &mut self.honest[at], received);
             }
             if answers {
-                self.desk(at).answer_calls();
+                self.workload(at).answer_calls();
             }
             self.check_end(at);
             self.check_patience(at);

@@ -237,7 +237,7 @@ pub enum Frames {
 }
 
 impl Frames {
-    /// They as they came.
+    /// The message or messages as they came.
     pub(super) fn plain(&self) -> &Bytes {
         match self {
             Self::Plain(frame) | Self::Feedback(frame) => frame,

@@ -1,6 +1,6 @@
 //! An arm under constant efforts, followed as exactly as is asked: to rounding, or within a tolerance.
 //!
-//! Its motion is expanded in a power series ([`series`]); a step is as long as the last terms of it are small, and
+//! Its motion is expanded in a power series (`series.rs`); a step is as long as the last terms of it are small, and
 //! the series as long as the step. Positions and velocities are summed with compensation.
 //!
 //! **Invariant:** another path than any of the methods under study; the work of a span is bounded.

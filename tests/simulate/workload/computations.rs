@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl Desk<'_> {
+impl Workload<'_> {
     pub(super) fn compute(&mut self) {
         let method = self.court.below(Method::ALL.len());
         let name = Method::ALL[method].name();

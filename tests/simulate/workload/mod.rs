@@ -56,7 +56,7 @@ impl Numbers {
 }
 
 /// One client does one thing.
-pub struct Desk<'a> {
+pub struct Workload<'a> {
     pub court: &'a Court,
     pub plan: &'a Plan,
     pub model: &'a mut Model,
@@ -66,7 +66,7 @@ pub struct Desk<'a> {
     pub at: usize,
 }
 
-impl Desk<'_> {
+impl Workload<'_> {
     fn me(&mut self) -> &mut Honest {
         &mut self.all[self.at]
     }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl Desk<'_> {
+impl Workload<'_> {
     pub(super) fn provide(&mut self) {
         let service = self.court.among(&SERVICES);
         let spelling = self.spelled(service);
@@ -104,7 +104,7 @@ impl Desk<'_> {
                 "{{\"op\":\"service_response\",\"id\":{id},\"service\":\"{service}\",\"values\":{values},\"result\":{result}}}"
             );
             let due = Instant::now() + delay;
-            self.me().owed.push((due, one.number, frame));
+            self.me().due_answers.push((due, one.number, frame));
             if let Some(forward) = self.model.forwards.get_mut(&one.number) {
                 forward.answered = Some((due, result, values));
             }
@@ -112,7 +112,7 @@ impl Desk<'_> {
         let now = Instant::now();
         let due: Vec<_> = self
             .me()
-            .owed
+            .due_answers
             .extract_if(.., |(due, ..)| *due <= now)
             .collect();
         for (_, number, frame) in due {

@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl Desk<'_> {
+impl Workload<'_> {
     pub(super) fn ask(&mut self) {
         let services = [
             "/arm_sim/set_params",

@@ -2,7 +2,7 @@
 
 use super::*;
 
-impl Desk<'_> {
+impl Workload<'_> {
     /// Some JSON that must arrive as it is.
     pub(super) fn payload(&self, depth: usize) -> String {
         match self.court.below(if depth > 2 { 6 } else { 9 }) {
@@ -49,7 +49,7 @@ impl Desk<'_> {
         let topic = self.court.among(&TOPICS);
         self.advertise(topic);
         let count = self.court.among(&[1, 2, 6, 40]);
-        self.publish_on(topic, count, |desk| desk.payload(0));
+        self.publish_on(topic, count, |workload| workload.payload(0));
     }
 
     pub(super) fn advertise(&mut self, topic: &str) {
@@ -130,7 +130,7 @@ impl Desk<'_> {
         let (interval, topic) =
             throttled.unwrap_or_else(|| (Duration::from_millis(20), TOPICS[0].to_owned()));
         self.advertise(&topic);
-        self.publish_on(&topic, 1, |desk| desk.payload(0));
+        self.publish_on(&topic, 1, |workload| workload.payload(0));
         interval
     }
 
