@@ -4,3 +4,4 @@ pub mod attack;
 pub mod process;
 pub mod program;
 pub mod protocol;
+pub mod random;

@@ -109,6 +109,24 @@ fn messages_keep_their_order_though_long_ones_are_cut_up_elsewhere() {
     });
 }
 
+/// Hears messages, numbered from 0, up to the last: in order, each of the others counted as dropped. Gives how many came,
+/// and the number of the last one that was cut up.
+async fn hear_what_was_kept(gateway: &Gateway, peer: &mut Peer, messages: u64) -> (u64, u64) {
+    let (mut came, mut cut_up, mut last) = (0, 0, 0);
+    while last + 1 < messages {
+        let (message, number) = next_message(peer).await;
+        let n = message["msg"]["n"].as_u64().unwrap();
+        assert!(came == 0 || n > last, "{n} behind {last}");
+        last = n;
+        came += 1;
+        cut_up = cut_up.max(number);
+    }
+    let dropped = gateway.gauges.messages_dropped();
+    assert_eq!(came + dropped, messages, "each has come or is counted");
+    assert!(dropped > messages / 4, "{dropped} were too many to be kept");
+    (came, cut_up)
+}
+
 /// Fragments' ids count what has been cut up: no more than has come.
 #[test]
 fn nothing_is_cut_up_for_a_client_that_does_not_read() {
@@ -125,19 +143,8 @@ fn nothing_is_cut_up_for_a_client_that_does_not_read() {
                 .await;
         }
         sleep(Duration::from_secs(60)).await;
-        let (mut came, mut cut_up, mut last) = (0, 0, 0);
-        while last + 1 < MESSAGES {
-            let (message, number) = next_message(&mut subscriber).await;
-            let n = message["msg"]["n"].as_u64().unwrap();
-            assert!(came == 0 || n > last, "{n} behind {last}");
-            last = n;
-            came += 1;
-            cut_up = cut_up.max(number);
-        }
+        let (came, cut_up) = hear_what_was_kept(&gateway, &mut subscriber, MESSAGES).await;
         assert_eq!(cut_up, came, "each that was cut up has come");
-        let dropped = gateway.gauges.messages_dropped();
-        assert_eq!(came + dropped, MESSAGES, "each has come or is counted");
-        assert!(dropped > MESSAGES / 4, "{dropped} were too many to be kept");
     });
 }
 
@@ -160,16 +167,7 @@ fn each_message_of_a_series_that_had_to_go_is_counted() {
         }
         publisher.send_text(&lines).await;
         sleep(Duration::from_secs(60)).await;
-        let (mut came, mut last) = (0, 0);
-        while last + 1 < MESSAGES {
-            last = next_message(&mut subscriber).await.0["msg"]["n"]
-                .as_u64()
-                .unwrap();
-            came += 1;
-        }
-        let dropped = gateway.gauges.messages_dropped();
-        assert_eq!(came + dropped, MESSAGES, "each has come or is counted");
-        assert!(dropped > MESSAGES / 4, "{dropped} were too many to be kept");
+        hear_what_was_kept(&gateway, &mut subscriber, MESSAGES).await;
     });
 }
 

@@ -20,6 +20,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::{Simulation, step_under};
 use pendularm::math::trig::sin_cos;
+use pendularm_benches::random::spread;
 use std::env;
 use std::hint::black_box;
 use std::time::Instant;
@@ -86,15 +87,9 @@ fn start<const N: usize>() -> State<N> {
     })
 }
 
-/// States spread over a few turns, the same in every run (xorshift).
+/// States spread over a few turns, the same in every run.
 fn states<const N: usize>() -> Vec<State<N>> {
-    let mut bits = 0x9E37_79B9_7F4A_7C15_u64;
-    let mut random = |range: f64| {
-        bits ^= bits << 13;
-        bits ^= bits >> 7;
-        bits ^= bits << 17;
-        (bits as f64 / u64::MAX as f64 - 0.5) * range
-    };
+    let mut random = spread();
     (0..CALLS)
         .map(|_| State {
             position: std::array::from_fn(|_| random(8.0)),

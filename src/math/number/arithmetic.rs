@@ -1,11 +1,9 @@
 //! Arithmetic as a method's steps need it: less than dynamics and control do, so that numbers of more digits can be
 //! stepped too.
 //!
-//! **Invariant:** for a number of the arm's formulas it is that number's own.
+//! **Invariant:** every number of the arm's formulas has it.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
-
-use super::Number;
 
 /// Sums, products and quotients, of numbers and with constants.
 pub trait Arithmetic:
@@ -18,14 +16,14 @@ pub trait Arithmetic:
     + Add<f64, Output = Self>
     + Mul<f64, Output = Self>
 {
-    /// `value` as a number of the kind of `self`.
+    /// `value` as a number of the kind of `self`, in as many lanes.
     #[must_use]
     fn like(self, value: f64) -> Self;
 }
 
-impl<T: Number> Arithmetic for T {
+impl Arithmetic for f64 {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
-        Number::like(self, value)
+        value
     }
 }

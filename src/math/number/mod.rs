@@ -12,8 +12,6 @@ mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
 
-use std::ops::{Add, Div, Mul, Neg, Sub};
-
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
 pub(super) use register::RegisterPair;
@@ -34,22 +32,9 @@ macro_rules! entries {
 pub(super) use entries;
 
 /// A number, or as many as two registers have lanes. Constants are the same in all lanes.
-pub trait Number:
-    Copy
-    + Add<Output = Self>
-    + Sub<Output = Self>
-    + Mul<Output = Self>
-    + Div<Output = Self>
-    + Neg<Output = Self>
-    + Add<f64, Output = Self>
-    + Mul<f64, Output = Self>
-{
+pub trait Number: Arithmetic {
     /// How many numbers these are.
     const LANES: usize;
-
-    /// `value` in as many lanes as `self` has.
-    #[must_use]
-    fn like(self, value: f64) -> Self;
 
     /// `self - factor * other`, of a product that is exact, or so small that it changes nothing: whether it is rounded
     /// by itself, or not, is the same.
@@ -78,11 +63,6 @@ pub trait Number:
 /// One arm.
 impl Number for f64 {
     const LANES: usize = 1;
-
-    #[inline(always)]
-    fn like(self, value: f64) -> Self {
-        value
-    }
 
     #[inline(always)]
     fn less_exact(self, factor: Self, other: f64) -> Self {

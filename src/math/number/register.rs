@@ -14,7 +14,7 @@ use std::ops::{Add, Div, Mul, Neg, Sub};
 
 use fearless_simd::prelude::*;
 
-use super::Number;
+use super::{Arithmetic, Number};
 
 /// As many numbers as two registers of `S` have lanes.
 #[derive(Clone, Copy)]
@@ -95,14 +95,16 @@ impl<S: Simd> Mul<f64> for RegisterPair<S> {
     }
 }
 
-/// Several arms.
-impl<S: Simd> Number for RegisterPair<S> {
-    const LANES: usize = 2 * S::f64s::LEN;
-
+impl<S: Simd> Arithmetic for RegisterPair<S> {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         Self::splat(self.0[0].token(), value)
     }
+}
+
+/// Several arms.
+impl<S: Simd> Number for RegisterPair<S> {
+    const LANES: usize = 2 * S::f64s::LEN;
 
     #[inline(always)]
     fn less_exact(self, factor: Self, other: f64) -> Self {

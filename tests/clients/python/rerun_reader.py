@@ -43,7 +43,7 @@ for chunk in McapReader(whole).stream():
     if "SeriesLines:names" in columns.schema.names:
         names |= {name for row in columns["SeriesLines:names"].to_pylist() for name in row or ()}
 
-# What is plotted is what was published, value by value.
+# The plots have what was published, value by value.
 with whole.open("rb") as file:
     reader = make_reader(file, decoder_factories=[DecoderFactory()])
     published = [

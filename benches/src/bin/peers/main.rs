@@ -27,6 +27,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::batch::Registers;
 use pendularm::math::simulation::{Simulation, step_under};
+use pendularm_benches::random::spread;
 
 // As in harness.h, which says what they mean.
 const CALLS: usize = 500;
@@ -61,15 +62,9 @@ fn main() {
 /// A state and the effort at it.
 type Case<const N: usize> = (State<N>, [f64; N]);
 
-/// Positions over a few turns, velocities to 3 rad/s, efforts to 10 N m, the same in every run (xorshift).
+/// Positions over a few turns, velocities to 3 rad/s, efforts to 10 N m, the same in every run.
 fn print_states<const N: usize>() {
-    let mut bits = 0x9E37_79B9_7F4A_7C15_u64;
-    let mut random = |range: f64| {
-        bits ^= bits << 13;
-        bits ^= bits >> 7;
-        bits ^= bits << 17;
-        (bits as f64 / u64::MAX as f64 - 0.5) * range
-    };
+    let mut random = spread();
     for _ in 0..CALLS {
         let line: Vec<String> = [8.0, 6.0, 20.0]
             .into_iter()
