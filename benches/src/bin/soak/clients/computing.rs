@@ -15,7 +15,7 @@ use crate::world::{Fault, World};
 const ADVISED_PART: f64 = 0.8;
 /// Steps whose answer is modest (docs/protocol.md): for so many there is always room.
 const MODEST_STEPS: u64 = 60_000;
-/// What says that there is none.
+/// The refusal of an answer for which there is none.
 const NO_ROOM: &str = "too many bytes wait for clients that do not read";
 const METHODS: [&str; 4] = ["euler", "midpoint", "verlet", "rk4"];
 
