@@ -1,4 +1,6 @@
 //! As many arms as a pair of registers has lanes: to and fro, and where a step leads to.
+//!
+//! **Invariant:** no lane knows of another.
 
 #![allow(
     clippy::indexing_slicing,
