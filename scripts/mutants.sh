@@ -113,10 +113,10 @@ lay_out() { # layer, folder
         sed -n 's|^#\[path = "../support/\(.*\)\.rs"\]$|#[cfg(test)] #[path = "../tests/support/\1.rs"] mod \1;|p' "$root/tests/$1/main.rs"
         sed -n 's/^mod \([a-z_]*\);$/\1/p' "$root/tests/$1/main.rs" | while read -r name; do
             if [ "$name" = default_gains ] || [ -e "$root/tests/support/$name.rs" ]; then continue; fi
-            # Tests run in the order of their names: those that take a second come last.
+            # Tests run in the order of their names: unit tests come first, those that take a second last.
             case $name in
-                expression | arm_turns | memory | memory_kinds | pacing | player | recorder | replay | slow | study) order=tests_slow ;;
-                *) order=test ;;
+                expression | arm_turns | memory | memory_kinds | pacing | player | recorder | replay | slow | study) order=zz ;;
+                *) order=z ;;
             esac
             test="../tests/$1/$name"
             if [ -d "$2/src/$test" ]; then test=$test/mod; fi
