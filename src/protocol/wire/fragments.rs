@@ -198,15 +198,15 @@ struct Fragment<'a> {
 }
 
 /// A frame in pieces of at most `size` bytes of text each, one line per piece; as it is where it is no longer than
-/// that.
+/// that. `None` if the lines have more than `most` bytes.
 #[must_use]
-pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
+pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes> {
     let text = frame.strip_suffix(b"\n").unwrap_or(frame);
     let Some(text) = std::str::from_utf8(text)
         .ok()
         .filter(|text| text.len() > size)
     else {
-        return frame.clone();
+        return Some(frame.clone());
     };
     // A piece must not end within a character: the longest has four bytes.
     let size = size.max(MIN_SIZE);
@@ -218,7 +218,7 @@ pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
         rest = behind;
     }
     let total = pieces.len();
-    let mut lines = Vec::with_capacity(text.len() + total * 96);
+    let mut lines = Vec::with_capacity(most.min(text.len() + total * 96));
     for (num, data) in pieces.into_iter().enumerate() {
         let fragment = Fragment {
             op: "fragment",
@@ -229,12 +229,15 @@ pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
         };
         if serde_json::to_writer(&mut lines, &fragment).is_err() {
             debug_assert!(false, "text can always be written as JSON");
-            return frame.clone();
+            return Some(frame.clone());
         }
         lines.push(b'\n');
+        if lines.len() > most {
+            return None;
+        }
     }
     lines.shrink_to_fit();
-    Bytes::from(lines)
+    Some(Bytes::from(lines))
 }
 
 /// The last boundary of characters at or before `at`.
@@ -377,11 +380,16 @@ mod tests {
     fn a_frame_in_pieces_is_the_frame_again() {
         let text = format!("{{\"msg\":\"{}\"}}", "aä€😀\\\"".repeat(40));
         let frame = Bytes::from(format!("{text}\n"));
-        assert_eq!(split(&frame, text.len(), "id"), frame);
+        assert_eq!(split(&frame, text.len(), "id", 0), Some(frame.clone()));
         for size in MIN_SIZE..MIN_SIZE + 8 {
             let mut fragments = Fragments::default();
             let mut whole = None;
-            let lines = split(&frame, size, "id");
+            let lines = split(&frame, size, "id", usize::MAX).unwrap();
+            assert_eq!(
+                split(&frame, size, "id", lines.len()).as_ref(),
+                Some(&lines)
+            );
+            assert_eq!(split(&frame, size, "id", lines.len() - 1), None);
             for line in lines
                 .strip_suffix(b"\n")
                 .unwrap()
