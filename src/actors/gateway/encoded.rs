@@ -140,3 +140,63 @@ impl Encoded {
         Some(Some(Bytes::from(bytes)))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIB: usize = 1024 * 1024;
+
+    /// A message that is encoded, and what it was made with.
+    fn encoded(
+        msg: &str,
+        compression: Compression,
+        type_name: Option<&str>,
+        memory: &Memory,
+    ) -> Made {
+        let plain = Bytes::from(format!(
+            "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n"
+        ));
+        let encoding = Encoding {
+            compression,
+            fragment_size: Some(64).filter(|_| compression == Compression::None),
+            ros1_stamps: false,
+        };
+        let counters = (&Arc::default(), memory);
+        Encoded::new(&"/t".into(), plain, encoding, type_name, counters).make()
+    }
+
+    /// A long text is one value, a list of numbers a value for every two bytes.
+    #[test]
+    fn a_tree_counts_while_it_stands() {
+        for (msg, gives_way) in [
+            (format!("\"{}\"", "x".repeat(MIB / 2)), 0),
+            (format!("[{}1]", "1,".repeat(MIB / 4)), 1),
+        ] {
+            let memory = Memory::of(10 * MIB);
+            let account = memory.open();
+            let others = account.take(4 * MIB);
+            let made = encoded(&msg, Compression::Cbor, None, &memory);
+            assert_eq!((made.messages.len(), made.lost), (1, 0));
+            assert_eq!(memory.cut_off(), gives_way);
+            drop((others, account, made));
+            assert_eq!(memory.held(), 0);
+        }
+    }
+
+    #[test]
+    fn what_no_outbox_takes_is_not_made_and_counts_as_lost() {
+        let memory = Memory::default();
+        let times = format!("{{\"transforms\":[{}{{}}]}}", "{},".repeat(200_000));
+        let quotes = format!("\"{}\"", "\\\"".repeat(MIB));
+        for (msg, compression) in [
+            (times.as_str(), Compression::CborRaw),
+            (&quotes, Compression::None),
+            ("1e999", Compression::Cbor),
+        ] {
+            let made = encoded(msg, compression, Some("tf2_msgs/msg/TFMessage"), &memory);
+            assert_eq!((made.messages.len(), made.lost), (0, 1), "{compression:?}");
+        }
+        assert_eq!(memory.held(), 0);
+    }
+}
