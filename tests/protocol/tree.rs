@@ -5,20 +5,20 @@
 
 use pendularm::protocol::catalog::types;
 use pendularm::protocol::limits::MAX_FRAME;
-use pendularm::protocol::ros::tree::{Branch, Kind, MessageTree, NODE_BYTES};
+use pendularm::protocol::ros::tree::{Branch, BranchKind, MessageTree, NODE_BYTES};
 use pendularm::protocol::ros::{cbor, cdr};
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-/// What a value of ours would be as one of theirs.
+/// A value of ours as one of theirs.
 fn value(branch: Branch<'_, '_>) -> Value {
     match branch.kind() {
-        Kind::Null => Value::Null,
-        Kind::Bool(value) => value.into(),
-        Kind::Number(number) => number.clone().into(),
-        Kind::Text(text) => text.into(),
-        Kind::Array(entries) => entries.map(value).collect(),
-        Kind::Object(members) => {
+        BranchKind::Null => Value::Null,
+        BranchKind::Bool(value) => value.into(),
+        BranchKind::Number(number) => number.clone().into(),
+        BranchKind::Text(text) => text.into(),
+        BranchKind::Array(entries) => entries.map(value).collect(),
+        BranchKind::Object(members) => {
             let ordered: Vec<_> = members.in_order().collect();
             assert!(ordered.is_sorted_by(|one, next| one.0 < next.0));
             for (name, found) in &ordered {
@@ -116,7 +116,7 @@ proptest! {
     }
 }
 
-/// What takes most for its bytes, in a frame as long as one may be: 12 bytes for one.
+/// Texts that take most for their bytes, as long as a frame may be: 12 bytes for one.
 #[test]
 fn the_longest_message_takes_48_mib_at_worst() {
     let deep = |open: &str, close: &str| open.repeat(50) + &close.repeat(50) + ",";

@@ -7,7 +7,7 @@
 
 use super::cdr;
 use super::sink::Sink;
-use super::tree::{Branch, Kind};
+use super::tree::{Branch, BranchKind};
 use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
@@ -153,8 +153,8 @@ fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
 /// A value of type `kind`, which has fields if it is a message: then it is `inner`.
 fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
     match (kind, value.kind()) {
-        ("float64" | "float32", Kind::Null) => float(out, f64::NAN),
-        ("float64" | "float32", Kind::Number(number)) => {
+        ("float64" | "float32", BranchKind::Null) => float(out, f64::NAN),
+        ("float64" | "float32", BranchKind::Number(number)) => {
             float(out, number.as_f64().unwrap_or(f64::NAN));
         }
         _ => match inner {
@@ -196,24 +196,24 @@ fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) 
 /// Writes any JSON value. It goes as deep as a frame may be nested, which the frame's reader has checked.
 fn untyped(out: &mut Sink, value: Branch<'_, '_>) {
     match value.kind() {
-        Kind::Null => out.push(NULL),
-        Kind::Bool(false) => out.push(FALSE),
-        Kind::Bool(true) => out.push(TRUE),
-        Kind::Number(number) => match (number.as_u64(), number.as_i64()) {
+        BranchKind::Null => out.push(NULL),
+        BranchKind::Bool(false) => out.push(FALSE),
+        BranchKind::Bool(true) => out.push(TRUE),
+        BranchKind::Number(number) => match (number.as_u64(), number.as_i64()) {
             (Some(number), _) => length(out, UNSIGNED, number),
             // CBOR writes -1 - n for n; the complement of a negative number is that n.
             (None, Some(number)) => length(out, NEGATIVE, (!number).unsigned_abs()),
             (None, None) => float(out, number.as_f64().unwrap_or(f64::NAN)),
         },
-        Kind::Text(string) => text(out, string),
-        Kind::Array(entries) => {
+        BranchKind::Text(string) => text(out, string),
+        BranchKind::Array(entries) => {
             length(out, ARRAY, entries.len() as u64);
             for entry in entries {
                 untyped(out, entry);
             }
         }
-        Kind::Object(members) if members.are_in_order() => object(out, members),
-        Kind::Object(members) => object(out, members.in_order()),
+        BranchKind::Object(members) if members.are_in_order() => object(out, members),
+        BranchKind::Object(members) => object(out, members.in_order()),
     }
 }
 

@@ -8,7 +8,7 @@
 use serde_json::Value;
 
 use super::sink::Sink;
-use super::tree::{Branch, Kind, MessageTree};
+use super::tree::{Branch, BranchKind, MessageTree};
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
 
@@ -88,8 +88,8 @@ impl Writer {
         let unsigned = || value.as_u64().unwrap_or_default();
         let signed = || value.as_i64().unwrap_or_default();
         let float = || match value.kind() {
-            Kind::Null => f64::NAN,
-            Kind::Number(number) => number.as_f64().unwrap_or_default(),
+            BranchKind::Null => f64::NAN,
+            BranchKind::Number(number) => number.as_f64().unwrap_or_default(),
             _ => 0.0,
         };
         match kind {

@@ -38,7 +38,7 @@ enum TreeNode<'a> {
 /// The length of an array or object.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
-    /// Entries or members.
+    /// BranchEntries or members.
     count: usize,
     /// Nodes, its own included.
     nodes: usize,
@@ -180,7 +180,7 @@ pub struct Branch<'t, 'a> {
 
 /// The kinds of values, as another form has to tell them apart.
 #[derive(Debug, Clone)]
-pub enum Kind<'t, 'a> {
+pub enum BranchKind<'t, 'a> {
     /// `null`.
     Null,
     /// `true` or `false`.
@@ -190,9 +190,9 @@ pub enum Kind<'t, 'a> {
     /// A text, without its escapes.
     Text(&'t str),
     /// An array's entries.
-    Array(Entries<'t, 'a>),
+    Array(BranchEntries<'t, 'a>),
     /// An object's members.
-    Object(Members<'t, 'a>),
+    Object(BranchMembers<'t, 'a>),
 }
 
 impl<'t, 'a> Branch<'t, 'a> {
@@ -203,20 +203,20 @@ impl<'t, 'a> Branch<'t, 'a> {
 
     /// The value.
     #[must_use]
-    pub fn kind(self) -> Kind<'t, 'a> {
+    pub fn kind(self) -> BranchKind<'t, 'a> {
         let Some((first, rest)) = self.nodes.split_first() else {
-            return Kind::Null;
+            return BranchKind::Null;
         };
         match first {
-            TreeNode::Null => Kind::Null,
-            TreeNode::Bool(value) => Kind::Bool(*value),
-            TreeNode::Number(number) => Kind::Number(number),
-            TreeNode::Text(text) => Kind::Text(text),
-            TreeNode::Array(extent) => Kind::Array(Entries {
+            TreeNode::Null => BranchKind::Null,
+            TreeNode::Bool(value) => BranchKind::Bool(*value),
+            TreeNode::Number(number) => BranchKind::Number(number),
+            TreeNode::Text(text) => BranchKind::Text(text),
+            TreeNode::Array(extent) => BranchKind::Array(BranchEntries {
                 rest,
                 left: extent.count,
             }),
-            TreeNode::Object(extent) => Kind::Object(Members {
+            TreeNode::Object(extent) => BranchKind::Object(BranchMembers {
                 rest,
                 left: extent.count,
             }),
@@ -237,25 +237,25 @@ impl<'t, 'a> Branch<'t, 'a> {
         way.split('/')
             .skip(1)
             .try_fold(self, |at, part| match at.kind() {
-                Kind::Array(mut entries) => entries.next().filter(|_| part == "0"),
+                BranchKind::Array(mut entries) => entries.next().filter(|_| part == "0"),
                 _ => at.get(part),
             })
     }
 
     /// The entries, if it is an array.
     #[must_use]
-    pub fn entries(self) -> Option<Entries<'t, 'a>> {
+    pub fn entries(self) -> Option<BranchEntries<'t, 'a>> {
         match self.kind() {
-            Kind::Array(entries) => Some(entries),
+            BranchKind::Array(entries) => Some(entries),
             _ => None,
         }
     }
 
     /// The members, if it is an object.
     #[must_use]
-    pub fn members(self) -> Option<Members<'t, 'a>> {
+    pub fn members(self) -> Option<BranchMembers<'t, 'a>> {
         match self.kind() {
-            Kind::Object(members) => Some(members),
+            BranchKind::Object(members) => Some(members),
             _ => None,
         }
     }
@@ -264,7 +264,7 @@ impl<'t, 'a> Branch<'t, 'a> {
     #[must_use]
     pub fn as_str(self) -> Option<&'t str> {
         match self.kind() {
-            Kind::Text(text) => Some(text),
+            BranchKind::Text(text) => Some(text),
             _ => None,
         }
     }
@@ -273,7 +273,7 @@ impl<'t, 'a> Branch<'t, 'a> {
     #[must_use]
     pub fn as_bool(self) -> Option<bool> {
         match self.kind() {
-            Kind::Bool(value) => Some(value),
+            BranchKind::Bool(value) => Some(value),
             _ => None,
         }
     }
@@ -298,7 +298,7 @@ impl<'t, 'a> Branch<'t, 'a> {
 
     fn number(self) -> Option<&'t Number> {
         match self.kind() {
-            Kind::Number(number) => Some(number),
+            BranchKind::Number(number) => Some(number),
             _ => None,
         }
     }
@@ -306,13 +306,13 @@ impl<'t, 'a> Branch<'t, 'a> {
 
 /// The entries of an array, in order.
 #[derive(Debug, Clone)]
-pub struct Entries<'t, 'a> {
+pub struct BranchEntries<'t, 'a> {
     /// The nodes of those that are left, and others behind them.
     rest: &'t [TreeNode<'a>],
     left: usize,
 }
 
-impl<'t, 'a> Iterator for Entries<'t, 'a> {
+impl<'t, 'a> Iterator for BranchEntries<'t, 'a> {
     type Item = Branch<'t, 'a>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -325,17 +325,17 @@ impl<'t, 'a> Iterator for Entries<'t, 'a> {
     }
 }
 
-impl ExactSizeIterator for Entries<'_, '_> {}
+impl ExactSizeIterator for BranchEntries<'_, '_> {}
 
 /// The members of an object as they were written, names that come twice included.
 #[derive(Debug, Clone)]
-pub struct Members<'t, 'a> {
+pub struct BranchMembers<'t, 'a> {
     /// The nodes of those that are left, and others behind them.
     rest: &'t [TreeNode<'a>],
     left: usize,
 }
 
-impl<'t, 'a> Iterator for Members<'t, 'a> {
+impl<'t, 'a> Iterator for BranchMembers<'t, 'a> {
     type Item = (&'t str, Branch<'t, 'a>);
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -349,9 +349,9 @@ impl<'t, 'a> Iterator for Members<'t, 'a> {
     }
 }
 
-impl ExactSizeIterator for Members<'_, '_> {}
+impl ExactSizeIterator for BranchMembers<'_, '_> {}
 
-impl<'t, 'a> Members<'t, 'a> {
+impl<'t, 'a> BranchMembers<'t, 'a> {
     /// Whether each name comes behind the one in front of it, as text is ordered.
     #[must_use]
     pub fn are_in_order(&self) -> bool {
@@ -367,7 +367,7 @@ impl<'t, 'a> Members<'t, 'a> {
         let nodes = self.rest;
         let member = move |place: usize| {
             let rest = nodes.get(place..).unwrap_or_default();
-            Members { rest, left: 1 }
+            BranchMembers { rest, left: 1 }
                 .next()
                 .unwrap_or(("", Branch::FALSE))
         };
