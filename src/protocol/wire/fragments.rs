@@ -383,11 +383,8 @@ mod tests {
             let lines = split(&frame, size, "id", usize::MAX).unwrap();
             let within = |most: usize| split(&frame, size, "id", most).is_some();
             assert!(within(lines.len()) && !within(lines.len() - 1));
-            for line in lines
-                .strip_suffix(b"\n")
-                .unwrap()
-                .split(|byte| *byte == b'\n')
-            {
+            let lines = lines.strip_suffix(b"\n").unwrap();
+            for line in lines.split(|byte| *byte == b'\n') {
                 let line: serde_json::Value = serde_json::from_slice(line).unwrap();
                 let number = |name: &str| usize::try_from(line[name].as_u64().unwrap()).unwrap();
                 let data = line["data"].as_str().unwrap();
