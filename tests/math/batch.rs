@@ -7,7 +7,8 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
-use pendularm::math::simulation::batch::{self, Registers};
+use pendularm::math::number::Registers;
+use pendularm::math::simulation::batch;
 
 /// Sizes around the point at which the sine's reduction needs the C library (2e5 rad), and far beyond.
 const FAR: [f64; 5] = [1.9e5, 2.1e5, 1e9, 1e16, 1e300];

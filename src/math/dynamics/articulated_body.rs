@@ -37,8 +37,6 @@
     reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
 )]
 
-use std::ops::Add;
-
 use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Number, entries};
 use crate::math::trig;
@@ -86,6 +84,7 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     } else {
         sin_cos_beyond_first(q)
     };
+    let x_axis = entries!(Planar::new(zero, zero), i => Planar::new(cos[i], sin[i]));
     let mut rate = qd[0];
     let w = entries!(zero, i => {
         if i > 0 {
@@ -93,50 +92,53 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
         }
         rods[i].length * rate * rate
     });
+    let u = entries!(zero, i => {
+        let transmitted = if i + 1 < N { tau[i] - tau[i + 1] } else { tau[i] };
+        transmitted * rods[i].per_mass_length
+    });
 
-    // From the tip to the base: what each link carries, and how its tip will answer its joint.
+    // From the tip to the base: what each link carries, and how its tip will answer the one before.
     let mut carried = Carried::nothing(zero);
     let mut hinges = [Hinge::none(zero); N];
-    let mut outer = zero;
-    for i in (0..N).rev() {
-        let u = (tau[i] - outer) * rods[i].per_mass_length;
-        outer = tau[i];
-        let big_w = carried.c * 3.0 + 1.0;
-        let per_w = zero.like(1.0) / big_w;
-        hinges[i] = Hinge {
-            free: per_w * 3.0 * (u - carried.bias.y),
-            along: per_w * 3.0 * carried.b,
-            across: per_w * 0.5,
+    for i in (1..N).rev() {
+        carried = if i + 1 == N {
+            Carried::outermost(u[i], w[i], rods[i].mass_ratio, x_axis[i])
+        } else {
+            let body = carried.with_rod(u[i], w[i]);
+            hinges[i] = carried.hinge(u[i], w[i], x_axis[i]).scaled(body.per_w());
+            body.turned(u[i], rods[i].mass_ratio, x_axis[i])
         };
-        if i > 0 {
-            let x_axis = Planar::new(cos[i], sin[i]);
-            carried = if i + 1 == N {
-                Body::bare(u, w[i]).turned(rods[i].mass_ratio, x_axis, x_axis)
-            } else {
-                let body = carried.with_rod(u, w[i], big_w, per_w);
-                let v = x_axis + x_axis.perp().scaled(body.k);
-                body.turned(rods[i].mass_ratio, x_axis, v)
-            };
-        }
     }
+    let base = carried.hinge(u[0], w[0], x_axis[0]);
+    let per_w = zero.like(1.0) / carried.big_w;
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
-    let mut tip = Planar::new(zero, if WEIGHS { *gravity } else { zero });
-    let mut inner = zero;
-    entries!(zero, i => {
-        let x_axis = Planar::new(cos[i], sin[i]);
-        let joint = Planar::new(x_axis.dot(tip), x_axis.perp_dot(tip));
-        let along = joint.x - w[i];
-        let mut across = hinges[i].free - hinges[i].across * joint.y;
-        if i + 1 < N {
-            across = across - hinges[i].along * along;
+    let (mut tip, mut inner);
+    if WEIGHS {
+        let joint = Planar::new(x_axis[0].y * *gravity, x_axis[0].x * *gravity);
+        let across = (base.free - base.y * *gravity) * per_w;
+        tip = Planar::new(joint.x - w[0], across);
+        inner = (across - joint.y) * rods[0].per_length;
+    } else {
+        tip = Planar::new(-w[0], base.free * per_w);
+        inner = tip.y * rods[0].per_length;
+    }
+    let mut relative = [inner; N];
+    for i in 1..N {
+        let joint_y = x_axis[i].perp_dot(tip);
+        let per_length = rods[i].per_length;
+        if i + 1 == N {
+            relative[i] = (u[i] * 3.0 * per_length - inner) - per_length * 1.5 * joint_y;
+        } else {
+            let hinge = hinges[i];
+            let along = (x_axis[i].x * tip.x - w[i]) + x_axis[i].y * tip.y;
+            let across = (hinge.free - hinge.x * tip.x) - hinge.y * tip.y;
+            let link = (across - joint_y) * per_length;
+            relative[i] = link - inner;
+            (tip, inner) = (Planar::new(along, across), link);
         }
-        tip = Planar::new(along, across);
-        let link = (across - joint.y) * rods[i].per_length;
-        let relative = link - inner;
-        inner = link;
-        relative
-    })
+    }
+    relative
 }
 
 /// Sines and cosines of all angles but the first, for which those of 0 stand.
@@ -167,42 +169,18 @@ impl<T: Number> Planar<T> {
     }
 
     #[inline(always)]
-    fn dot(self, other: Self) -> T {
-        self.x * other.x + self.y * other.y
-    }
-
-    /// Turned by a right angle.
-    #[inline(always)]
-    fn perp(self) -> Self {
-        Self::new(-self.y, self.x)
-    }
-
-    #[inline(always)]
     fn perp_dot(self, other: Self) -> T {
         self.x * other.y - self.y * other.x
     }
-
-    #[inline(always)]
-    fn scaled(self, factor: T) -> Self {
-        Self::new(factor * self.x, factor * self.y)
-    }
 }
 
-impl<T: Number> Add for Planar<T> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self::new(self.x + other.x, self.y + other.y)
-    }
-}
-
-/// How the tip of a link accelerates across it: `t_y = free - along t_x - across p_y`.
+/// How the tip of a link accelerates across it: `free - x p_x - y p_y`, where the tip of the link before, in whose frame
+/// `p` is, accelerates by `p`.
 #[derive(Clone, Copy)]
 struct Hinge<T> {
     free: T,
-    along: T,
-    across: T,
+    x: T,
+    y: T,
 }
 
 impl<T: Number> Hinge<T> {
@@ -210,53 +188,17 @@ impl<T: Number> Hinge<T> {
     fn none(zero: T) -> Self {
         Self {
             free: zero,
-            along: zero,
-            across: zero,
+            x: zero,
+            y: zero,
         }
     }
-}
 
-/// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass:
-/// `A' = x v vᵀ + d y yᵀ` with `v = (1, k)`, and `B' = x φ v + ψ y`.
-#[derive(Clone, Copy)]
-struct Body<T> {
-    x: T,
-    k: T,
-    d: T,
-    phi: T,
-    psi: T,
-}
-
-impl<T: Number> Body<T> {
-    /// The outermost link, which carries nothing.
     #[inline(always)]
-    fn bare(u: T, w: T) -> Self {
+    fn scaled(self, factor: T) -> Self {
         Self {
-            x: u.like(1.0),
-            k: u.like(0.0),
-            d: u.like(0.25),
-            phi: w * -0.5,
-            psi: u * 1.5,
-        }
-    }
-
-    /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link and of
-    /// `v` in that frame.
-    #[inline(always)]
-    fn turned(self, mass_ratio: T, x_axis: Planar<T>, v: Planar<T>) -> Carried<T> {
-        let (x, d, psi) = (
-            mass_ratio * self.x,
-            mass_ratio * self.d,
-            mass_ratio * self.psi,
-        );
-        let y_axis = x_axis.perp();
-        Carried {
-            a: x * v.x * v.x + d * y_axis.x * y_axis.x,
-            b: x * v.x * v.y + d * y_axis.x * y_axis.y,
-            c: x * v.y * v.y + d * y_axis.y * y_axis.y,
-            det: x * d,
-            bias: v.scaled(x * self.phi) + y_axis.scaled(psi),
-            e: (x_axis.scaled(d * self.phi) + v.perp().scaled(psi)).scaled(x),
+            free: factor * self.free,
+            x: factor * self.x,
+            y: factor * self.y,
         }
     }
 }
@@ -265,9 +207,12 @@ impl<T: Number> Body<T> {
 #[derive(Clone, Copy)]
 struct Carried<T> {
     a: T,
-    b: T,
-    c: T,
-    det: T,
+    /// `3 b`.
+    b3: T,
+    /// `W = 1 + 3 c`.
+    big_w: T,
+    /// `3 det A`.
+    det3: T,
     bias: Planar<T>,
     /// `E = (c B_x - b B_y, a B_y - b B_x)`, without its cancellation.
     e: Planar<T>,
@@ -278,27 +223,122 @@ impl<T: Number> Carried<T> {
     fn nothing(zero: T) -> Self {
         Self {
             a: zero,
-            b: zero,
-            c: zero,
-            det: zero,
+            b3: zero,
+            big_w: zero.like(1.0),
+            det3: zero,
             bias: Planar::new(zero, zero),
             e: Planar::new(zero, zero),
         }
     }
 
-    /// Adds the rod that carries this and turns about its joint; `W` and `1 / W` are at hand.
+    /// The outermost link, which carries nothing: `A' = 1/4 + 3/4 x xᵀ`, `B' = -w/2 x + 3u/2 y`.
     #[inline(always)]
-    fn with_rod(&self, u: T, w: T, big_w: T, per_w: T) -> Body<T> {
-        let big_x = (self.a + 1.0) + (self.c + self.det) * 3.0;
-        let per_x = u.like(1.0) / big_x;
-        let along = self.bias.x + (self.e.x + self.b * u) * 3.0 + w * 0.5 * big_w;
-        let across = u * (self.a + 1.0) + self.b * 0.5 * w - self.bias.y - self.e.y;
+    fn outermost(u: T, w: T, mass_ratio: T, x_axis: Planar<T>) -> Self {
+        let Planar { x, y } = x_axis;
+        let quarter = mass_ratio * 0.25;
+        let three = mass_ratio * 0.75;
+        let nine = mass_ratio * 2.25;
+        let (phi, psi) = (mass_ratio * (w * -0.5), mass_ratio * (u * 1.5));
+        let (along, across) = (
+            Planar::new(phi * x, phi * y),
+            Planar::new(psi * y, psi * x),
+        );
+        Self {
+            a: quarter + three * (x * x),
+            b3: nine * (x * y),
+            big_w: (three + 1.0) + nine * (y * y),
+            det3: three * mass_ratio,
+            bias: Planar::new(along.x - across.x, along.y + across.y),
+            e: Planar::new(
+                mass_ratio * (along.x * 0.25 - across.x),
+                mass_ratio * (along.y * 0.25 + across.y),
+            ),
+        }
+    }
+
+    /// How the tip that carries this answers its joint, `W` times over.
+    #[inline(always)]
+    fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
+        Hinge {
+            free: (u - self.bias.y) * 3.0 + self.b3 * w,
+            x: self.b3 * x_axis.x - x_axis.y * 0.5,
+            y: self.b3 * x_axis.y + x_axis.x * 0.5,
+        }
+    }
+
+    /// Adds the rod that carries this and turns about its joint.
+    #[inline(always)]
+    fn with_rod(&self, u: T, w: T) -> Body<T> {
+        let big_w = self.big_w;
+        let big_x = big_w + (self.a + self.det3);
+        let one_a = self.a + 1.0;
+        let half_b = self.b3 * (1.0 / 6.0);
+        let along = self.b3 * u + (self.bias.x + self.e.x * 3.0);
+        let across = u * one_a + half_b * w - self.bias.y - self.e.y;
         Body {
-            x: big_x * per_w,
-            k: self.b * -0.5 * per_x,
-            d: ((self.a + 1.0) * 0.25 + self.c + self.det) * per_x,
-            phi: along * per_x - w,
-            psi: u + across * (per_x * 0.5),
+            big_w,
+            big_x,
+            half_b,
+            d: (big_x - one_a * 0.25) * (1.0 / 3.0),
+            phi: along - w * (big_x - big_w * 0.5),
+            psi: across * 0.5,
+            quotient: u.like(1.0) / (big_w * big_x),
+        }
+    }
+}
+
+/// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass. Every product and
+/// sum is made before the one quotient that all of it needs, and that is waited for longest.
+#[derive(Clone, Copy)]
+struct Body<T> {
+    big_w: T,
+    big_x: T,
+    /// `-X k`.
+    half_b: T,
+    /// `X d`.
+    d: T,
+    /// `X φ`.
+    phi: T,
+    /// `X (ψ - u)`.
+    psi: T,
+    /// `1 / (W X)`.
+    quotient: T,
+}
+
+impl<T: Number> Body<T> {
+    /// `1 / W`.
+    #[inline(always)]
+    fn per_w(&self) -> T {
+        self.big_x * self.quotient
+    }
+
+    /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link in that
+    /// frame.
+    #[inline(always)]
+    fn turned(&self, u: T, mass_ratio: T, x_axis: Planar<T>) -> Carried<T> {
+        let Planar { x, y } = x_axis;
+        let (m, m3, q) = (mass_ratio, mass_ratio * 3.0, self.quotient);
+        // X v, W X d and W X (ψ - u).
+        let v = Planar::new(
+            self.big_x * x + self.half_b * y,
+            self.big_x * y - self.half_b * x,
+        );
+        let d = self.big_w * self.d;
+        let psi = self.big_w * self.psi;
+        let (stiff, soft) = (self.d * self.phi, (u + psi * q) * self.big_x);
+        Carried {
+            a: m * (v.x * v.x + d * (y * y)) * q,
+            b3: m3 * (v.x * v.y - d * (x * y)) * q,
+            big_w: m3 * (v.y * v.y + d * (x * x)) * q + 1.0,
+            det3: m * m3 * (self.d * self.big_x) * q,
+            bias: Planar::new(
+                m * (self.phi * v.x - psi * y) * q - m * u * y,
+                m * (self.phi * v.y + psi * x) * q + m * u * x,
+            ),
+            e: Planar::new(
+                m * m * (stiff * x - soft * v.y) * q,
+                m * m * (stiff * y + soft * v.x) * q,
+            ),
         }
     }
 }

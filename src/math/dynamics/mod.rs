@@ -27,6 +27,8 @@
 )]
 
 mod articulated_body;
+#[cfg(feature = "batch")]
+pub mod batch;
 
 #[cfg(feature = "batch")]
 pub(super) use articulated_body::recursion;

@@ -11,10 +11,14 @@
 mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
+#[cfg(feature = "batch")]
+mod registers;
 
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
 pub(super) use register::RegisterPair;
+#[cfg(feature = "batch")]
+pub use registers::Registers;
 
 /// An array with an entry for each `$i`, its length that of where it goes; `$any` is any number of the kind.
 ///
@@ -60,6 +64,10 @@ pub trait Number: Arithmetic {
     fn set_lane(&mut self, lane: usize, value: f64);
 }
 
+/// The direction of each of the four quarter turns.
+const QUARTER_TURN_X: [f64; 4] = [1.0, 0.0, -1.0, 0.0];
+const QUARTER_TURN_Y: [f64; 4] = [0.0, 1.0, 0.0, -1.0];
+
 /// One arm.
 impl Number for f64 {
     const LANES: usize = 1;
@@ -81,16 +89,11 @@ impl Number for f64 {
 
     #[inline(always)]
     fn turned(self, sine: Self, cosine: Self) -> (Self, Self) {
-        let quadrant = self.to_bits();
-        let odd = 0_u64.wrapping_sub(quadrant & 1);
-        let (sine, cosine) = (sine.to_bits(), cosine.to_bits());
-        let exchange = (sine ^ cosine) & odd;
-        let negative_sine = (quadrant & 2) << 62;
-        let negative_cosine = (quadrant.wrapping_add(1) & 2) << 62;
-        (
-            Self::from_bits(sine ^ exchange ^ negative_sine),
-            Self::from_bits(cosine ^ exchange ^ negative_cosine),
-        )
+        // By products with 0, 1 and -1, which change nothing: their factors are known early, while masks would take the
+        // two through other registers.
+        let quadrant = (self.to_bits() & 3) as usize;
+        let (x, y) = (QUARTER_TURN_X[quadrant], QUARTER_TURN_Y[quadrant]);
+        (x * sine + y * cosine, x * cosine - y * sine)
     }
 
     #[inline(always)]

@@ -30,6 +30,23 @@ impl<S: Simd> RegisterPair<S> {
         Self([S::f64s::splat(simd, value); 2])
     }
 
+    /// The first numbers of `column`, one in each lane; there are enough.
+    #[inline(always)]
+    pub(in crate::math) fn load(simd: S, column: &[f64]) -> Self {
+        let (first, second) = (&column[..Self::WIDTH], &column[Self::WIDTH..Self::LANES]);
+        Self([
+            S::f64s::from_slice(simd, first),
+            S::f64s::from_slice(simd, second),
+        ])
+    }
+
+    /// Puts the number of each lane into `column`, which has room for them.
+    #[inline(always)]
+    pub(in crate::math) fn store(self, column: &mut [f64]) {
+        self.0[0].store_slice(&mut column[..Self::WIDTH]);
+        self.0[1].store_slice(&mut column[Self::WIDTH..Self::LANES]);
+    }
+
     /// Whether all lanes of all values are finite.
     #[inline(always)]
     pub(in crate::math) fn all_finite(some: &[Self], others: &[Self]) -> bool {

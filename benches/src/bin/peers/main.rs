@@ -24,8 +24,8 @@ use std::time::{Duration, Instant};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
+use pendularm::math::number::Registers;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::batch::Registers;
 use pendularm::math::simulation::{Simulation, step_under};
 use pendularm_benches::random::spread;
 

@@ -13,57 +13,17 @@
 mod lanes;
 mod seat;
 
-use std::sync::OnceLock;
-
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::dispatch;
 
 use self::lanes::{Formation, PAIRS};
 use self::seat::{Seat, StepKind};
 use super::Simulation;
-use crate::math::number::RegisterPair;
+use crate::math::number::Registers;
 
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
 const WORTH_A_LANE: u64 = 2;
 
-/// The registers of this machine that arms can share.
-#[derive(Debug, Clone, Copy)]
-pub struct Registers(Level);
-
 impl Registers {
-    /// The widest that there are.
-    #[must_use]
-    pub fn widest() -> Self {
-        // Asked of the processor once.
-        static LEVEL: OnceLock<Level> = OnceLock::new();
-        Self(*LEVEL.get_or_init(Level::new))
-    }
-
-    /// All that there are, the widest first; what steps take in any of them is the same.
-    #[must_use]
-    pub fn all() -> Vec<Self> {
-        let widest = Self::widest();
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        let narrower = [
-            widest.0.as_avx2().map(Simd::level),
-            widest.0.as_sse4_2().map(Simd::level),
-        ];
-        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-        let narrower: [Option<Level>; 0] = [];
-        let mut all = vec![widest];
-        for one in narrower.into_iter().flatten().map(Self) {
-            if all.iter().all(|other| other.lanes() != one.lanes()) {
-                all.push(one);
-            }
-        }
-        all
-    }
-
-    /// How many arms share one.
-    #[must_use]
-    pub fn lanes(self) -> usize {
-        dispatch!(self.0, simd => lanes_of(simd))
-    }
-
     /// [`advance`] in these.
     pub fn advance<'a, const N: usize>(
         self,
@@ -100,7 +60,7 @@ impl Registers {
             // Nobody to share a register with.
             seat.alone();
         } else if !seats.is_empty() {
-            dispatch!(self.0, simd => Formation::new(simd, seats).run(kind));
+            dispatch!(self.level(), simd => Formation::new(simd, seats).run(kind));
         }
         seats.clear();
     }
@@ -117,9 +77,4 @@ impl Registers {
 /// ```
 pub fn advance<'a, const N: usize>(arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>) {
     Registers::widest().advance(arms);
-}
-
-#[inline(always)]
-fn lanes_of<S: Simd>(_: S) -> usize {
-    RegisterPair::<S>::WIDTH
 }
