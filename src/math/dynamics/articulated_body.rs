@@ -53,6 +53,12 @@ pub fn forward_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
+    #[cfg(feature = "batch")]
+    if N > 1 {
+        if let Some(simd) = fearless_simd::Level::baseline().as_sse2() {
+            return super::twin::forward(simd, arm, q, qd, tau);
+        }
+    }
     recursion::<f64, N, true>(&arm.rods, &arm.gravity, q, qd, tau)
 }
 
@@ -78,12 +84,24 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     qd: &[T; N],
     tau: &[T; N],
 ) -> [T; N] {
-    let zero = q[0].like(0.0);
     let (sin, cos) = if WEIGHS {
         trig::sin_cos(q)
     } else {
         sin_cos_beyond_first(q)
     };
+    accelerations::<T, N, WEIGHS>(rods, gravity, &sin, &cos, qd, tau)
+}
+
+#[inline(always)]
+pub(in crate::math) fn accelerations<T: Number, const N: usize, const WEIGHS: bool>(
+    rods: &[Rod<T>; N],
+    gravity: &T,
+    sin: &[T; N],
+    cos: &[T; N],
+    qd: &[T; N],
+    tau: &[T; N],
+) -> [T; N] {
+    let zero = qd[0].like(0.0);
     let x_axis = entries!(Planar::new(zero, zero), i => Planar::new(cos[i], sin[i]));
     let mut rate = qd[0];
     let w = entries!(zero, i => {
@@ -100,27 +118,29 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     // From the tip to the base: what each link carries, and how its tip will answer the one before.
     let mut carried = Carried::nothing(zero);
     let mut hinges = [Hinge::none(zero); N];
+    let mut per_w = [zero; N];
     for i in (1..N).rev() {
         carried = if i + 1 == N {
             Carried::outermost(u[i], w[i], rods[i].mass_ratio, x_axis[i])
         } else {
             let body = carried.with_rod(u[i], w[i]);
-            hinges[i] = carried.hinge(u[i], w[i], x_axis[i]).scaled(body.per_w());
+            hinges[i] = carried.hinge(u[i], w[i], x_axis[i]);
+            per_w[i] = body.per_w();
             body.turned(u[i], rods[i].mass_ratio, x_axis[i])
         };
     }
     let base = carried.hinge(u[0], w[0], x_axis[0]);
-    let per_w = zero.like(1.0) / carried.big_w;
+    per_w[0] = zero.like(1.0) / carried.big_w;
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
     let (mut tip, mut inner);
     if WEIGHS {
         let joint = Planar::new(x_axis[0].y * *gravity, x_axis[0].x * *gravity);
-        let across = (base.free - base.y * *gravity) * per_w;
+        let across = (base.free - base.y * *gravity) * per_w[0];
         tip = Planar::new(joint.x - w[0], across);
         inner = (across - joint.y) * rods[0].per_length;
     } else {
-        tip = Planar::new(-w[0], base.free * per_w);
+        tip = Planar::new(-w[0], base.free * per_w[0]);
         inner = tip.y * rods[0].per_length;
     }
     let mut relative = [inner; N];
@@ -132,7 +152,7 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
         } else {
             let hinge = hinges[i];
             let along = (x_axis[i].x * tip.x - w[i]) + x_axis[i].y * tip.y;
-            let across = (hinge.free - hinge.x * tip.x) - hinge.y * tip.y;
+            let across = ((hinge.free - hinge.x * tip.x) - hinge.y * tip.y) * per_w[i];
             let link = (across - joint_y) * per_length;
             relative[i] = link - inner;
             (tip, inner) = (Planar::new(along, across), link);

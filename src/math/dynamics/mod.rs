@@ -28,6 +28,8 @@
 
 mod articulated_body;
 #[cfg(feature = "batch")]
+mod twin;
+#[cfg(feature = "batch")]
 pub mod batch;
 
 #[cfg(feature = "batch")]

@@ -12,11 +12,15 @@ mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
 #[cfg(feature = "batch")]
+mod twin;
+#[cfg(feature = "batch")]
 mod registers;
 
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
 pub(super) use register::RegisterPair;
+#[cfg(feature = "batch")]
+pub(super) use twin::Twin;
 #[cfg(feature = "batch")]
 pub use registers::Registers;
 
@@ -64,10 +68,6 @@ pub trait Number: Arithmetic {
     fn set_lane(&mut self, lane: usize, value: f64);
 }
 
-/// The direction of each of the four quarter turns.
-const QUARTER_TURN_X: [f64; 4] = [1.0, 0.0, -1.0, 0.0];
-const QUARTER_TURN_Y: [f64; 4] = [0.0, 1.0, 0.0, -1.0];
-
 /// One arm.
 impl Number for f64 {
     const LANES: usize = 1;
@@ -89,11 +89,16 @@ impl Number for f64 {
 
     #[inline(always)]
     fn turned(self, sine: Self, cosine: Self) -> (Self, Self) {
-        // By products with 0, 1 and -1, which change nothing: their factors are known early, while masks would take the
-        // two through other registers.
-        let quadrant = (self.to_bits() & 3) as usize;
-        let (x, y) = (QUARTER_TURN_X[quadrant], QUARTER_TURN_Y[quadrant]);
-        (x * sine + y * cosine, x * cosine - y * sine)
+        let quadrant = self.to_bits();
+        let odd = 0_u64.wrapping_sub(quadrant & 1);
+        let (sine, cosine) = (sine.to_bits(), cosine.to_bits());
+        let exchange = (sine ^ cosine) & odd;
+        let negative_sine = (quadrant & 2) << 62;
+        let negative_cosine = (quadrant.wrapping_add(1) & 2) << 62;
+        (
+            Self::from_bits(sine ^ exchange ^ negative_sine),
+            Self::from_bits(cosine ^ exchange ^ negative_cosine),
+        )
     }
 
     #[inline(always)]

@@ -25,11 +25,25 @@ pub fn step_under<const N: usize>(
 ) -> Increment<N> {
     let State { position, velocity } = state;
     if leaves_out_first_angle(arm) {
-        let acceleration = |_, q: &[f64; N], v: &[f64; N]| weightless_dynamics(arm, q, v, effort);
-        increment(method, acceleration, 0.0, position, velocity, h)
+        increment(
+            method,
+            #[inline(always)]
+            |_, q: &[f64; N], v: &[f64; N]| weightless_dynamics(arm, q, v, effort),
+            0.0,
+            position,
+            velocity,
+            h,
+        )
     } else {
-        let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
-        increment(method, acceleration, 0.0, position, velocity, h)
+        increment(
+            method,
+            #[inline(always)]
+            |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort),
+            0.0,
+            position,
+            velocity,
+            h,
+        )
     }
 }
 
