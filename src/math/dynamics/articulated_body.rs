@@ -223,7 +223,8 @@ impl<T: Number> Hinge<T> {
     }
 }
 
-/// The load at the tip of a link, in the frame of that link and per unit of its mass: `A = (a b; b c)` and `B`.
+/// The load at the tip of a link, in the frame of that link and per unit of its mass, `A = (a b; b c)` and `B`, by what
+/// the link needs of it.
 #[derive(Clone, Copy)]
 struct Carried<T> {
     a: T,
@@ -233,9 +234,12 @@ struct Carried<T> {
     big_w: T,
     /// `3 det A`.
     det3: T,
-    bias: Planar<T>,
-    /// `E = (c B_x - b B_y, a B_y - b B_x)`, without its cancellation.
-    e: Planar<T>,
+    /// `3 B_y`.
+    bias_y3: T,
+    /// `B_x + 3 E_x`.
+    stiff: T,
+    /// `B_y + E_y`.
+    soft: T,
 }
 
 impl<T: Number> Carried<T> {
@@ -246,8 +250,9 @@ impl<T: Number> Carried<T> {
             b3: zero,
             big_w: zero.like(1.0),
             det3: zero,
-            bias: Planar::new(zero, zero),
-            e: Planar::new(zero, zero),
+            bias_y3: zero,
+            stiff: zero,
+            soft: zero,
         }
     }
 
@@ -255,24 +260,17 @@ impl<T: Number> Carried<T> {
     #[inline(always)]
     fn outermost(u: T, w: T, mass_ratio: T, x_axis: Planar<T>) -> Self {
         let Planar { x, y } = x_axis;
-        let quarter = mass_ratio * 0.25;
-        let three = mass_ratio * 0.75;
-        let nine = mass_ratio * 2.25;
-        let (phi, psi) = (mass_ratio * (w * -0.5), mass_ratio * (u * 1.5));
-        let (along, across) = (
-            Planar::new(phi * x, phi * y),
-            Planar::new(psi * y, psi * x),
-        );
+        let m = mass_ratio;
+        let (quarter, three, nine) = (m * 0.25, m * 0.75, m * 2.25);
+        let (phi, psi) = (w * (m * -0.5), u * (m * 1.5));
         Self {
             a: quarter + three * (x * x),
             b3: nine * (x * y),
             big_w: (three + 1.0) + nine * (y * y),
-            det3: three * mass_ratio,
-            bias: Planar::new(along.x - across.x, along.y + across.y),
-            e: Planar::new(
-                mass_ratio * (along.x * 0.25 - across.x),
-                mass_ratio * (along.y * 0.25 + across.y),
-            ),
+            det3: three * m,
+            bias_y3: (phi * y + psi * x) * 3.0,
+            stiff: phi * ((three + 1.0) * x) - psi * ((m * 3.0 + 1.0) * y),
+            soft: phi * ((quarter + 1.0) * y) + psi * ((m + 1.0) * x),
         }
     }
 
@@ -280,9 +278,9 @@ impl<T: Number> Carried<T> {
     #[inline(always)]
     fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
         Hinge {
-            free: (u - self.bias.y) * 3.0 + self.b3 * w,
-            x: self.b3 * x_axis.x - x_axis.y * 0.5,
-            y: self.b3 * x_axis.y + x_axis.x * 0.5,
+            free: (u * 3.0 + self.b3 * w) - self.bias_y3,
+            x: (self.b3 * x_axis.x).less_exact(x_axis.y, 0.5),
+            y: (self.b3 * x_axis.y).less_exact(x_axis.x, -0.5),
         }
     }
 
@@ -293,15 +291,13 @@ impl<T: Number> Carried<T> {
         let big_x = big_w + (self.a + self.det3);
         let one_a = self.a + 1.0;
         let half_b = self.b3 * (1.0 / 6.0);
-        let along = self.b3 * u + (self.bias.x + self.e.x * 3.0);
-        let across = u * one_a + half_b * w - self.bias.y - self.e.y;
         Body {
             big_w,
             big_x,
             half_b,
-            d: (big_x - one_a * 0.25) * (1.0 / 3.0),
-            phi: along - w * (big_x - big_w * 0.5),
-            psi: across * 0.5,
+            d: big_x.less_exact(one_a, 0.25) * (1.0 / 3.0),
+            phi: (self.b3 * u - w * big_x.less_exact(big_w, 0.5)) + self.stiff,
+            psi: (u * one_a + half_b * w) - self.soft,
             quotient: u.like(1.0) / (big_w * big_x),
         }
     }
@@ -319,7 +315,7 @@ struct Body<T> {
     d: T,
     /// `X φ`.
     phi: T,
-    /// `X (ψ - u)`.
+    /// `2 X (ψ - u)`.
     psi: T,
     /// `1 / (W X)`.
     quotient: T,
@@ -337,28 +333,38 @@ impl<T: Number> Body<T> {
     #[inline(always)]
     fn turned(&self, u: T, mass_ratio: T, x_axis: Planar<T>) -> Carried<T> {
         let Planar { x, y } = x_axis;
-        let (m, m3, q) = (mass_ratio, mass_ratio * 3.0, self.quotient);
-        // X v, W X d and W X (ψ - u).
+        let (m, m3) = (mass_ratio, mass_ratio * 3.0);
+        // X v, W X d and the axes by which the soft part goes.
         let v = Planar::new(
             self.big_x * x + self.half_b * y,
             self.big_x * y - self.half_b * x,
         );
         let d = self.big_w * self.d;
-        let psi = self.big_w * self.psi;
-        let (stiff, soft) = (self.d * self.phi, (u + psi * q) * self.big_x);
+        let half_w = self.big_w * 0.5;
+        let q = self.quotient;
+        let m3q = m3 * q;
+        let bias = Planar::new(
+            self.phi * v.x - self.psi * (half_w * y),
+            self.phi * v.y + self.psi * (half_w * x),
+        );
+        // E, from its stiff and its soft part.
+        let psi = (u + self.psi * half_w * q) * self.big_x;
+        let d_phi = self.d * self.phi;
+        let e3 = Planar::new(
+            m * m3q * (d_phi * x - psi * v.y),
+            m * m3q * (d_phi * y + psi * v.x),
+        );
+        let third = 1.0 / 3.0;
+        let bias_x = m * q * bias.x - m * u * y;
+        let bias_y3 = m3q * bias.y + m3 * (u * x);
         Carried {
-            a: m * (v.x * v.x + d * (y * y)) * q,
-            b3: m3 * (v.x * v.y - d * (x * y)) * q,
+            a: m * q * (v.x * v.x + d * (y * y)),
+            b3: m3q * (v.x * v.y - d * (x * y)),
             big_w: m3 * (v.y * v.y + d * (x * x)) * q + 1.0,
-            det3: m * m3 * (self.d * self.big_x) * q,
-            bias: Planar::new(
-                m * (self.phi * v.x - psi * y) * q - m * u * y,
-                m * (self.phi * v.y + psi * x) * q + m * u * x,
-            ),
-            e: Planar::new(
-                m * m * (stiff * x - soft * v.y) * q,
-                m * m * (stiff * y + soft * v.x) * q,
-            ),
+            det3: m * m3q * (self.d * self.big_x),
+            bias_y3,
+            stiff: bias_x + e3.x,
+            soft: (bias_y3 + e3.y) * third,
         }
     }
 }
