@@ -129,18 +129,20 @@ pub(in crate::math) fn accelerations<T: Number, const N: usize, const WEIGHS: bo
             body.turned(u[i], rods[i].mass_ratio, x_axis[i])
         };
     }
-    let base = carried.hinge(u[0], w[0], x_axis[0]);
     per_w[0] = zero.like(1.0) / carried.big_w;
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
+    let u3 = if N > 1 { tau[0] - tau[1] } else { tau[0] } * (rods[0].per_mass_length * 3.0);
+    let free = u3 - carried.bias_y3;
     let (mut tip, mut inner);
     if WEIGHS {
         let joint = Planar::new(x_axis[0].y * *gravity, x_axis[0].x * *gravity);
-        let across = (base.free - base.y * *gravity) * per_w[0];
-        tip = Planar::new(joint.x - w[0], across);
+        let along = joint.x - w[0];
+        let across = (free.less_exact(joint.y, 0.5) - carried.b3 * along) * per_w[0];
+        tip = Planar::new(along, across);
         inner = (across - joint.y) * rods[0].per_length;
     } else {
-        tip = Planar::new(-w[0], base.free * per_w[0]);
+        tip = Planar::new(-w[0], (free + carried.b3 * w[0]) * per_w[0]);
         inner = tip.y * rods[0].per_length;
     }
     let mut relative = [inner; N];
@@ -148,7 +150,7 @@ pub(in crate::math) fn accelerations<T: Number, const N: usize, const WEIGHS: bo
         let joint_y = x_axis[i].perp_dot(tip);
         let per_length = rods[i].per_length;
         if i + 1 == N {
-            relative[i] = (u[i] * 3.0 * per_length - inner) - per_length * 1.5 * joint_y;
+            relative[i] = (u[i] * (per_length * 3.0) - inner) - per_length * 1.5 * joint_y;
         } else {
             let hinge = hinges[i];
             let along = (x_axis[i].x * tip.x - w[i]) + x_axis[i].y * tip.y;
@@ -212,15 +214,6 @@ impl<T: Number> Hinge<T> {
             y: zero,
         }
     }
-
-    #[inline(always)]
-    fn scaled(self, factor: T) -> Self {
-        Self {
-            free: factor * self.free,
-            x: factor * self.x,
-            y: factor * self.y,
-        }
-    }
 }
 
 /// The load at the tip of a link, in the frame of that link and per unit of its mass, `A = (a b; b c)` and `B`, by what
@@ -262,15 +255,16 @@ impl<T: Number> Carried<T> {
         let Planar { x, y } = x_axis;
         let m = mass_ratio;
         let (quarter, three, nine) = (m * 0.25, m * 0.75, m * 2.25);
-        let (phi, psi) = (w * (m * -0.5), u * (m * 1.5));
+        let (phi3, psi3) = (w * (m * -1.5), u * (m * 4.5));
+        let third = 1.0 / 3.0;
         Self {
             a: quarter + three * (x * x),
             b3: nine * (x * y),
             big_w: (three + 1.0) + nine * (y * y),
             det3: three * m,
-            bias_y3: (phi * y + psi * x) * 3.0,
-            stiff: phi * ((three + 1.0) * x) - psi * ((m * 3.0 + 1.0) * y),
-            soft: phi * ((quarter + 1.0) * y) + psi * ((m + 1.0) * x),
+            bias_y3: phi3 * y + psi3 * x,
+            stiff: phi3 * ((quarter + third) * x) - psi3 * ((m + third) * y),
+            soft: phi3 * ((quarter * third + third) * y) + psi3 * ((m * third + third) * x),
         }
     }
 

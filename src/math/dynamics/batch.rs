@@ -9,11 +9,11 @@
     reason = "joints run over 0..N of arrays that have N elements, states over those that every column has"
 )]
 
-use fearless_simd::{Simd, dispatch};
+use fearless_simd::{Simd, SimdBase, dispatch};
 
 use super::recursion;
 use crate::math::arm::{Arm, Rod};
-use crate::math::number::{Arithmetic, Number, RegisterPair, Registers, entries};
+use crate::math::number::{Arithmetic, Number, Registers, Wide, entries};
 
 /// A column per joint: entry `k` of each is of state `k`.
 pub type Columns<'a, const N: usize> = [&'a [f64]; N];
@@ -37,7 +37,7 @@ impl Registers {
         if count < 2 * self.lanes() {
             alone(arm, given, &mut qdd, count);
         } else {
-            dispatch!(self.level(), simd => together(simd, arm, given, &mut qdd, count));
+            dispatch!(self.level(), simd => together_in(simd, arm, given, &mut qdd, count));
         }
     }
 }
@@ -87,28 +87,37 @@ fn alone<const N: usize>(
     }
 }
 
+#[inline(always)]
+fn together_in<S: Simd, const N: usize>(simd: S, arm: &Arm<N>, given: [Columns<'_, N>; 3], qdd: &mut [&mut [f64]; N], count: usize) {
+    if S::f64s::LEN >= 8 {
+        together::<S, 2, N>(simd, arm, given, qdd, count);
+    } else {
+        together::<S, 1, N>(simd, arm, given, qdd, count);
+    }
+}
+
 /// A pair of registers after the other. The last of them begins earlier where the states do not fill it, and takes some
 /// a second time.
 #[inline(always)]
-fn together<S: Simd, const N: usize>(
+fn together<S: Simd, const K: usize, const N: usize>(
     simd: S,
     arm: &Arm<N>,
     [q, qd, tau]: [Columns<'_, N>; 3],
     qdd: &mut [&mut [f64]; N],
     count: usize,
 ) {
-    let lanes = RegisterPair::<S>::LANES;
-    let zero = RegisterPair::splat(simd, 0.0);
+    let lanes = Wide::<S, K>::LANES;
+    let zero = Wide::<S, K>::splat(simd, 0.0);
     let gravity = zero.like(arm.gravity);
     let rods = entries!(in_lanes(&arm.rods[0], zero), i => in_lanes(&arm.rods[i], zero));
     let mut next = 0;
     while next < count {
         let at = next.min(count - lanes);
-        let q = entries!(zero, i => RegisterPair::load(simd, &q[i][at..]));
-        let qd = entries!(zero, i => RegisterPair::load(simd, &qd[i][at..]));
-        let tau = entries!(zero, i => RegisterPair::load(simd, &tau[i][at..]));
+        let q = entries!(zero, i => Wide::<S, K>::load(simd, &q[i][at..]));
+        let qd = entries!(zero, i => Wide::<S, K>::load(simd, &qd[i][at..]));
+        let tau = entries!(zero, i => Wide::<S, K>::load(simd, &tau[i][at..]));
         let accelerations =
-            recursion::<RegisterPair<S>, N, true>(&rods, &gravity, &q, &qd, &tau);
+            recursion::<Wide<S, K>, N, true>(&rods, &gravity, &q, &qd, &tau);
         for i in 0..N {
             accelerations[i].store(&mut qdd[i][at..]);
         }

@@ -18,7 +18,7 @@ mod registers;
 
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
-pub(super) use register::RegisterPair;
+pub(super) use register::Wide;
 #[cfg(feature = "batch")]
 pub(super) use twin::Twin;
 #[cfg(feature = "batch")]

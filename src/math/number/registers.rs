@@ -4,7 +4,7 @@ use std::sync::OnceLock;
 
 use fearless_simd::{Level, Simd, dispatch};
 
-use super::register::RegisterPair;
+use super::register::Wide;
 
 /// Registers of one width, whose lanes arms or states share.
 #[derive(Debug, Clone, Copy)]
@@ -53,5 +53,5 @@ impl Registers {
 
 #[inline(always)]
 fn lanes_of<S: Simd>(_: S) -> usize {
-    RegisterPair::<S>::WIDTH
+    Wide::<S, 1>::WIDTH
 }

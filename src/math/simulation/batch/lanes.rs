@@ -16,7 +16,7 @@ use super::seat::{Seat, StepKind};
 use crate::math::arm::{Rod, State};
 use crate::math::dynamics::recursion;
 use crate::math::integrator::Method;
-use crate::math::number::{Number, RegisterPair, entries};
+use crate::math::number::{Number, Wide, entries};
 use crate::math::pid::{Control, Gains, Setpoint, law};
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::stepped;
@@ -25,8 +25,10 @@ use crate::math::simulation::increments::stepped;
 pub(super) const PAIRS: usize = 2;
 
 /// A few pairs' worth of arms of one kind.
+const K: usize = 2;
+
 pub(super) struct Formation<'s, 'a, S: Simd, const N: usize> {
-    pairs: [Lanes<RegisterPair<S>, N>; PAIRS],
+    pairs: [Lanes<Wide<S, K>, N>; PAIRS],
     seats: &'s mut [Seat<'a, N>],
 }
 
@@ -34,8 +36,8 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
     /// Gives every arm a lane; there are enough.
     #[inline(always)]
     pub(super) fn new(simd: S, seats: &'s mut [Seat<'a, N>]) -> Self {
-        let mut pairs = [Lanes::resting(RegisterPair::splat(simd, 0.0)); PAIRS];
-        for (lanes, seats) in pairs.iter_mut().zip(seats.chunks(RegisterPair::<S>::LANES)) {
+        let mut pairs = [Lanes::resting(Wide::<S, K>::splat(simd, 0.0)); PAIRS];
+        for (lanes, seats) in pairs.iter_mut().zip(seats.chunks(Wide::<S, K>::LANES)) {
             for (lane, seat) in seats.iter().enumerate() {
                 lanes.seat(lane, seat);
             }
@@ -64,14 +66,14 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
 
     #[inline(always)]
     fn take_steps<const WEIGHS: bool>(&mut self, kind: StepKind, steps: u64) {
-        let used = self.seats.len().div_ceil(RegisterPair::<S>::LANES);
+        let used = self.seats.len().div_ceil(Wide::<S, K>::LANES);
         for step in 0..steps {
             for (index, lanes) in self.pairs.iter_mut().take(used).enumerate() {
                 let mut next = lanes.next::<WEIGHS>(kind.method, kind.controlled);
-                if !RegisterPair::all_finite(&next.state.position, &next.state.velocity) {
+                if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
                     // Moved out of the way, so that otherwise nothing has to be in memory.
                     let mut parted = next;
-                    let first = index * RegisterPair::<S>::LANES;
+                    let first = index * Wide::<S, K>::LANES;
                     part(lanes, &mut parted, &mut self.seats[first..], step);
                     next = parted;
                 }
@@ -82,7 +84,7 @@ impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
 
     /// Counts the steps, has arms leave that have taken theirs, and ends disturbances.
     fn look(&mut self, steps: u64) {
-        let chunks = self.seats.chunks_mut(RegisterPair::<S>::LANES);
+        let chunks = self.seats.chunks_mut(Wide::<S, K>::LANES);
         for (lanes, seats) in self.pairs.iter_mut().zip(chunks) {
             for (lane, seat) in seats
                 .iter_mut()
