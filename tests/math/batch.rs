@@ -5,9 +5,9 @@ use std::f64::consts::TAU;
 use fastrand::Rng;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
+use pendularm::math::number::Registers;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
-use pendularm::math::number::Registers;
 use pendularm::math::simulation::batch;
 
 /// Sizes around the point at which the sine's reduction needs the C library (2e5 rad), and far beyond.

@@ -41,10 +41,12 @@ use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Number, entries};
 use crate::math::trig;
 
+const THIRD: f64 = 1.0 / 3.0;
+
 /// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
 ///
 /// Never panics. The result is not finite where the input is not, or where an intermediate value leaves the range
-/// of `f64` (mass ratios of about 1e150 between neighbours).
+/// of `f64` (mass ratios of about 1e75 between neighbours).
 #[must_use]
 #[inline(always)]
 pub fn forward_dynamics<const N: usize>(
@@ -53,13 +55,7 @@ pub fn forward_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    #[cfg(feature = "batch")]
-    if N > 1 {
-        if let Some(simd) = fearless_simd::Level::baseline().as_sse2() {
-            return super::twin::forward(simd, arm, q, qd, tau);
-        }
-    }
-    recursion::<f64, N, true>(&arm.rods, &arm.gravity, q, qd, tau)
+    one_arm::<N, true>(arm, q, qd, tau)
 }
 
 /// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
@@ -72,7 +68,21 @@ pub fn weightless_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    recursion::<f64, N, false>(&arm.rods, &arm.gravity, q, qd, tau)
+    one_arm::<N, false>(arm, q, qd, tau)
+}
+
+#[inline(always)]
+fn one_arm<const N: usize, const WEIGHS: bool>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    qd: &[f64; N],
+    tau: &[f64; N],
+) -> [f64; N] {
+    #[cfg(all(feature = "batch", target_arch = "x86_64"))]
+    if let Some(simd) = fearless_simd::Level::baseline().as_sse2() {
+        return super::one_arm::accelerations::<N, WEIGHS>(simd, arm, q, qd, tau);
+    }
+    recursion::<f64, N, WEIGHS>(&arm.rods, &arm.gravity, q, qd, tau)
 }
 
 /// The joint accelerations of one arm or of several side by side, with or without gravity.
@@ -89,15 +99,15 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     } else {
         sin_cos_beyond_first(q)
     };
-    accelerations::<T, N, WEIGHS>(rods, gravity, &sin, &cos, qd, tau)
+    recursion_along::<T, N, WEIGHS>(rods, gravity, (&sin, &cos), qd, tau)
 }
 
+/// The recursion from the sines and cosines of all angles; where nothing weighs, the first are not looked at.
 #[inline(always)]
-pub(in crate::math) fn accelerations<T: Number, const N: usize, const WEIGHS: bool>(
+pub(super) fn recursion_along<T: Number, const N: usize, const WEIGHS: bool>(
     rods: &[Rod<T>; N],
     gravity: &T,
-    sin: &[T; N],
-    cos: &[T; N],
+    (sin, cos): (&[T; N], &[T; N]),
     qd: &[T; N],
     tau: &[T; N],
 ) -> [T; N] {
@@ -256,15 +266,14 @@ impl<T: Number> Carried<T> {
         let m = mass_ratio;
         let (quarter, three, nine) = (m * 0.25, m * 0.75, m * 2.25);
         let (phi3, psi3) = (w * (m * -1.5), u * (m * 4.5));
-        let third = 1.0 / 3.0;
         Self {
             a: quarter + three * (x * x),
             b3: nine * (x * y),
             big_w: (three + 1.0) + nine * (y * y),
             det3: three * m,
             bias_y3: phi3 * y + psi3 * x,
-            stiff: phi3 * ((quarter + third) * x) - psi3 * ((m + third) * y),
-            soft: phi3 * ((quarter * third + third) * y) + psi3 * ((m * third + third) * x),
+            stiff: phi3 * ((quarter + THIRD) * x) - psi3 * ((m + THIRD) * y),
+            soft: phi3 * ((quarter * THIRD + THIRD) * y) + psi3 * ((m * THIRD + THIRD) * x),
         }
     }
 
@@ -289,7 +298,7 @@ impl<T: Number> Carried<T> {
             big_w,
             big_x,
             half_b,
-            d: big_x.less_exact(one_a, 0.25) * (1.0 / 3.0),
+            d: big_x.less_exact(one_a, 0.25) * THIRD,
             phi: (self.b3 * u - w * big_x.less_exact(big_w, 0.5)) + self.stiff,
             psi: (u * one_a + half_b * w) - self.soft,
             quotient: u.like(1.0) / (big_w * big_x),
@@ -348,7 +357,6 @@ impl<T: Number> Body<T> {
             m * m3q * (d_phi * x - psi * v.y),
             m * m3q * (d_phi * y + psi * v.x),
         );
-        let third = 1.0 / 3.0;
         let bias_x = m * q * bias.x - m * u * y;
         let bias_y3 = m3q * bias.y + m3 * (u * x);
         Carried {
@@ -358,7 +366,7 @@ impl<T: Number> Body<T> {
             det3: m * m3q * (self.d * self.big_x),
             bias_y3,
             stiff: bias_x + e3.x,
-            soft: (bias_y3 + e3.y) * third,
+            soft: (bias_y3 + e3.y) * THIRD,
         }
     }
 }

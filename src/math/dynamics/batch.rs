@@ -37,7 +37,7 @@ impl Registers {
         if count < 2 * self.lanes() {
             alone(arm, given, &mut qdd, count);
         } else {
-            dispatch!(self.level(), simd => together_in(simd, arm, given, &mut qdd, count));
+            dispatch!(self.level(), simd => in_registers(simd, arm, given, &mut qdd, count));
         }
     }
 }
@@ -87,8 +87,16 @@ fn alone<const N: usize>(
     }
 }
 
+/// As many registers at a time as there is room for: a second one hides what the first waits for, and costs more than that
+/// where there are 16.
 #[inline(always)]
-fn together_in<S: Simd, const N: usize>(simd: S, arm: &Arm<N>, given: [Columns<'_, N>; 3], qdd: &mut [&mut [f64]; N], count: usize) {
+fn in_registers<S: Simd, const N: usize>(
+    simd: S,
+    arm: &Arm<N>,
+    given: [Columns<'_, N>; 3],
+    qdd: &mut [&mut [f64]; N],
+    count: usize,
+) {
     if S::f64s::LEN >= 8 {
         together::<S, 2, N>(simd, arm, given, qdd, count);
     } else {
@@ -96,8 +104,8 @@ fn together_in<S: Simd, const N: usize>(simd: S, arm: &Arm<N>, given: [Columns<'
     }
 }
 
-/// A pair of registers after the other. The last of them begins earlier where the states do not fill it, and takes some
-/// a second time.
+/// States from the first on. The last registers begin earlier where the states do not fill them, and take some a second
+/// time.
 #[inline(always)]
 fn together<S: Simd, const K: usize, const N: usize>(
     simd: S,
@@ -116,8 +124,7 @@ fn together<S: Simd, const K: usize, const N: usize>(
         let q = entries!(zero, i => Wide::<S, K>::load(simd, &q[i][at..]));
         let qd = entries!(zero, i => Wide::<S, K>::load(simd, &qd[i][at..]));
         let tau = entries!(zero, i => Wide::<S, K>::load(simd, &tau[i][at..]));
-        let accelerations =
-            recursion::<Wide<S, K>, N, true>(&rods, &gravity, &q, &qd, &tau);
+        let accelerations = recursion::<Wide<S, K>, N, true>(&rods, &gravity, &q, &qd, &tau);
         for i in 0..N {
             accelerations[i].store(&mut qdd[i][at..]);
         }

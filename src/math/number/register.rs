@@ -12,6 +12,7 @@
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use fearless_simd::f64x2;
 use fearless_simd::prelude::*;
 
 use super::{Arithmetic, Number};
@@ -35,7 +36,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     pub(in crate::math) fn load(simd: S, column: &[f64]) -> Self {
         let mut loaded = [S::f64s::splat(simd, 0.0); K];
         for i in 0..K {
-            loaded[i] = S::f64s::from_slice(simd, &column[i * Self::WIDTH..(i + 1) * Self::WIDTH]);
+            loaded[i] = S::f64s::from_slice(simd, &column[i * Self::WIDTH..][..Self::WIDTH]);
         }
         Self(loaded)
     }
@@ -44,7 +45,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     #[inline(always)]
     pub(in crate::math) fn store(self, column: &mut [f64]) {
         for i in 0..K {
-            self.0[i].store_slice(&mut column[i * Self::WIDTH..(i + 1) * Self::WIDTH]);
+            self.0[i].store_slice(&mut column[i * Self::WIDTH..][..Self::WIDTH]);
         }
     }
 
@@ -67,6 +68,22 @@ impl<S: Simd, const K: usize> Wide<S, K> {
             }
         }
         sum.simd_eq(0.0).all_true()
+    }
+}
+
+/// A register of two, as plain `x86-64` has them.
+impl<S: Simd<f64s = f64x2<S>>> Wide<S, 1> {
+    /// A number in each lane.
+    #[inline(always)]
+    pub(in crate::math) fn two(simd: S, lower: f64, upper: f64) -> Self {
+        Self([f64x2::simd_from(simd, [lower, upper])])
+    }
+
+    /// The number of the upper lane in both.
+    #[inline(always)]
+    pub(in crate::math) fn upper(self) -> Self {
+        let [register] = self.0;
+        Self([register.zip_high(register)])
     }
 }
 
@@ -200,13 +217,23 @@ fn clamped<S: Simd>(value: S::f64s, limit: f64) -> S::f64s {
 fn turned<S: Simd>(shifted: S::f64s, sine: S::f64s, cosine: S::f64s) -> (S::f64s, S::f64s) {
     let simd = shifted.token();
     let one = S::u64s::splat(simd, 1);
+    let sign = S::u64s::splat(simd, 1 << 63);
     let quadrant: S::u64s = shifted.bitcast();
-    let odd = (quadrant & one).simd_eq(one);
-    let sin: S::u64s = odd.select(cosine, sine).bitcast();
-    let cos: S::u64s = odd.select(sine, cosine).bitcast();
-    let sign = quadrant << 62;
-    let negative_sine = sign & S::u64s::splat(simd, 1 << 63);
-    let negative_cosine = (sign + S::u64s::splat(simd, 1 << 62)) & S::u64s::splat(simd, 1 << 63);
+    let (sin, cos): (S::u64s, S::u64s);
+    if S::f64s::LEN == 2 {
+        // Plain `x86-64` compares no integers of this length.
+        let odd = S::u64s::splat(simd, 0) - (quadrant & one);
+        let (sine, cosine): (S::u64s, S::u64s) = (sine.bitcast(), cosine.bitcast());
+        let exchange = (sine ^ cosine) & odd;
+        (sin, cos) = (sine ^ exchange, cosine ^ exchange);
+    } else {
+        let odd = (quadrant & one).simd_eq(one);
+        sin = odd.select(cosine, sine).bitcast();
+        cos = odd.select(sine, cosine).bitcast();
+    }
+    let half = quadrant << 62;
+    let negative_sine = half & sign;
+    let negative_cosine = (half + S::u64s::splat(simd, 1 << 62)) & sign;
     (
         (sin ^ negative_sine).bitcast(),
         (cos ^ negative_cosine).bitcast(),

@@ -21,12 +21,13 @@ use crate::math::pid::{Control, Gains, Setpoint, law};
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::stepped;
 
+/// Registers at a time.
+const K: usize = 2;
+
 /// Pairs of registers that take each step in turn.
 pub(super) const PAIRS: usize = 2;
 
 /// A few pairs' worth of arms of one kind.
-const K: usize = 2;
-
 pub(super) struct Formation<'s, 'a, S: Simd, const N: usize> {
     pairs: [Lanes<Wide<S, K>, N>; PAIRS],
     seats: &'s mut [Seat<'a, N>],
