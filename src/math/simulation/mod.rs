@@ -191,7 +191,6 @@ impl<const N: usize> Simulation<N> {
         }
         let (arm, effort) = (&self.arm, &control.effort);
         let (next, carry) = stepped(
-            #[inline(always)]
             |_, q: &[f64; N], v: &[f64; N]| {
                 if WEIGHS {
                     forward_dynamics(arm, q, v, effort)

@@ -21,7 +21,7 @@ use crate::math::pid::{Control, Gains, Setpoint, law};
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::stepped;
 
-/// Registers at a time.
+/// Registers that do each operation one behind the other.
 const K: usize = 2;
 
 /// Pairs of registers that take each step in turn.
