@@ -1,6 +1,6 @@
-//! A few registers full of numbers, each as wide as the machine's are.
+//! One or two registers full of numbers, each as wide as the machine's are.
 //!
-//! Every operation is done in all of them, one behind the other: the processor, which looks some hundred operations
+//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations
 //! ahead, then always has one to do while another waits for its result.
 //!
 //! **Invariant:** as in [`super`]: a lane has the bits of one number.
@@ -17,11 +17,29 @@ use fearless_simd::prelude::*;
 
 use super::{Arithmetic, Number};
 
-/// As many numbers as `K` registers of `S` have lanes.
+/// `$do` for each register, 0 and, if there are two, 1: not as a loop, which the compiler would first have to take apart
+/// for every operation there is.
+macro_rules! each_register {
+    ($i:ident => $do:block) => {{
+        {
+            let $i = 0;
+            $do
+        }
+        if Self::TWO {
+            let $i = 1;
+            $do
+        }
+    }};
+}
+
+/// As many numbers as `K` registers of `S` have lanes; `K` is 1 or 2.
 #[derive(Clone, Copy)]
 pub(in crate::math) struct Wide<S: Simd, const K: usize>([S::f64s; K]);
 
 impl<S: Simd, const K: usize> Wide<S, K> {
+    /// Whether there is a second register.
+    const TWO: bool = K == 2;
+
     /// How many lanes one register has.
     pub(in crate::math) const WIDTH: usize = S::f64s::LEN;
 
@@ -35,18 +53,18 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     #[inline(always)]
     pub(in crate::math) fn load(simd: S, column: &[f64]) -> Self {
         let mut loaded = [S::f64s::splat(simd, 0.0); K];
-        for i in 0..K {
+        each_register!(i => {
             loaded[i] = S::f64s::from_slice(simd, &column[i * Self::WIDTH..][..Self::WIDTH]);
-        }
+        });
         Self(loaded)
     }
 
     /// Puts the number of each lane into `column`, which has room for them.
     #[inline(always)]
     pub(in crate::math) fn store(self, column: &mut [f64]) {
-        for i in 0..K {
+        each_register!(i => {
             self.0[i].store_slice(&mut column[i * Self::WIDTH..][..Self::WIDTH]);
-        }
+        });
     }
 
     /// Whether all lanes of all values are finite.
@@ -58,14 +76,14 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         // Times 0 a finite number is 0, and any other is not a number.
         let mut sum = first.0[0] * 0.0;
         for value in some {
-            for i in 0..K {
+            each_register!(i => {
                 sum = value.0[i].mul_add(0.0, sum);
-            }
+            });
         }
         for value in others {
-            for i in 0..K {
+            each_register!(i => {
                 sum = value.0[i].mul_add(0.0, sum);
-            }
+            });
         }
         sum.simd_eq(0.0).all_true()
     }
@@ -94,9 +112,9 @@ macro_rules! operator {
 
             #[inline(always)]
             fn $method(mut self, other: Self) -> Self {
-                for i in 0..K {
+                each_register!(i => {
                     self.0[i] = self.0[i].$method(other.0[i]);
-                }
+                });
                 self
             }
         }
@@ -113,9 +131,9 @@ impl<S: Simd, const K: usize> Neg for Wide<S, K> {
 
     #[inline(always)]
     fn neg(mut self) -> Self {
-        for i in 0..K {
+        each_register!(i => {
             self.0[i] = -self.0[i];
-        }
+        });
         self
     }
 }
@@ -152,17 +170,17 @@ impl<S: Simd, const K: usize> Number for Wide<S, K> {
     #[inline(always)]
     fn less_exact(mut self, factor: Self, other: f64) -> Self {
         let minus = S::f64s::splat(self.0[0].token(), -other);
-        for i in 0..K {
+        each_register!(i => {
             self.0[i] = factor.0[i].mul_add(minus, self.0[i]);
-        }
+        });
         self
     }
 
     #[inline(always)]
     fn clamped(mut self, limit: f64) -> Self {
-        for i in 0..K {
+        each_register!(i => {
             self.0[i] = clamped::<S>(self.0[i], limit);
-        }
+        });
         self
     }
 
@@ -173,24 +191,24 @@ impl<S: Simd, const K: usize> Number for Wide<S, K> {
         };
         // By the sum of all squares, which is no larger only if none is; so it asks for less than all.
         let mut sums = first.0;
-        for i in 0..K {
+        each_register!(i => {
             sums[i] = sums[i] * sums[i];
             for value in rest {
                 sums[i] = value.0[i].mul_add(value.0[i], sums[i]);
             }
-        }
+        });
         let mut within = sums[0].simd_le(limit * limit);
-        for sum in &sums[1..] {
-            within &= sum.simd_le(limit * limit);
+        if Self::TWO {
+            within &= sums[1].simd_le(limit * limit);
         }
         within.all_true()
     }
 
     #[inline(always)]
     fn turned(self, mut sine: Self, mut cosine: Self) -> (Self, Self) {
-        for i in 0..K {
+        each_register!(i => {
             (sine.0[i], cosine.0[i]) = turned::<S>(self.0[i], sine.0[i], cosine.0[i]);
-        }
+        });
         (sine, cosine)
     }
 
