@@ -17,14 +17,16 @@ use fearless_simd::Simd;
 
 use super::lanes::{Lanes, Moving};
 use super::seat::{Seat, StepKind};
-use crate::math::number::{Number, RegisterPair};
+use crate::math::number::{Number, Wide};
 
+/// Registers that do each operation one behind the other.
+const K: usize = 2;
 /// Pairs of registers that take each step in turn.
 pub(super) const PAIRS: usize = 2;
 
 /// A few pairs' worth of arms of one kind, and those that wait for a lane.
 pub(super) struct Formation<'q, 'a, S: Simd, const N: usize> {
-    pairs: [Lanes<RegisterPair<S>, N>; PAIRS],
+    pairs: [Lanes<Wide<S, K>, N>; PAIRS],
     /// Who has which lane, pair after pair.
     seats: Vec<Option<Seat<'a, N>>>,
     waiting: Drain<'q, Seat<'a, N>>,
@@ -34,10 +36,10 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
     /// Gives as many arms a lane as there are.
     #[inline(always)]
     pub(super) fn new(simd: S, mut waiting: Drain<'q, Seat<'a, N>>) -> Self {
-        let mut pairs = [Lanes::resting(RegisterPair::splat(simd, 0.0)); PAIRS];
-        let mut seats = Vec::with_capacity(PAIRS * RegisterPair::<S>::LANES);
+        let mut pairs = [Lanes::resting(Wide::<S, K>::splat(simd, 0.0)); PAIRS];
+        let mut seats = Vec::with_capacity(PAIRS * Wide::<S, K>::LANES);
         for lanes in &mut pairs {
-            for lane in 0..RegisterPair::<S>::LANES {
+            for lane in 0..Wide::<S, K>::LANES {
                 let seat = waiting.next();
                 if let Some(seat) = &seat {
                     lanes.seat(lane, seat);
@@ -72,7 +74,7 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
 
     #[inline(always)]
     fn take_steps<const WEIGHS: bool>(&mut self, kind: StepKind, steps: u64) {
-        let mut seats = self.seats.chunks(RegisterPair::<S>::LANES);
+        let mut seats = self.seats.chunks(Wide::<S, K>::LANES);
         let taken: [bool; PAIRS] = [(); PAIRS].map(|()| {
             seats
                 .next()
@@ -84,10 +86,10 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
                     continue;
                 }
                 let mut next = lanes.next::<WEIGHS>(kind.method, kind.controlled);
-                if !RegisterPair::all_finite(&next.state.position, &next.state.velocity) {
+                if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
                     // Moved out of the way, so that otherwise nothing has to be in memory.
                     let mut parted = next;
-                    let first = index * RegisterPair::<S>::LANES;
+                    let first = index * Wide::<S, K>::LANES;
                     part(lanes, &mut parted, &mut self.seats[first..], step);
                     next = parted;
                 }
@@ -98,7 +100,7 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
 
     /// Counts the steps, shows where they led to, has arms leave that are done, and gives their lanes to the next.
     fn look(&mut self, steps: u64) {
-        let chunks = self.seats.chunks_mut(RegisterPair::<S>::LANES);
+        let chunks = self.seats.chunks_mut(Wide::<S, K>::LANES);
         for (lanes, seats) in self.pairs.iter_mut().zip(chunks) {
             for (lane, place) in seats.iter_mut().enumerate() {
                 if let Some(seat) = place {

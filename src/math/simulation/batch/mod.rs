@@ -16,15 +16,14 @@ mod seat;
 
 use std::cmp::Reverse;
 use std::ops::ControlFlow;
-use std::sync::OnceLock;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::dispatch;
 
 use self::formation::Formation;
 use self::seat::{Observer, Seat, StepKind};
 use super::Simulation;
 use crate::math::arm::State;
-use crate::math::number::RegisterPair;
+use crate::math::number::Registers;
 
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
 const WORTH_A_LANE: u64 = 2;
@@ -33,45 +32,7 @@ const WORTH_A_LANE: u64 = 2;
 /// for little.
 const QUEUE: usize = 1024;
 
-/// The registers of this machine that arms can share.
-#[derive(Debug, Clone, Copy)]
-pub struct Registers(Level);
-
 impl Registers {
-    /// The widest that there are.
-    #[must_use]
-    pub fn widest() -> Self {
-        // Asked of the processor once.
-        static LEVEL: OnceLock<Level> = OnceLock::new();
-        Self(*LEVEL.get_or_init(Level::new))
-    }
-
-    /// All that there are, the widest first; what steps take in any of them is the same.
-    #[must_use]
-    pub fn all() -> Vec<Self> {
-        let widest = Self::widest();
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        let narrower = [
-            widest.0.as_avx2().map(Simd::level),
-            widest.0.as_sse4_2().map(Simd::level),
-        ];
-        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-        let narrower: [Option<Level>; 0] = [];
-        let mut all = vec![widest];
-        for one in narrower.into_iter().flatten().map(Self) {
-            if all.iter().all(|other| other.lanes() != one.lanes()) {
-                all.push(one);
-            }
-        }
-        all
-    }
-
-    /// How many arms share one.
-    #[must_use]
-    pub fn lanes(self) -> usize {
-        dispatch!(self.0, simd => lanes_of(simd))
-    }
-
     /// [`advance`] in these.
     pub fn advance<'a, const N: usize>(
         self,
@@ -132,7 +93,7 @@ impl Registers {
         }
         // Who takes longest begins first, so that the last ones end together.
         queue.sort_by_key(|seat| Reverse(seat.left()));
-        dispatch!(self.0, simd => Formation::new(simd, queue.drain(..)).run(kind));
+        dispatch!(self.level(), simd => Formation::new(simd, queue.drain(..)).run(kind));
     }
 }
 
@@ -172,9 +133,4 @@ pub fn advance_with<'a, const N: usize, O>(
     O: FnMut(&State<N>) -> ControlFlow<()> + 'a,
 {
     Registers::widest().advance_with(arms);
-}
-
-#[inline(always)]
-fn lanes_of<S: Simd>(_: S) -> usize {
-    RegisterPair::<S>::WIDTH
 }
