@@ -9,14 +9,15 @@ use mcap::records::{MessageHeader, Metadata};
 use mcap::write::NoSeek;
 use mcap::{McapError, WriteOptions, Writer};
 use serde::Deserialize;
+use serde_json::json;
 use serde_json::value::RawValue;
-use serde_json::{Value, json};
 
 use super::schema::{CALL, CALLS, INPUT, INPUTS, STATE, STATES};
 use super::{Content, RecordEntry};
 use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::ros::cdr;
+use crate::protocol::ros::tree::MessageTree;
 
 /// Length of a chunk, from which on it is written without waiting for the next second.
 pub const CHUNK_BYTES: u64 = 64 * 1024;
@@ -67,8 +68,9 @@ struct Channel {
 }
 
 #[derive(Deserialize)]
-struct PublishFrame {
-    msg: Value,
+struct PublishFrame<'a> {
+    #[serde(borrow)]
+    msg: &'a RawValue,
 }
 
 #[derive(Deserialize)]
@@ -122,9 +124,9 @@ impl<W: Write> Scribe<W> {
         match &entry.content {
             Content::Published { topic, frame } => {
                 let frame: PublishFrame = serde_json::from_slice(frame)?;
-                self.message(at, topic, &frame.msg)
+                self.message(at, topic, frame.msg.get())
             }
-            Content::Heard { topic, msg } => self.message(at, topic, &serde_json::from_str(msg)?),
+            Content::Heard { topic, msg } => self.message(at, topic, msg),
             Content::Called {
                 client,
                 service,
@@ -140,7 +142,8 @@ impl<W: Write> Scribe<W> {
                 self.call(at, *client, *service, &Said::answer(&frame))
             }
             Content::Input { step, note } => {
-                self.put(at, INPUTS, INPUT, &json!({"step": step, "input": note}))
+                let msg = json!({"step": step, "input": note});
+                self.put(at, INPUTS, INPUT, &cdr::encode(INPUT, &msg))
             }
             Content::State {
                 step,
@@ -149,7 +152,7 @@ impl<W: Write> Scribe<W> {
                 effort,
             } => {
                 let msg = json!({"step": step, "position": position, "velocity": velocity, "effort": effort});
-                self.put(at, STATES, STATE, &msg)
+                self.put(at, STATES, STATE, &cdr::encode(STATE, &msg))
             }
         }
     }
@@ -185,11 +188,12 @@ impl<W: Write> Scribe<W> {
         self.bytes
     }
 
-    fn message(&mut self, at: u64, topic: &Topic, msg: &Value) -> Result<(), RecordError> {
-        match types::find(topic.type_name()) {
-            Some(one) => self.put(at, topic.name(), one, msg),
-            None => Ok(()),
-        }
+    fn message(&mut self, at: u64, topic: &Topic, msg: &str) -> Result<(), RecordError> {
+        let Some(one) = types::find(topic.type_name()) else {
+            return Ok(());
+        };
+        let msg = MessageTree::read(msg.as_bytes())?;
+        self.put(at, topic.name(), one, &cdr::encode_tree(one, msg.root()))
     }
 
     fn call(
@@ -209,7 +213,7 @@ impl<W: Write> Scribe<W> {
             "result": said.result,
             "status": said.status,
         });
-        self.put(at, CALLS, CALL, &msg)
+        self.put(at, CALLS, CALL, &cdr::encode(CALL, &msg))
     }
 
     fn put(
@@ -217,7 +221,7 @@ impl<W: Write> Scribe<W> {
         at: u64,
         topic: &'static str,
         one: Type,
-        msg: &Value,
+        data: &[u8],
     ) -> Result<(), RecordError> {
         if !self.channels.contains_key(topic) {
             let text = types::definition(one);
@@ -239,8 +243,7 @@ impl<W: Write> Scribe<W> {
             log_time: at,
             publish_time: at,
         };
-        let data = cdr::encode(one, msg);
-        self.writer.write_to_known_channel(&header, &data)?;
+        self.writer.write_to_known_channel(&header, data)?;
         self.messages += 1;
         self.bytes += data.len() as u64;
         Ok(())

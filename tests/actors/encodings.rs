@@ -148,6 +148,30 @@ fn nothing_is_cut_up_for_a_client_that_does_not_read() {
     });
 }
 
+/// Pieces of 64 bytes have more than as much around them: of 3 MB they are longer than any outbox takes.
+#[test]
+fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had_them() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let mut publisher = gateway.connect(WIDE);
+        let mut subscribers = [gateway.connect(WIDE), gateway.connect(WIDE)];
+        for subscriber in &mut subscribers {
+            subscribe_in_pieces(subscriber, 64).await;
+        }
+        publisher.advertise("/t").await;
+        for (n, length) in [(0, 3_000_000), (1, 100_000)] {
+            let msg = json!({"n": n, "pad": "x".repeat(length)});
+            publisher
+                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .await;
+        }
+        for subscriber in &mut subscribers {
+            assert_eq!(next_message(subscriber).await.0["msg"]["n"], 1);
+        }
+        assert_eq!(gateway.gauges.messages_dropped(), 2);
+    });
+}
+
 /// A series waits to be cut up as one piece, and goes as one; each message in it counts.
 #[test]
 fn each_message_of_a_series_that_had_to_go_is_counted() {

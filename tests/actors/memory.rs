@@ -12,6 +12,7 @@ use pendularm::actors::compute::integration::Integration;
 use pendularm::actors::compute::workers::WorkerPool;
 use pendularm::actors::gateway::limits::MAX_CONNECTIONS;
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::resources::aside::PLACES;
 use pendularm::actors::resources::budget::{
     Account, CONNECTION_BYTES, MAX_HELD, MAX_MEMORY, MESSAGES_LEFT, MODEST, MODEST_PART, Memory,
     NoRoom,
@@ -20,6 +21,7 @@ use pendularm::actors::wire::{ROOM_TIME, SMALL_ANSWER};
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::limits::MAX_FRAME;
 use pendularm::protocol::outbox::{FRAME_BYTES, MAX_TOPIC_BYTES, PLACE_BYTES};
+use pendularm::protocol::ros::tree::NODE_BYTES;
 use serde_json::json;
 use tokio::time::{sleep, timeout};
 
@@ -77,6 +79,8 @@ fn the_limits_are_as_the_readme_says_and_leave_room_for_every_client() {
     assert!(MAX_HELD / 4 * 5 + files + 64 * MIB <= MAX_MEMORY);
     // While nobody else is there, whatever the contract accepts fits: a frame and all that is made of it.
     const { assert!(10 * MAX_FRAME + MAX_TOPIC_BYTES < MAX_HELD) };
+    // So do the longest messages that are put into another form at a time, with their trees: 12 bytes for one, and 4.
+    const { assert!(NODE_BYTES / 2 == 12 && PLACES * (12 + 4) * MAX_FRAME <= MAX_HELD / 2) };
 }
 
 #[test]

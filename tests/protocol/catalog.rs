@@ -415,6 +415,23 @@ fn a_field_is_listed_once_and_numbers_have_a_unit() {
     }
 }
 
+#[test]
+fn a_type_is_found_with_and_without_its_middle_part_and_with_no_other() {
+    for one in types::all() {
+        let found = |name: &str| types::find(name).map(|found| found.name);
+        let [package, middle, last] = one.name.split('/').collect::<Vec<_>>()[..] else {
+            panic!("{}", one.name);
+        };
+        assert_eq!(found(one.name), Some(one.name));
+        assert_eq!(found(&format!("{package}/{last}")), Some(one.name));
+        for other in ["srv", "action", ""].map(|part| format!("{package}/{part}/{last}")) {
+            let is_other = middle != other.split('/').nth(1).unwrap_or_default();
+            assert!(!is_other || found(&other).is_none(), "{other}");
+        }
+        assert_eq!(found(&format!("{}/", one.name)), None);
+    }
+}
+
 /// Messages are encoded by walking through their types: that has to come to an end.
 #[test]
 fn no_type_has_itself_inside() {

@@ -2,8 +2,19 @@
 //!
 //! **Invariant:** the expected bytes are written from the standards, by hand; nothing here is read back by our own code.
 
-use pendularm::protocol::ros::cbor::{publish, publish_raw};
+use pendularm::protocol::ros::cbor;
+use pendularm::protocol::ros::tree::MessageTree;
 use serde_json::{Value, json};
+
+fn publish(topic: &str, type_name: Option<&str>, msg: &Value) -> Vec<u8> {
+    let tree = MessageTree::from(msg);
+    cbor::publish(topic, type_name, tree.root(), usize::MAX).expect("room")
+}
+
+fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
+    let tree = MessageTree::from(msg);
+    cbor::publish_raw(topic, type_name, tree.root(), usize::MAX)
+}
 
 /// The head of every frame of the topic `/t`: a map of three, whose last key is `msg`.
 fn head() -> Vec<u8> {
@@ -262,5 +273,26 @@ fn a_frame_has_no_spare_room() {
         let msg = json!({"name": [], "position": vec![0.5; length]});
         let frame = publish_raw("/t", "sensor_msgs/msg/JointState", &msg).unwrap();
         assert_eq!(frame.capacity(), frame.len());
+    }
+}
+
+/// In three bytes of JSON, `{},`, there may be a message of eighty: the frame is longer than anybody takes.
+#[test]
+fn a_frame_that_would_be_longer_than_it_may_be_is_not_made() {
+    let transforms = json!({"transforms": vec![json!({}); 100]});
+    let type_name = "tf2_msgs/msg/TFMessage";
+    let long = publish_raw("/t", type_name, &transforms).unwrap();
+    assert!(long.len() > 8_000, "{}", long.len());
+    let tree = MessageTree::from(&transforms);
+    for (missing, made) in [(0, Some(&long)), (1, None), (long.len(), None)] {
+        let most = long.len() - missing;
+        let raw = cbor::publish_raw("/t", type_name, tree.root(), most);
+        assert_eq!(raw.as_ref(), made, "{missing}");
+    }
+    let short = publish("/t", None, &transforms);
+    for (missing, made) in [(0, Some(&short)), (1, None)] {
+        let most = short.len() - missing;
+        let untyped = cbor::publish("/t", None, tree.root(), most);
+        assert_eq!(untyped.as_ref(), made, "{missing}");
     }
 }

@@ -31,3 +31,4 @@ mod rosapi;
 mod scene;
 mod series;
 mod trajectory;
+mod tree;

@@ -262,28 +262,61 @@ fn registrations_and_calls_of_a_day() {
     attack("60 hogs of calls of a day", attackers);
 }
 
+/// A frame of a WebSocket, of at most 125 bytes.
+#[cfg(feature = "web")]
+fn frame(opcode: u8, payload: &[u8]) -> Vec<u8> {
+    let length = u8::try_from(payload.len()).unwrap();
+    [&[opcode, 0x80 | length, 0, 0, 0, 0], payload].concat()
+}
+
+#[cfg(feature = "web")]
+fn handshake(runtime: &Runtime) -> String {
+    format!(
+        "GET / HTTP/1.1\r\nHost: {}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
+         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
+        runtime.address
+    )
+}
+
+/// Messages whose text is read before it is written: a map and a list for each few bytes of the first, a value for
+/// every two of the second; for three of the last a message of eighty.
+#[cfg(feature = "web")]
+#[test]
+#[ignore = "make test-slow"]
+fn messages_that_have_to_be_read_to_be_encoded() {
+    let deep = "{\"a\":[".repeat(50) + &"]}".repeat(50) + ",";
+    for (name, compression, type_name, unit) in [
+        ("deep", "cbor", "demo/Deep", deep.as_str()),
+        ("flat", "cbor", "demo/Flat", "1,"),
+        ("short", "cbor-raw", "tf2_msgs/TFMessage", "{},"),
+    ] {
+        let runtime = Runtime::start();
+        let all = unit.repeat(3 * MB / unit.len());
+        let mut attackers = Vec::new();
+        for n in 0..40 {
+            let topic = format!("/{n}");
+            let subscribe = json!({"op": "subscribe", "topic": topic, "compression": compression});
+            let advertise = json!({"op": "advertise", "topic": topic, "type": type_name});
+            let publish = format!(
+                "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{{\"transforms\":[{all}{{}}]}}}}\n"
+            );
+            attackers.push(Attacker::new(line(&advertise), publish));
+            let heard = [
+                handshake(&runtime).into_bytes(),
+                frame(0x81, subscribe.to_string().as_bytes()),
+            ];
+            attackers.push(Attacker::new(heard.concat(), ""));
+        }
+        attack_on(&runtime, &format!("{name} messages in binary"), attackers);
+    }
+}
+
 #[cfg(feature = "web")]
 #[test]
 #[ignore = "make test-slow"]
 fn websockets_that_read_nothing() {
-    let frame = |opcode: u8, payload: &[u8]| {
-        let mut frame = vec![
-            opcode,
-            0x80 | u8::try_from(payload.len()).unwrap(),
-            0,
-            0,
-            0,
-            0,
-        ];
-        frame.extend_from_slice(payload);
-        frame
-    };
     let runtime = Runtime::start();
-    let open = format!(
-        "GET / HTTP/1.1\r\nHost: {}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\
-         Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n",
-        runtime.address
-    );
+    let open = handshake(&runtime);
     let pings = frame(0x89, &[b'x'; 125]).repeat(2000);
     let one = attack_on(
         &runtime,

@@ -49,31 +49,6 @@ pub const ATTACKS: &[Attack] = &[
         sips,
     ),
     Attack::new(
-        "fragment-sizes",
-        "100 subscribers want 100 fragment sizes of messages of 3 MB",
-        fragment_sizes_100,
-    ),
-    Attack::new(
-        "fragment-sizes-400",
-        "400 subscribers, each with a size of its own",
-        fragment_sizes_400,
-    ),
-    Attack::new(
-        "cbor-sizes",
-        "20 subscribers want cbor, each with a fragment size of its own, of 3 MB",
-        cbor_sizes,
-    ),
-    Attack::new(
-        "deep-cbor",
-        "10 subscribers want cbor of messages of 3 MB nested 100 deep",
-        deep_cbor,
-    ),
-    Attack::new(
-        "tiny-fragments",
-        "20 subscribers want a megabyte in fragments of one byte",
-        tiny_fragments,
-    ),
-    Attack::new(
         "throttled-series",
         "900 subscribers are throttled beside a flood of short messages",
         throttled_series,
@@ -199,79 +174,6 @@ fn sips() -> Vec<Client> {
         .repeats(&call("/arm_sim/integration_step", "1", steps))
         .sips(100)
         .times(50)
-}
-
-/// Subscribers of `/attack/sizes`, each with its own further fields, and two messages a second to them.
-fn sizes(
-    count: usize,
-    door: fn() -> Client,
-    further: impl Fn(usize) -> String,
-    msg: &str,
-) -> Vec<Client> {
-    let frame = publish("/attack/sizes", msg);
-    let pause = std::time::Duration::from_millis(500);
-    let publisher = Client::tcp()
-        .advertises("/attack/sizes")
-        .repeats(&frame)
-        .drips(frame.len() + 1, pause)
-        .after(300);
-    let mut clients = each(0..count, |k| {
-        door().says(&subscribe("/attack/sizes", &further(k)))
-    });
-    clients.push(publisher);
-    clients
-}
-
-fn text(bytes: usize) -> String {
-    format!(r#"{{"data":"{}"}}"#, filler(bytes))
-}
-
-fn fragment_sizes_100() -> Vec<Client> {
-    sizes(
-        100,
-        Client::tcp,
-        |k| format!(r#","fragment_size":{}"#, 10_000 + k),
-        &text(3 * MIB),
-    )
-}
-
-fn fragment_sizes_400() -> Vec<Client> {
-    sizes(
-        400,
-        Client::tcp,
-        |k| format!(r#","fragment_size":{}"#, 1_000 + k),
-        &text(3 * MIB),
-    )
-}
-
-fn cbor_sizes() -> Vec<Client> {
-    let further = |k| format!(r#","compression":"cbor","fragment_size":{}"#, 1_000 + k);
-    sizes(
-        20,
-        Client::web,
-        further,
-        &format!(r#"{{"data":[{}1]}}"#, "[1.5,2,\"a\"],".repeat(3 * MIB / 12)),
-    )
-}
-
-fn deep_cbor() -> Vec<Client> {
-    let deep = format!("{}{},", r#"{"a":["#.repeat(50), "]}".repeat(50));
-    let further = |_| r#","compression":"cbor""#.to_owned();
-    sizes(
-        10,
-        Client::web,
-        further,
-        &format!(r#"{{"data":[{}1]}}"#, deep.repeat(3 * MIB / deep.len())),
-    )
-}
-
-fn tiny_fragments() -> Vec<Client> {
-    sizes(
-        20,
-        Client::tcp,
-        |_| r#","fragment_size":1"#.to_owned(),
-        &text(MIB),
-    )
 }
 
 fn throttled_series() -> Vec<Client> {

@@ -8,6 +8,7 @@
 pub mod admission;
 pub mod arm;
 pub mod computing;
+pub mod forms;
 pub mod gateway;
 pub mod memory;
 pub mod names;
@@ -97,13 +98,14 @@ impl Attack {
 }
 
 /// All attacks, by what they are aimed at.
-pub fn groups() -> [(&'static str, &'static [Attack]); 7] {
+pub fn groups() -> [(&'static str, &'static [Attack]); 8] {
     [
         ("gateway", gateway::ATTACKS),
         ("websocket", websocket::ATTACKS),
         ("arm", arm::ATTACKS),
         ("computing", computing::ATTACKS),
         ("memory", memory::ATTACKS),
+        ("forms", forms::ATTACKS),
         ("names", names::ATTACKS),
         ("admission", admission::ATTACKS),
     ]

@@ -7,19 +7,31 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
-use serde_json::Value;
 use tokio::sync::OnceCell;
 
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::budget::Memory;
 use crate::protocol::messages;
 use crate::protocol::op::{Compression, Encoding};
+use crate::protocol::outbox::MAX_TOPIC_BYTES;
+use crate::protocol::ros::tree::MessageTree;
 use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
 
 /// Longest message, or series of them, that is encoded where it is heard: in all the forms that there may be it takes
 /// a fraction of a millisecond.
 const SHORT: usize = 4 * 1024;
+/// Bytes of memory that encoding takes for each of a message, beside its tree: the names of ROS 1 may double it, what
+/// is made grows by doubling, and names are put in order.
+const ENCODING_BYTES: usize = 4;
+
+/// The messages in their form.
+#[derive(Default)]
+pub struct Made {
+    pub(super) messages: Vec<Bytes>,
+    /// How many could not be made: longer than any outbox takes, or beyond what their type can be.
+    pub(super) lost: u64,
+}
 
 /// A message, or a series of them, in one form, each message by itself: whoever keeps one keeps none of the others in
 /// memory.
@@ -34,7 +46,7 @@ pub struct Encoded {
     fragmented: Arc<AtomicU64>,
     /// Counts what is made.
     memory: Memory,
-    made: OnceCell<Vec<Bytes>>,
+    made: OnceCell<Made>,
 }
 
 impl Encoded {
@@ -63,16 +75,16 @@ impl Encoded {
     }
 
     /// The messages, if they have been made, or are so short that they can be at once.
-    pub(super) fn at_hand(&self) -> Option<&[Bytes]> {
+    pub(super) fn at_hand(&self) -> Option<&Made> {
         if !self.made.initialized() && self.plain.len() <= SHORT {
             // Somebody else may just be at it, which is as good.
             let _ = self.made.set(self.make());
         }
-        self.made.get().map(Vec::as_slice)
+        self.made.get()
     }
 
     /// The messages, once they have been made.
-    pub(super) async fn messages(self: &Arc<Self>) -> &[Bytes] {
+    pub(super) async fn messages(self: &Arc<Self>) -> &Made {
         let make = || async {
             let this = Arc::clone(self);
             let made = aside(Errand::Writing, move || this.make()).await;
@@ -81,20 +93,23 @@ impl Encoded {
         self.made.get_or_init(make).await
     }
 
-    fn make(&self) -> Vec<Bytes> {
+    fn make(&self) -> Made {
         let all = self.plain.len();
-        let singly = series::messages(self.plain.clone());
-        singly
-            .filter_map(|message| {
-                let is_counted = message.len() == all;
-                let encoded = self.encode(&message)?;
-                Some(match encoded {
-                    Some(encoded) => self.memory.count(encoded),
-                    None if is_counted => message,
-                    None => self.memory.count(Bytes::copy_from_slice(&message)),
-                })
-            })
-            .collect()
+        let mut made = Made::default();
+        for message in series::messages(self.plain.clone()) {
+            let is_counted = message.len() == all;
+            let counted = match self.encode(&message) {
+                Some(Some(encoded)) => self.memory.count(encoded),
+                Some(None) if is_counted => message,
+                Some(None) => self.memory.count(Bytes::copy_from_slice(&message)),
+                None => {
+                    made.lost += 1;
+                    continue;
+                }
+            };
+            made.messages.push(counted);
+        }
+        made
     }
 
     /// One message: `None` where it can't be written so, `Some(None)` where it stays as it is.
@@ -102,22 +117,86 @@ impl Encoded {
     fn encode(&self, plain: &Bytes) -> Option<Option<Bytes>> {
         let spelling = &*self.spelling;
         let type_name = self.type_name.as_deref();
+        let mut working = self.memory.take(ENCODING_BYTES * plain.len());
         let renamed = (self.encoding.ros1_stamps).then(|| stamps::with_ros1_names(plain));
         let plain = renamed.as_ref().unwrap_or(plain);
         if self.encoding.compression == Compression::None {
             let size = self.encoding.fragment_size;
-            let split = size.filter(|size| plain.len() > *size).map(|size| {
-                let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
-                fragments::split(plain, size, &format!("pendularm:{number}"))
-            });
-            return Some(split.or(renamed));
+            let Some(size) = size.filter(|size| plain.len() > *size) else {
+                return Some(renamed);
+            };
+            let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
+            let id = format!("pendularm:{number}");
+            return fragments::split(plain, size, &id, MAX_TOPIC_BYTES).map(Some);
         }
         let msg = messages::message_text(spelling, plain);
-        let msg: Value = serde_json::from_slice(msg).ok()?;
+        working.resize(working.bytes() + MessageTree::room(msg));
+        let tree = MessageTree::read(msg).ok()?;
+        let msg = tree.root();
         let bytes = match self.encoding.compression {
-            Compression::CborRaw => cbor::publish_raw(spelling, type_name?, &msg)?,
-            _ => cbor::publish(spelling, type_name, &msg),
+            Compression::CborRaw => cbor::publish_raw(spelling, type_name?, msg, MAX_TOPIC_BYTES)?,
+            _ => cbor::publish(spelling, type_name, msg, MAX_TOPIC_BYTES)?,
         };
         Some(Some(Bytes::from(bytes)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const MIB: usize = 1024 * 1024;
+
+    /// A message that is encoded, and what it was made with.
+    fn encoded(
+        msg: &str,
+        compression: Compression,
+        type_name: Option<&str>,
+        memory: &Memory,
+    ) -> Made {
+        let plain = Bytes::from(format!(
+            "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n"
+        ));
+        let encoding = Encoding {
+            compression,
+            fragment_size: Some(64).filter(|_| compression == Compression::None),
+            ros1_stamps: false,
+        };
+        let counters = (&Arc::default(), memory);
+        Encoded::new(&"/t".into(), plain, encoding, type_name, counters).make()
+    }
+
+    /// A long text is one value, a list of numbers a value for every two bytes.
+    #[test]
+    fn a_tree_counts_while_it_stands() {
+        for (msg, gives_way) in [
+            (format!("\"{}\"", "x".repeat(MIB / 2)), 0),
+            (format!("[{}1]", "1,".repeat(MIB / 4)), 1),
+        ] {
+            let memory = Memory::of(10 * MIB);
+            let account = memory.open();
+            let others = account.take(4 * MIB);
+            let made = encoded(&msg, Compression::Cbor, None, &memory);
+            assert_eq!((made.messages.len(), made.lost), (1, 0));
+            assert_eq!(memory.cut_off(), gives_way);
+            drop((others, account, made));
+            assert_eq!(memory.held(), 0);
+        }
+    }
+
+    #[test]
+    fn what_no_outbox_takes_is_not_made_and_counts_as_lost() {
+        let memory = Memory::default();
+        let times = format!("{{\"transforms\":[{}{{}}]}}", "{},".repeat(200_000));
+        let quotes = format!("\"{}\"", "\\\"".repeat(MIB));
+        for (msg, compression) in [
+            (times.as_str(), Compression::CborRaw),
+            (&quotes, Compression::None),
+            ("1e999", Compression::Cbor),
+        ] {
+            let made = encoded(msg, compression, Some("tf2_msgs/msg/TFMessage"), &memory);
+            assert_eq!((made.messages.len(), made.lost), (0, 1), "{compression:?}");
+        }
+        assert_eq!(memory.held(), 0);
     }
 }

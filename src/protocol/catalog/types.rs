@@ -3,6 +3,9 @@
 //! **Invariant:** every type that a field of a known type has is known too, so that a definition can be told to its
 //! end.
 
+use std::collections::HashMap;
+use std::sync::LazyLock;
+
 pub use super::entry::{Constant, Count, Type};
 use super::entry::{Field, byte, message, required};
 use super::services::WISH;
@@ -23,13 +26,28 @@ pub fn all() -> impl Iterator<Item = Type> {
         .chain(ros2_types::TYPES)
 }
 
+/// The types by their names, and by these without their middle part: a question about types looks up hundreds.
+static BY_NAME: LazyLock<HashMap<String, Type>> = LazyLock::new(|| {
+    let parts = || Action::ALL.into_iter().flat_map(Action::parts);
+    let mut by_name = HashMap::new();
+    for one in all().chain(parts()) {
+        by_name.entry(one.name.to_owned()).or_insert(one);
+    }
+    for one in all().chain(parts()) {
+        by_name.entry(names::short_type(one.name)).or_insert(one);
+    }
+    by_name
+});
+
 /// The type of that name, which may be that of an action's goal, result or feedback too; its middle part may be left
 /// out.
 #[must_use]
 pub fn find(name: &str) -> Option<Type> {
-    let parts = Action::ALL.into_iter().flat_map(Action::parts);
-    let mut all = all().chain(parts);
-    all.find(|one| names::same_type(one.name, name))
+    let found = BY_NAME.get(name);
+    let found = found.or_else(|| BY_NAME.get(&names::short_type(name)));
+    found
+        .copied()
+        .filter(|one| names::same_type(one.name, name))
 }
 
 /// `first`, and every type inside it, each once, in the order of first mention.

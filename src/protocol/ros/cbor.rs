@@ -5,9 +5,10 @@
 //!
 //! **Invariant:** a frame begins with a byte that no JSON frame begins with.
 
-use serde_json::{Map, Value};
-
 use super::cdr;
+use super::sink::Sink;
+use super::tree::{Branch, BranchKind};
+use crate::protocol::catalog::Field;
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
 
@@ -27,39 +28,49 @@ const FLOAT64: u8 = 0xfb;
 const FLOAT64_ARRAY: u64 = 86;
 const INT32_ARRAY: u64 = 78;
 
-/// A whole `publish` frame with the message in CBOR. `type_name` is the message's type, if it is known.
+/// A whole `publish` frame with the message in CBOR; `None` if it has more than `most` bytes. `type_name` is the
+/// message's type, if it is known.
 #[must_use]
-pub fn publish(topic: &str, type_name: Option<&str>, msg: &Value) -> Vec<u8> {
-    let mut out = head(topic);
+pub fn publish(
+    topic: &str,
+    type_name: Option<&str>,
+    msg: Branch<'_, '_>,
+    most: usize,
+) -> Option<Vec<u8>> {
+    let mut out = head(topic, most);
     match type_name.and_then(types::find) {
         Some(one) => message(&mut out, one, msg),
         None => untyped(&mut out, msg),
     }
-    out.shrink_to_fit();
-    out
+    out.finish()
 }
 
-/// A whole `publish` frame with the message in CDR; `None` if its type is not known.
+/// A whole `publish` frame with the message in CDR; `None` if its type is not known, or if it has more than `most`
+/// bytes.
 #[must_use]
-pub fn publish_raw(topic: &str, type_name: &str, msg: &Value) -> Option<Vec<u8>> {
+pub fn publish_raw(
+    topic: &str,
+    type_name: &str,
+    msg: Branch<'_, '_>,
+    most: usize,
+) -> Option<Vec<u8>> {
     let one = types::find(type_name)?;
     let (secs, nsecs) = stamp(msg);
-    let mut out = head(topic);
+    let mut out = head(topic, most);
     length(&mut out, MAP, 3);
     text(&mut out, "secs");
     length(&mut out, UNSIGNED, secs);
     text(&mut out, "nsecs");
     length(&mut out, UNSIGNED, nsecs);
     text(&mut out, "bytes");
-    let bytes = cdr::encode(one, msg);
+    let bytes = cdr::encode_within(one, msg, most)?;
     length(&mut out, BYTES, bytes.len() as u64);
-    out.extend_from_slice(&bytes);
-    out.shrink_to_fit();
-    Some(out)
+    out.extend(&bytes);
+    out.finish()
 }
 
 /// The time that a message tells of itself; 0 if it tells none.
-fn stamp(msg: &Value) -> (u64, u64) {
+fn stamp(msg: Branch<'_, '_>) -> (u64, u64) {
     let places = [
         "/header/stamp",
         "/stamp",
@@ -74,8 +85,8 @@ fn stamp(msg: &Value) -> (u64, u64) {
     )
 }
 
-fn head(topic: &str) -> Vec<u8> {
-    let mut out = Vec::with_capacity(256);
+fn head(topic: &str, most: usize) -> Sink {
+    let mut out = Sink::new(most);
     length(&mut out, MAP, 3);
     text(&mut out, "op");
     text(&mut out, "publish");
@@ -90,48 +101,45 @@ fn head(topic: &str) -> Vec<u8> {
     clippy::cast_possible_truncation,
     reason = "each arm has just seen that the number fits"
 )]
-fn length(out: &mut Vec<u8>, major: u8, number: u64) {
+fn length(out: &mut Sink, major: u8, number: u64) {
     match number {
         0..=23 => out.push(major + number as u8),
-        24..=0xff => out.extend_from_slice(&[major + 24, number as u8]),
+        24..=0xff => out.extend(&[major + 24, number as u8]),
         0x100..=0xffff => {
             out.push(major + 25);
-            out.extend_from_slice(&(number as u16).to_be_bytes());
+            out.extend(&(number as u16).to_be_bytes());
         }
         0x1_0000..=0xffff_ffff => {
             out.push(major + 26);
-            out.extend_from_slice(&(number as u32).to_be_bytes());
+            out.extend(&(number as u32).to_be_bytes());
         }
         _ => {
             out.push(major + 27);
-            out.extend_from_slice(&number.to_be_bytes());
+            out.extend(&number.to_be_bytes());
         }
     }
 }
 
-fn text(out: &mut Vec<u8>, text: &str) {
+fn text(out: &mut Sink, text: &str) {
     length(out, TEXT, text.len() as u64);
-    out.extend_from_slice(text.as_bytes());
+    out.extend(text.as_bytes());
 }
 
-fn float(out: &mut Vec<u8>, value: f64) {
+fn float(out: &mut Sink, value: f64) {
     out.push(FLOAT64);
-    out.extend_from_slice(&value.to_be_bytes());
+    out.extend(&value.to_be_bytes());
 }
 
 /// Every field that is there, in the type's order; others, which it does not have, are left out.
-fn message(out: &mut Vec<u8>, one: Type, msg: &Value) {
-    let Some(members) = msg.as_object() else {
+fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
+    if msg.members().is_none() {
         return untyped(out, msg);
-    };
-    let there = one
-        .fields
-        .iter()
-        .filter(|field| members.contains_key(field.name));
+    }
+    let found = |field: &'static Field| Some((field, msg.get(field.name)?));
+    let there = one.fields.iter().filter_map(found);
     length(out, MAP, there.clone().count() as u64);
-    for field in there {
+    for (field, value) in there {
         text(out, field.name);
-        let value = members.get(field.name).unwrap_or(&Value::Null);
         let (kind, count) = field.element();
         // Looked up once, however many entries there are.
         let inner = cdr::message_type(kind);
@@ -143,10 +151,10 @@ fn message(out: &mut Vec<u8>, one: Type, msg: &Value) {
 }
 
 /// A value of type `kind`, which has fields if it is a message: then it is `inner`.
-fn single(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
-    match (kind, value) {
-        ("float64" | "float32", Value::Null) => float(out, f64::NAN),
-        ("float64" | "float32", Value::Number(number)) => {
+fn single(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
+    match (kind, value.kind()) {
+        ("float64" | "float32", BranchKind::Null) => float(out, f64::NAN),
+        ("float64" | "float32", BranchKind::Number(number)) => {
             float(out, number.as_f64().unwrap_or(f64::NAN));
         }
         _ => match inner {
@@ -156,8 +164,8 @@ fn single(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
     }
 }
 
-fn many(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
-    let Some(entries) = value.as_array() else {
+fn many(out: &mut Sink, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
+    let Some(entries) = value.entries() else {
         return untyped(out, value);
     };
     match kind {
@@ -165,7 +173,7 @@ fn many(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
             length(out, TAG, FLOAT64_ARRAY);
             length(out, BYTES, entries.len() as u64 * 8);
             for entry in entries {
-                out.extend_from_slice(&entry.as_f64().unwrap_or(f64::NAN).to_le_bytes());
+                out.extend(&entry.as_f64().unwrap_or(f64::NAN).to_le_bytes());
             }
         }
         "int32" => {
@@ -173,7 +181,7 @@ fn many(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
             length(out, BYTES, entries.len() as u64 * 4);
             for entry in entries {
                 let entry = entry.as_i64().and_then(|entry| i32::try_from(entry).ok());
-                out.extend_from_slice(&entry.unwrap_or_default().to_le_bytes());
+                out.extend(&entry.unwrap_or_default().to_le_bytes());
             }
         }
         _ => {
@@ -186,29 +194,33 @@ fn many(out: &mut Vec<u8>, kind: &str, inner: Option<Type>, value: &Value) {
 }
 
 /// Writes any JSON value. It goes as deep as a frame may be nested, which the frame's reader has checked.
-fn untyped(out: &mut Vec<u8>, value: &Value) {
-    match value {
-        Value::Null => out.push(NULL),
-        Value::Bool(false) => out.push(FALSE),
-        Value::Bool(true) => out.push(TRUE),
-        Value::Number(number) => match (number.as_u64(), number.as_i64()) {
+fn untyped(out: &mut Sink, value: Branch<'_, '_>) {
+    match value.kind() {
+        BranchKind::Null => out.push(NULL),
+        BranchKind::Bool(false) => out.push(FALSE),
+        BranchKind::Bool(true) => out.push(TRUE),
+        BranchKind::Number(number) => match (number.as_u64(), number.as_i64()) {
             (Some(number), _) => length(out, UNSIGNED, number),
             // CBOR writes -1 - n for n; the complement of a negative number is that n.
             (None, Some(number)) => length(out, NEGATIVE, (!number).unsigned_abs()),
             (None, None) => float(out, number.as_f64().unwrap_or(f64::NAN)),
         },
-        Value::String(string) => text(out, string),
-        Value::Array(entries) => {
+        BranchKind::Text(string) => text(out, string),
+        BranchKind::Array(entries) => {
             length(out, ARRAY, entries.len() as u64);
             for entry in entries {
                 untyped(out, entry);
             }
         }
-        Value::Object(members) => object(out, members),
+        BranchKind::Object(members) if members.are_in_order() => object(out, members),
+        BranchKind::Object(members) => object(out, members.in_order()),
     }
 }
 
-fn object(out: &mut Vec<u8>, members: &Map<String, Value>) {
+fn object<'t, 'a: 't>(
+    out: &mut Sink,
+    members: impl ExactSizeIterator<Item = (&'t str, Branch<'t, 'a>)>,
+) {
     length(out, MAP, members.len() as u64);
     for (name, value) in members {
         text(out, name);

@@ -7,22 +7,38 @@
 
 use serde_json::Value;
 
+use super::sink::Sink;
+use super::tree::{Branch, BranchKind, MessageTree};
 use crate::protocol::catalog::types;
 use crate::protocol::catalog::types::{Count, Type};
 
 /// Little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
 /// A field that is not there: as a number, a text, an array or a message it is the zero of that.
-const ABSENT: Value = Value::Bool(false);
+const ABSENT: Branch<'_, '_> = Branch::FALSE;
 
 /// The bytes of a message of that type.
 #[must_use]
 pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
+    encode_tree(one, MessageTree::from(msg).root())
+}
+
+/// The same of a message that has been read otherwise.
+#[must_use]
+pub fn encode_tree(one: Type, msg: Branch<'_, '_>) -> Vec<u8> {
+    // More than that there can't be.
+    encode_within(one, msg, usize::MAX).unwrap_or_default()
+}
+
+/// The same, unless it has more than `most` bytes: two of JSON (`{}`) may be a message of a hundred.
+#[must_use]
+pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<u8>> {
     let mut writer = Writer {
-        bytes: HEADER.to_vec(),
+        sink: Sink::new(most),
     };
+    writer.sink.extend(&HEADER);
     writer.message(one, msg);
-    writer.bytes
+    writer.sink.finish()
 }
 
 /// The type of that name if it is a message's, which has the name of a package in front.
@@ -31,29 +47,33 @@ pub(super) fn message_type(kind: &str) -> Option<Type> {
 }
 
 struct Writer {
-    bytes: Vec<u8>,
+    sink: Sink,
 }
 
 impl Writer {
-    fn message(&mut self, one: Type, msg: &Value) {
+    fn message(&mut self, one: Type, msg: Branch<'_, '_>) {
         for field in one.fields {
-            let value = msg.get(field.name).unwrap_or(&ABSENT);
+            let value = msg.get(field.name).unwrap_or(ABSENT);
             let (kind, count) = field.element();
             // Looked up once, however many entries there are.
             let inner = message_type(kind);
             match count {
                 Count::One => self.single(kind, inner, value),
                 Count::Any => {
-                    let entries = value.as_array().map(Vec::as_slice).unwrap_or_default();
-                    self.count(entries.len());
-                    for entry in entries {
+                    let entries = value.entries();
+                    self.count(entries.as_ref().map_or(0, ExactSizeIterator::len));
+                    for entry in entries.into_iter().flatten() {
+                        if self.sink.is_over() {
+                            return;
+                        }
                         self.single(kind, inner, entry);
                     }
                 }
                 // Without a count in front: the type has it.
                 Count::Exactly(count) => {
-                    for at in 0..count {
-                        self.single(kind, inner, value.get(at).unwrap_or(&ABSENT));
+                    let mut entries = value.entries().into_iter().flatten();
+                    for _ in 0..count {
+                        self.single(kind, inner, entries.next().unwrap_or(ABSENT));
                     }
                 }
             }
@@ -64,12 +84,13 @@ impl Writer {
         clippy::cast_possible_truncation,
         reason = "a float32 is as exact as it can be"
     )]
-    fn single(&mut self, kind: &str, inner: Option<Type>, value: &Value) {
+    fn single(&mut self, kind: &str, inner: Option<Type>, value: Branch<'_, '_>) {
         let unsigned = || value.as_u64().unwrap_or_default();
         let signed = || value.as_i64().unwrap_or_default();
-        let float = || match value {
-            Value::Null => f64::NAN,
-            value => value.as_f64().unwrap_or_default(),
+        let float = || match value.kind() {
+            BranchKind::Null => f64::NAN,
+            BranchKind::Number(number) => number.as_f64().unwrap_or_default(),
+            _ => 0.0,
         };
         match kind {
             "bool" => self.aligned([u8::from(value.as_bool().unwrap_or_default())]),
@@ -107,10 +128,8 @@ impl Writer {
 
     /// Puts a primitive at a multiple of its size.
     fn aligned<const SIZE: usize>(&mut self, bytes: [u8; SIZE]) {
-        let body = self.bytes.len() - HEADER.len();
-        let padded = HEADER.len() + body.next_multiple_of(SIZE);
-        self.bytes.resize(padded, 0);
-        self.bytes.extend_from_slice(&bytes);
+        self.sink.align(HEADER.len(), SIZE);
+        self.sink.extend(&bytes);
     }
 
     fn count(&mut self, count: usize) {
@@ -120,8 +139,8 @@ impl Writer {
     /// Length with the final NUL, the text, the NUL.
     fn string(&mut self, text: &str) {
         self.count(text.len() + 1);
-        self.bytes.extend_from_slice(text.as_bytes());
-        self.bytes.push(0);
+        self.sink.extend(text.as_bytes());
+        self.sink.push(0);
     }
 }
 

@@ -7,6 +7,8 @@ pub mod cdr;
 pub mod cdr_reader;
 pub mod parameters;
 pub mod rosapi;
+mod sink;
 pub mod srdf;
 pub mod stamps;
+pub mod tree;
 pub mod urdf;

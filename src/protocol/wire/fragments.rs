@@ -198,15 +198,13 @@ struct Fragment<'a> {
 }
 
 /// A frame in pieces of at most `size` bytes of text each, one line per piece; as it is where it is no longer than
-/// that.
+/// that. `None` if the lines have more than `most` bytes.
 #[must_use]
-pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
+pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes> {
     let text = frame.strip_suffix(b"\n").unwrap_or(frame);
-    let Some(text) = std::str::from_utf8(text)
-        .ok()
-        .filter(|text| text.len() > size)
-    else {
-        return frame.clone();
+    let text = std::str::from_utf8(text).ok();
+    let Some(text) = text.filter(|text| text.len() > size) else {
+        return Some(frame.clone());
     };
     // A piece must not end within a character: the longest has four bytes.
     let size = size.max(MIN_SIZE);
@@ -218,7 +216,7 @@ pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
         rest = behind;
     }
     let total = pieces.len();
-    let mut lines = Vec::with_capacity(text.len() + total * 96);
+    let mut lines = Vec::with_capacity(most.min(text.len() + total * 96));
     for (num, data) in pieces.into_iter().enumerate() {
         let fragment = Fragment {
             op: "fragment",
@@ -227,14 +225,15 @@ pub fn split(frame: &Bytes, size: usize, id: &str) -> Bytes {
             num,
             total,
         };
-        if serde_json::to_writer(&mut lines, &fragment).is_err() {
-            debug_assert!(false, "text can always be written as JSON");
-            return frame.clone();
+        let written = serde_json::to_writer(&mut lines, &fragment);
+        debug_assert!(written.is_ok(), "text can always be written as JSON");
+        if written.is_err() || lines.len() >= most {
+            return None;
         }
         lines.push(b'\n');
     }
     lines.shrink_to_fit();
-    Bytes::from(lines)
+    Some(Bytes::from(lines))
 }
 
 /// The last boundary of characters at or before `at`.
@@ -377,16 +376,15 @@ mod tests {
     fn a_frame_in_pieces_is_the_frame_again() {
         let text = format!("{{\"msg\":\"{}\"}}", "aä€😀\\\"".repeat(40));
         let frame = Bytes::from(format!("{text}\n"));
-        assert_eq!(split(&frame, text.len(), "id"), frame);
+        assert_eq!(split(&frame, text.len(), "id", 0), Some(frame.clone()));
         for size in MIN_SIZE..MIN_SIZE + 8 {
             let mut fragments = Fragments::default();
             let mut whole = None;
-            let lines = split(&frame, size, "id");
-            for line in lines
-                .strip_suffix(b"\n")
-                .unwrap()
-                .split(|byte| *byte == b'\n')
-            {
+            let lines = split(&frame, size, "id", usize::MAX).unwrap();
+            let within = |most: usize| split(&frame, size, "id", most).is_some();
+            assert!(within(lines.len()) && !within(lines.len() - 1));
+            let lines = lines.strip_suffix(b"\n").unwrap();
+            for line in lines.split(|byte| *byte == b'\n') {
                 let line: serde_json::Value = serde_json::from_slice(line).unwrap();
                 let number = |name: &str| usize::try_from(line[name].as_u64().unwrap()).unwrap();
                 let data = line["data"].as_str().unwrap();

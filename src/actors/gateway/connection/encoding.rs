@@ -47,9 +47,11 @@ impl Outgoing {
         match message.frames {
             Frames::Plain(frame) | Frames::Feedback(frame) => self.push(&message.topic, frame),
             Frames::Encoded(ref encoded, newest) => {
-                let Some(frames) = encoded.at_hand() else {
+                let Some(made) = encoded.at_hand() else {
                     return Some(message);
                 };
+                self.count_dropped(made.lost);
+                let frames = &made.messages;
                 // The first may be due; all others but the newest would be replaced by those.
                 let last = newest.map_or(0, |newest| frames.len().saturating_sub(newest));
                 let wanted = frames.iter().enumerate();
@@ -88,7 +90,7 @@ impl EncodingTask {
                 while newest.is_none() && encoded.at_hand().is_none() && self.has_enough() {
                     sleep(LOOK_AGAIN).await;
                 }
-                if encoded.messages().await.len() > FREE_FRAMES {
+                if encoded.messages().await.messages.len() > FREE_FRAMES {
                     // Many clients may have as many to go through.
                     turns::read().await;
                 }

@@ -9,6 +9,7 @@ use std::sync::atomic::Ordering;
 use bytes::Bytes;
 
 use super::account::{Account, Sum};
+use super::share::Share;
 use super::{CONNECTION_BYTES, MAX_HELD};
 
 /// All accounts, and their sum; clones share them.
@@ -63,6 +64,12 @@ impl Memory {
     #[must_use]
     pub fn count(&self, frame: Bytes) -> Bytes {
         self.messages.count(frame)
+    }
+
+    /// Takes `bytes` for work that is nobody's own, until the share is dropped.
+    #[must_use]
+    pub fn take(&self, bytes: usize) -> Share {
+        self.messages.take(bytes)
     }
 }
 

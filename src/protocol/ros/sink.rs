@@ -1,0 +1,60 @@
+//! Bytes that are written one behind the other, up to a limit.
+//!
+//! **Invariant:** no more than the limit is kept; what has gone beyond it is not there at all.
+
+/// The bytes so far.
+#[derive(Debug)]
+pub(super) struct Sink {
+    bytes: Vec<u8>,
+    most: usize,
+    is_over: bool,
+}
+
+impl Sink {
+    /// Nothing yet, and at most `most` bytes.
+    pub(super) fn new(most: usize) -> Self {
+        Self {
+            bytes: Vec::with_capacity(most.min(256)),
+            most,
+            is_over: false,
+        }
+    }
+
+    pub(super) fn push(&mut self, byte: u8) {
+        self.extend(&[byte]);
+    }
+
+    pub(super) fn extend(&mut self, bytes: &[u8]) {
+        if self.has_room(bytes.len()) {
+            self.bytes.extend_from_slice(bytes);
+        }
+    }
+
+    /// Zeros up to a multiple of `size`, counted from `start`.
+    pub(super) fn align(&mut self, start: usize, size: usize) {
+        let written = self.bytes.len().saturating_sub(start);
+        let zeros = written.next_multiple_of(size) - written;
+        if self.has_room(zeros) {
+            self.bytes.resize(self.bytes.len() + zeros, 0);
+        }
+    }
+
+    /// Whether more has been written than there may be: whoever writes on does so for nothing.
+    pub(super) const fn is_over(&self) -> bool {
+        self.is_over
+    }
+
+    /// All of it, without spare room; `None` if it was more than there may be.
+    pub(super) fn finish(mut self) -> Option<Vec<u8>> {
+        self.bytes.shrink_to_fit();
+        (!self.is_over).then_some(self.bytes)
+    }
+
+    fn has_room(&mut self, more: usize) -> bool {
+        self.is_over |= more > self.most - self.bytes.len();
+        if self.is_over {
+            self.bytes = Vec::new();
+        }
+        !self.is_over
+    }
+}

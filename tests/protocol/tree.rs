@@ -1,0 +1,182 @@
+//! A message as it is read for its other forms: the same values as `serde_json`'s own, in a few bytes for each byte of
+//! text.
+//!
+//! **Invariant:** the other reading shares no code with ours; what names mean that come twice is what it makes of them.
+
+use pendularm::protocol::catalog::types;
+use pendularm::protocol::limits::MAX_FRAME;
+use pendularm::protocol::ros::tree::{Branch, BranchKind, MessageTree, NODE_BYTES};
+use pendularm::protocol::ros::{cbor, cdr};
+use proptest::prelude::*;
+use serde_json::{Value, json};
+
+/// A value of ours as one of theirs.
+fn value(branch: Branch<'_, '_>) -> Value {
+    match branch.kind() {
+        BranchKind::Null => Value::Null,
+        BranchKind::Bool(value) => value.into(),
+        BranchKind::Number(number) => number.clone().into(),
+        BranchKind::Text(text) => text.into(),
+        BranchKind::Array(entries) => entries.map(value).collect(),
+        BranchKind::Object(members) => {
+            let ordered: Vec<_> = members.in_order().collect();
+            assert!(ordered.is_sorted_by(|one, next| one.0 < next.0));
+            for (name, found) in &ordered {
+                let again = branch.get(name).map(value);
+                assert_eq!(again, Some(value(*found)), "{name} is found too");
+            }
+            let members = ordered.into_iter();
+            let members = members.map(|(name, one)| (name.to_owned(), value(one)));
+            Value::Object(members.collect())
+        }
+    }
+}
+
+/// Names that come twice in most objects of a few members, and fields that our types have.
+fn name() -> impl Strategy<Value = String> {
+    prop_oneof![
+        Just("\"\"".to_owned()),
+        Just("\"a\"".to_owned()),
+        Just("\"\\u0061\"".to_owned()),
+        Just("\"b\"".to_owned()),
+        Just("\"header\"".to_owned()),
+        Just("\"stamp\"".to_owned()),
+        Just("\"sec\"".to_owned()),
+        Just("\"nanosec\"".to_owned()),
+        Just("\"name\"".to_owned()),
+        Just("\"position\"".to_owned()),
+        Just("\"transforms\"".to_owned()),
+        any::<String>().prop_map(|text| json!(text).to_string()),
+    ]
+}
+
+/// JSON texts, with spaces and with whatever numbers a client may send.
+fn text() -> impl Strategy<Value = String> {
+    let leaf = prop_oneof![
+        Just("null".to_owned()),
+        any::<bool>().prop_map(|value| value.to_string()),
+        any::<i64>().prop_map(|number| number.to_string()),
+        any::<u64>().prop_map(|number| number.to_string()),
+        any::<u8>().prop_map(|number| number.to_string()),
+        any::<f64>().prop_map(|number| json!(number).to_string()),
+        (any::<i32>(), -400..400_i32).prop_map(|(digits, power)| format!("{digits}E{power}")),
+        Just("-0".to_owned()),
+        name(),
+    ];
+    leaf.prop_recursive(6, 64, 8, |inner| {
+        let members = proptest::collection::vec((name(), inner.clone()), 0..8);
+        prop_oneof![
+            proptest::collection::vec(inner, 0..8)
+                .prop_map(|entries| format!("[{}]", entries.join(" , "))),
+            members.prop_map(|members| {
+                let members: Vec<String> = members
+                    .iter()
+                    .map(|(name, value)| format!("{name}: {value}"))
+                    .collect();
+                format!("{{{}}}", members.join(","))
+            }),
+        ]
+    })
+}
+
+proptest! {
+    #[test]
+    fn what_is_read_is_what_another_reader_reads(text in text()) {
+        let expected: Result<Value, _> = serde_json::from_str(&text);
+        let read = MessageTree::read(text.as_bytes());
+        prop_assert_eq!(read.is_ok(), expected.is_ok(), "{}", text);
+        if let (Ok(tree), Ok(expected)) = (read, expected) {
+            prop_assert_eq!(value(tree.root()), expected, "{}", text);
+        }
+    }
+
+    /// Theirs has each name once and in order before anything is written of it.
+    #[test]
+    fn a_frame_is_that_of_the_other_reading(text in text(), known in 0..types::all().count()) {
+        let Ok(expected) = serde_json::from_str::<Value>(&text) else {
+            return Ok(());
+        };
+        let (ours, theirs) = (MessageTree::read(text.as_bytes()).unwrap(), MessageTree::from(&expected));
+        let one = types::all().nth(known).unwrap();
+        for name in [None, Some(one.name)] {
+            let frame = |tree: &MessageTree| cbor::publish("/t", name, tree.root(), usize::MAX);
+            prop_assert_eq!(frame(&ours), frame(&theirs), "{:?} {}", name, text);
+        }
+        let raw = |tree: &MessageTree| cbor::publish_raw("/t", one.name, tree.root(), usize::MAX);
+        prop_assert_eq!(raw(&ours), raw(&theirs), "{} {}", one.name, text);
+        prop_assert_eq!(cdr::encode_tree(one, ours.root()), cdr::encode(one, &expected));
+    }
+
+    #[test]
+    fn a_tree_takes_no_more_room_than_was_said_before(text in text()) {
+        if let Ok(tree) = MessageTree::read(text.as_bytes()) {
+            prop_assert_eq!(tree.allocated(), MessageTree::room(text.as_bytes()));
+            prop_assert!(2 * tree.allocated() <= NODE_BYTES * (text.len() + 2), "{}", text);
+        }
+    }
+}
+
+/// Texts that take most for their bytes, as long as a frame may be: 12 bytes for one.
+#[test]
+fn the_longest_message_takes_48_mib_at_worst() {
+    let deep = |open: &str, close: &str| open.repeat(50) + &close.repeat(50) + ",";
+    for unit in [
+        "1,",
+        "[],",
+        "[1],",
+        "{},",
+        "\"\",",
+        "{\"\":1},",
+        &deep("[", "]"),
+        &deep("{\"a\":[", "]}"),
+    ] {
+        let text = format!("[{}0]", unit.repeat((MAX_FRAME - 3) / unit.len()));
+        let room = MessageTree::room(text.as_bytes());
+        assert!(room <= 12 * (text.len() + 2), "{unit}: {room}");
+        let tree = MessageTree::read(text.as_bytes()).unwrap();
+        assert_eq!(
+            tree.allocated(),
+            room,
+            "{unit}: one piece of memory, which never grows"
+        );
+    }
+    const { assert!(12 * MAX_FRAME <= 48 * 1024 * 1024) };
+}
+
+#[test]
+fn of_names_that_come_twice_the_last_counts() {
+    let tree = MessageTree::read(br#"{"b":1,"a":[2],"b":{"x":3},"a":4,"b":5}"#).unwrap();
+    let root = tree.root();
+    assert_eq!(root.get("b").and_then(Branch::as_u64), Some(5));
+    assert_eq!(root.get("c").map(value), None);
+    let members = root.members().unwrap();
+    assert!(!members.are_in_order());
+    let ordered: Vec<_> = members
+        .in_order()
+        .map(|(name, one)| (name, value(one)))
+        .collect();
+    assert_eq!(ordered, [("a", json!(4)), ("b", json!(5))]);
+    let twice = MessageTree::read(br#"{"a":1,"a":2}"#).unwrap();
+    assert!(!twice.root().members().unwrap().are_in_order());
+}
+
+#[test]
+fn a_value_is_found_at_the_end_of_its_way() {
+    let tree = MessageTree::read(br#"{"a":[{"0":{"b":7}}],"":8}"#).unwrap();
+    let at = |way: &str| tree.root().pointer(way).map(value);
+    assert_eq!(at("/a/0/0/b"), Some(json!(7)));
+    assert_eq!(at("/"), Some(json!(8)));
+    assert_eq!(at("/a/1"), None);
+    assert_eq!(at("/a/0/0/b/c"), None);
+}
+
+/// As deep as a frame may be nested: nothing that is dropped, copied or written goes deeper than that.
+#[test]
+fn a_tree_is_as_deep_as_a_message_may_be() {
+    let nested = |levels: usize| "[".repeat(levels) + &"]".repeat(levels);
+    assert!(MessageTree::read(nested(127).as_bytes()).is_ok());
+    assert!(MessageTree::read(nested(128).as_bytes()).is_err());
+    for bad in ["", "1 2", "[1", "{\"a\"}", "1e999", "\"\\ud800\"", "nul"] {
+        assert!(MessageTree::read(bad.as_bytes()).is_err(), "{bad}");
+    }
+}
