@@ -17,9 +17,9 @@
 //! | stiff part of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w` |
 //! | soft part of `B'` | `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
 //!
-//! A link needs one quotient, `1 / (W X)`, and nothing is waited for longer: so everything that can be is reckoned beside
-//! it, and the fewest operations come behind a number that is late. For the outermost link, which carries nothing, `A'`
-//! is `1/4 + 3/4 x xᵀ`.
+//! A link needs one quotient, `1 / (W X)`, and nothing is waited for longer: so everything that can be is reckoned
+//! beside it, and the fewest operations come behind a number that is late. For the outermost link, which carries
+//! nothing, `A'` is `1/4 + 3/4 x xᵀ`.
 //!
 //! Why so: the masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares
 //! when they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the
@@ -27,7 +27,7 @@
 //! part would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise.
 //! Rotations are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
 //! acceleration of the base. Without it nothing depends on where the first link points to, and
-//! [`weightless_dynamics`] leaves out that angle's sine and cosine.
+//! [`super::weightless_dynamics`] leaves out that angle's sine and cosine.
 //!
 //! Lost on the stored arms of 1 to 6 links, masses 1e-9 to 1e9, lengths 1e-6 to 1e6: at most one digit, and 1.2 with a
 //! heavy tip (`tests/math/`). Known limit: where masses *and* lengths spread by many powers of ten at once,
@@ -41,53 +41,11 @@
     reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
 )]
 
-use crate::math::arm::{Arm, Rod};
+use crate::math::arm::Rod;
 use crate::math::number::{Number, entries};
 use crate::math::trig;
 
 const THIRD: f64 = 1.0 / 3.0;
-
-/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
-///
-/// Never panics. The result is not finite where the input is not, or where an intermediate value leaves the range
-/// of `f64` (mass ratios of about 1e75 between neighbours).
-#[must_use]
-#[inline(always)]
-pub fn forward_dynamics<const N: usize>(
-    arm: &Arm<N>,
-    q: &[f64; N],
-    qd: &[f64; N],
-    tau: &[f64; N],
-) -> [f64; N] {
-    one_arm::<N, true>(arm, q, qd, tau)
-}
-
-/// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
-/// for fewer instructions. The first angle is not looked at, not even whether it is finite.
-#[must_use]
-#[inline(always)]
-pub fn weightless_dynamics<const N: usize>(
-    arm: &Arm<N>,
-    q: &[f64; N],
-    qd: &[f64; N],
-    tau: &[f64; N],
-) -> [f64; N] {
-    one_arm::<N, false>(arm, q, qd, tau)
-}
-
-#[inline(always)]
-fn one_arm<const N: usize, const WEIGHS: bool>(
-    arm: &Arm<N>,
-    q: &[f64; N],
-    qd: &[f64; N],
-    tau: &[f64; N],
-) -> [f64; N] {
-    #[cfg(all(feature = "batch", target_arch = "x86_64"))]
-    if let Some(simd) = fearless_simd::Level::baseline().as_sse2() {
-        return super::one_arm::accelerations::<N, WEIGHS>(simd, arm, q, qd, tau);
-    }
-    recursion::<f64, N, WEIGHS>(&arm.rods, &arm.gravity, q, qd, tau)
-}
 
 /// The joint accelerations of one arm or of several side by side, with or without gravity.
 #[inline(always)] // all of it: the recursion is unrolled, and what is constant at its two ends disappears
@@ -210,8 +168,8 @@ impl<T: Number> Planar<T> {
     }
 }
 
-/// How the tip of a link accelerates across it: `free - x p_x - y p_y`, where the tip of the link before, in whose frame
-/// `p` is, accelerates by `p`.
+/// How the tip of a link accelerates across it: `free - x p_x - y p_y`, if the tip of the link before, in whose frame
+/// `p` is, accelerates by `p`; `W` times over.
 #[derive(Clone, Copy)]
 struct Hinge<T> {
     free: T,
@@ -230,8 +188,8 @@ impl<T: Number> Hinge<T> {
     }
 }
 
-/// The load at the tip of a link, in the frame of that link and per unit of its mass, `A = (a b; b c)` and `B`, by what
-/// the link needs of it.
+/// The load at the tip of a link, in the frame of that link and per unit of its mass, `A = (a b; b c)` and `B`, by
+/// what the link needs of it.
 #[derive(Clone, Copy)]
 struct Carried<T> {
     a: T,

@@ -42,8 +42,8 @@ impl Registers {
     }
 }
 
-/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\], of as
-/// many states as the shortest column has entries; longer columns of `qdd` keep the rest of theirs.
+/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\], of
+/// as many states as the shortest column has entries; longer columns of `qdd` keep the rest of theirs.
 ///
 /// Never panics, and is as finite as [`super::forward_dynamics`].
 ///
@@ -87,8 +87,8 @@ fn alone<const N: usize>(
     }
 }
 
-/// As many registers at a time as there is room for: a second one hides what the first waits for, and costs more than that
-/// where there are 16.
+/// As many registers at a time as there is room for: a second one hides what the first waits for, and costs more than
+/// that where there are 16.
 #[inline(always)]
 fn in_registers<S: Simd, const N: usize>(
     simd: S,

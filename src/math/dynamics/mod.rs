@@ -30,11 +30,12 @@ mod articulated_body;
 #[cfg(feature = "batch")]
 pub mod batch;
 #[cfg(all(feature = "batch", target_arch = "x86_64"))]
+mod in_twos;
 mod one_arm;
 
 #[cfg(feature = "batch")]
 pub(super) use articulated_body::recursion;
-pub use articulated_body::{forward_dynamics, weightless_dynamics};
+pub use one_arm::{forward_dynamics, weightless_dynamics};
 
 use super::arm::{Arm, State};
 use super::trig;

@@ -17,8 +17,8 @@ use fearless_simd::prelude::*;
 
 use super::{Arithmetic, Number};
 
-/// `$do` for each register, 0 and, if there are two, 1: not as a loop, which the compiler would first have to take apart
-/// for every operation there is.
+/// `$do` for each register, 0 and, if there are two, 1: not as a loop, which the compiler would first have to take
+/// apart for every operation there is.
 macro_rules! each_register {
     ($i:ident => $do:block) => {{
         {

@@ -1,4 +1,6 @@
 //! The registers that this machine has.
+//!
+//! **Invariant:** a level is one that the processor was asked for and has.
 
 use std::sync::OnceLock;
 
@@ -45,7 +47,7 @@ impl Registers {
         dispatch!(self.0, simd => lanes_of(simd))
     }
 
-    /// What the library of registers knows them as.
+    /// Their name in the library of registers.
     pub(in crate::math) fn level(self) -> Level {
         self.0
     }
