@@ -107,8 +107,8 @@ features: ## Build with and without each feature and print size, crates and buil
 	@echo "make features: five release builds from nothing, some minutes"
 	@CARGO="$(CARGO)" python3 scripts/features.py $(if $(KEEP),--keep) $(ARGS)
 
-wheel: build ## Build the Python wheel with the program in it: python/target/wheels/
-	@bash scripts/wheel.sh "$(TARGET_DIR)/release/pendularm"
+wheel: $(if $(PORTABLE),,build) ## Build the Python wheel with the program in it: python/target/wheels/; PORTABLE=1 for every Linux with glibc 2.17 or newer
+	@PORTABLE="$(PORTABLE)" bash scripts/wheel.sh "$(TARGET_DIR)/release/pendularm"
 
 test-python: wheel ## Install the wheel into a fresh virtual environment and test it there; ARGS="-k batch" picks tests
 	@bash scripts/test-python.sh $(ARGS)

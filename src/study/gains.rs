@@ -287,6 +287,7 @@ impl Wish {
 
 impl<const N: usize> TestMove<N> {
     /// Goes on with the moves: once all have settled in time the slowest time \[s\], or none as soon as one has not.
+    /// They are made one by one: where gains fail the first ones tell.
     fn advance(&mut self, control: &ControlLoop<N>, settling_time: f64) -> Option<Option<f64>> {
         for _ in 0..STEPS_PER_PIECE {
             let moving = self.run.step();

@@ -43,6 +43,7 @@ mod slow;
 #[path = "../support/stage.rs"]
 mod stage;
 mod study;
+mod tf_web;
 #[path = "../support/virtual_time.rs"]
 mod virtual_time;
 mod web;

@@ -590,3 +590,32 @@ fn a_client_that_does_not_answer_the_close_frame_is_waited_for_no_longer_than_fi
         drop(socket);
     });
 }
+
+#[test]
+fn a_message_comes_as_cbor_or_as_cdr_in_cbor_as_each_subscriber_wants_it() {
+    run(async {
+        let gateway = Gateway::bare().await;
+        let (mut talker, mut plain) = (gateway.connect(WIDE), open(&gateway, WIDE).await);
+        let mut raw = open(&gateway, WIDE).await;
+        for (socket, compression) in [(&mut plain, "cbor"), (&mut raw, "cbor-raw")] {
+            let subscribe = json!({"op": "subscribe", "topic": "/t", "type": "std_msgs/String", "compression": compression});
+            send(socket, subscribe).await;
+        }
+        settle().await;
+        talker
+            .send(json!({"op": "advertise", "topic": "/t", "type": "std_msgs/String"}))
+            .await;
+        talker
+            .send(json!({"op": "publish", "topic": "/t", "msg": {"data": "abc"}}))
+            .await;
+        let holds = |message: &Event, part: &[u8]| matches!(message, Event::Binary(bytes) if bytes.windows(part.len()).any(|one| one == part));
+        // A map of one text, and a string in CDR: little-endian, its length with the zero behind it.
+        let (as_cbor, as_cdr) = (b"\xa1\x64data\x63abc", b"\0\x01\0\0\x04\0\0\0abc\0");
+        let (plain, raw) = (receive(&mut plain).await, receive(&mut raw).await);
+        assert!(
+            holds(&plain, as_cbor) && !holds(&plain, as_cdr),
+            "{plain:?}"
+        );
+        assert!(holds(&raw, as_cdr) && !holds(&raw, as_cbor), "{raw:?}");
+    });
+}

@@ -1,13 +1,16 @@
 //! Arms in the lanes of a register against the same arms alone: every bit of every simulation.
 
 use std::f64::consts::TAU;
+use std::ops::ControlFlow;
 
 use fastrand::Rng;
 use pendularm::math::arm::{Arm, State};
+use pendularm::math::dynamics::{self, forward_dynamics};
 use pendularm::math::integrator::Method;
+use pendularm::math::number::Registers;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
-use pendularm::math::simulation::batch::{self, Registers};
+use pendularm::math::simulation::batch;
 
 /// Sizes around the point at which the sine's reduction needs the C library (2e5 rad), and far beyond.
 const FAR: [f64; 5] = [1.9e5, 2.1e5, 1e9, 1e16, 1e300];
@@ -112,7 +115,7 @@ fn a_lane_has_the_bits_of_an_arm_that_is_stepped_alone() {
     let mut rng = Rng::with_seed(1);
     for registers in Registers::all() {
         let mut diverged = 0;
-        for count in (1..40).chain([64, 100, 129, 300]) {
+        for count in (1..40).chain([64, 100, 129, 300, 1500]) {
             diverged += compare::<2>(registers, &mut rng, count);
             diverged += compare::<3>(registers, &mut rng, count);
         }
@@ -120,6 +123,52 @@ fn a_lane_has_the_bits_of_an_arm_that_is_stepped_alone() {
     }
 }
 
+/// Has every arm seen by an observer that ends some of them, together and alone.
+fn compare_observed<const N: usize>(registers: Registers, rng: &mut Rng, count: usize) -> usize {
+    let mut together: Vec<Simulation<N>> = (0..count).map(|_| any_simulation(rng)).collect();
+    let mut alone = together.clone();
+    let orders: Vec<(u64, usize)> = (0..count)
+        .map(|_| (rng.u64(..60), rng.usize(1..80)))
+        .collect();
+    let see = |seen: &mut Vec<State<N>>, patience: usize, state: &State<N>| {
+        seen.push(*state);
+        if seen.len() == patience {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    };
+    let mut seen = vec![vec![]; count];
+    let arms = together.iter_mut().zip(&mut seen).zip(&orders);
+    registers.advance_with(arms.map(|((arm, seen), &(steps, patience))| {
+        let observe = move |state: &State<N>| see(seen, patience, state);
+        (arm, steps, observe)
+    }));
+    let mut ended = 0;
+    for (((one, other), seen), (steps, patience)) in
+        alone.iter_mut().zip(&together).zip(&seen).zip(orders)
+    {
+        let mut expected = vec![];
+        one.advance_with(steps, |now| see(&mut expected, patience, now.state()));
+        assert_eq!(shown(other), shown(one), "{} lanes", registers.lanes());
+        assert_eq!(format!("{seen:?}"), format!("{expected:?}"));
+        ended += usize::from(seen.len() == patience);
+    }
+    ended
+}
+
+#[test]
+fn an_observer_sees_what_it_sees_of_an_arm_that_is_stepped_alone_and_may_end_it() {
+    let mut rng = Rng::with_seed(2);
+    for registers in Registers::all() {
+        let mut ended = 0;
+        for count in [1, 2, 7, 33, 200] {
+            ended += compare_observed::<2>(registers, &mut rng, count);
+            ended += compare_observed::<3>(registers, &mut rng, count);
+        }
+        assert!(ended > 100, "only {ended} ended");
+    }
+}
 #[test]
 fn an_arm_that_diverges_leaves_its_neighbours_alone() {
     let mut arms = vec![Simulation::<3>::new(Arm::default(), Gains::default()); 16];
@@ -148,4 +197,75 @@ fn an_advance_may_be_cut_anywhere() {
     for (whole, cut) in whole.iter().zip(&cut) {
         assert_eq!(shown(whole), shown(cut));
     }
+}
+
+/// Accelerations in columns, with a number behind the last state that is to stay.
+fn accelerations<const N: usize>(registers: Registers, count: usize, rng: &mut Rng) {
+    let arm = Arm::new(
+        each(|| of_any_size(rng, 0.1, 10.0)),
+        each(|| of_any_size(rng, 0.1, 10.0)),
+        9.81,
+    )
+    .unwrap();
+    let states: Vec<State<N>> = (0..count).map(|_| any_state(rng)).collect();
+    let efforts: Vec<[f64; N]> = (0..count)
+        .map(|_| each(|| between(rng, -20.0, 20.0)))
+        .collect();
+    let column = |value: &dyn Fn(usize) -> f64| -> Vec<f64> { (0..count).map(value).collect() };
+    let q: [Vec<f64>; N] = std::array::from_fn(|i| column(&|k| states[k].position[i]));
+    let qd: [Vec<f64>; N] = std::array::from_fn(|i| column(&|k| states[k].velocity[i]));
+    let tau: [Vec<f64>; N] = std::array::from_fn(|i| column(&|k| efforts[k][i]));
+    let mut qdd: [Vec<f64>; N] = std::array::from_fn(|_| vec![7.0; count + 1]);
+    registers.forward_dynamics(
+        &arm,
+        q.each_ref().map(Vec::as_slice),
+        qd.each_ref().map(Vec::as_slice),
+        tau.each_ref().map(Vec::as_slice),
+        qdd.each_mut().map(Vec::as_mut_slice),
+    );
+    for (k, (state, effort)) in states.iter().zip(&efforts).enumerate() {
+        let want = forward_dynamics(&arm, &state.position, &state.velocity, effort);
+        let got: [f64; N] = std::array::from_fn(|i| qdd[i][k]);
+        // Not a number has many bits.
+        let bits = |x: f64| if x.is_nan() { None } else { Some(x.to_bits()) };
+        assert_eq!(
+            got.map(bits),
+            want.map(bits),
+            "state {k} of {count} in {} lanes: {state:?}",
+            registers.lanes()
+        );
+    }
+    assert!(
+        qdd.iter()
+            .all(|column| column[count].to_bits() == 7.0_f64.to_bits())
+    );
+}
+
+#[test]
+fn the_acceleration_of_a_state_has_the_same_bits_whichever_stand_beside_it() {
+    let mut rng = Rng::with_seed(4);
+    for registers in Registers::all() {
+        for count in (0..40).chain([64, 100, 129, 300]) {
+            accelerations::<1>(registers, count, &mut rng);
+            accelerations::<2>(registers, count, &mut rng);
+            accelerations::<3>(registers, count, &mut rng);
+        }
+    }
+}
+
+#[test]
+fn the_shortest_column_says_how_many_states_there_are() {
+    let (long, short) = ([0.5; 50], [0.25; 40]);
+    let (mut first, mut second) = ([7.0; 50], [7.0; 50]);
+    let arm = Arm::<2>::default();
+    dynamics::batch::forward_dynamics(
+        &arm,
+        [&long, &long],
+        [&long, &short],
+        [&long, &long],
+        [&mut first, &mut second],
+    );
+    let want = forward_dynamics(&arm, &[0.5; 2], &[0.5, 0.25], &[0.5; 2]);
+    assert_eq!([first[39], second[39]], want);
+    assert_eq!([first[40], second[40]], [7.0; 2]);
 }

@@ -8,7 +8,9 @@ use pendularm::math::simulation::step_under;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::forcing::{COARSEST, DURATION, FORCES};
 use pendularm::report::experiments::moving::{LookedAt, MovingScene, distance_behind};
-use pendularm::report::experiments::nonlinear::{PeriodicSwing, arrive, is_carried, move_of, spun};
+use pendularm::report::experiments::nonlinear::{
+    PeriodicSwing, are_carried, arrive, move_of, spun,
+};
 use pendularm::report::experiments::rounding::{Adding, energy_error, law};
 use pendularm::report::experiments::stiff::{By, Solver, StiffScene};
 use pendularm::study::control_loop::ControlLoop;
@@ -178,8 +180,10 @@ fn moves_and_swings_are_lost_at_long_steps_only() {
     for method in Method::ALL {
         let moves = [1e-3, 1.5e-2].map(|h| move_of(1.0, method, h));
         assert_eq!(arrive(&moves), [true, false], "{method}");
-        assert!(is_carried(&spun(10.0), method, 1e-3), "{method}");
-        assert!(!is_carried(&spun(300.0), method, 0.1), "{method}");
+        let free = ControlLoop::free(Arm::default()).with_method(method);
+        let swings =
+            [(10.0, 1e-3), (300.0, 0.1)].map(|(spin, h)| (free.with_timestep(h), spun(spin)));
+        assert_eq!(are_carried(&swings), [true, false], "{method}");
     }
 }
 

@@ -24,6 +24,7 @@ use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Ask, Call, Publish, Reply};
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::{Gains, Setpoint};
@@ -95,6 +96,12 @@ where
         .start();
         ArmSim::attach(&arm, &mut nodes);
         PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), &mut nodes);
+        let frames = TfRepublisher::new(
+            arm.clone().recipient(),
+            arm.clone().recipient(),
+            registry.clone().recipient(),
+        );
+        TfRepublisher::attach(&frames.start(), &mut nodes);
         let tracker = GoalTracker {
             track: arm.clone().recipient(),
             command: arm.clone().recipient(),

@@ -80,3 +80,22 @@ fn is_file_name(name: &str) -> bool {
     let plain = |byte: u8| byte.is_ascii_alphanumeric() || matches!(byte, b'.' | b'-' | b'_');
     (1..=MAX_FILE_NAME).contains(&name.len()) && !name.starts_with('.') && name.bytes().all(plain)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_that_of_a_file_beside_the_others() {
+        let longest = "a".repeat(MAX_FILE_NAME);
+        for name in ["run", "Run-2_b.mcap", "7", &longest] {
+            assert!(is_file_name(name), "{name}");
+        }
+        let too_long = "a".repeat(MAX_FILE_NAME + 1);
+        for name in [
+            "", ".hidden", "../a", "a/b", "a\\b", "a b", "a:b", "\u{e4}", &too_long,
+        ] {
+            assert!(!is_file_name(name), "{name}");
+        }
+    }
+}

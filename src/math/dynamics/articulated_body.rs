@@ -17,6 +17,10 @@
 //! | stiff part of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w` |
 //! | soft part of `B'` | `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
 //!
+//! A link needs one quotient, `1 / (W X)`, and nothing is waited for longer: so everything that can be is reckoned beside
+//! it, and the fewest operations come behind a number that is late. For the outermost link, which carries nothing, `A'`
+//! is `1/4 + 3/4 x xᵀ`.
+//!
 //! Why so: the masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares
 //! when they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the
 //! same two directions, because a heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff
@@ -37,16 +41,16 @@
     reason = "indices run over 0..N of arrays that have N elements, as they do in the formulas"
 )]
 
-use std::ops::Add;
-
 use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Number, entries};
 use crate::math::trig;
 
+const THIRD: f64 = 1.0 / 3.0;
+
 /// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\].
 ///
 /// Never panics. The result is not finite where the input is not, or where an intermediate value leaves the range
-/// of `f64` (mass ratios of about 1e150 between neighbours).
+/// of `f64` (mass ratios of about 1e75 between neighbours).
 #[must_use]
 #[inline(always)]
 pub fn forward_dynamics<const N: usize>(
@@ -55,7 +59,7 @@ pub fn forward_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    recursion::<f64, N, true>(&arm.rods, &arm.gravity, q, qd, tau)
+    one_arm::<N, true>(arm, q, qd, tau)
 }
 
 /// [`forward_dynamics`] of an arm whose gravity is zero: the same bits, but for the sign of an acceleration of zero,
@@ -68,7 +72,21 @@ pub fn weightless_dynamics<const N: usize>(
     qd: &[f64; N],
     tau: &[f64; N],
 ) -> [f64; N] {
-    recursion::<f64, N, false>(&arm.rods, &arm.gravity, q, qd, tau)
+    one_arm::<N, false>(arm, q, qd, tau)
+}
+
+#[inline(always)]
+fn one_arm<const N: usize, const WEIGHS: bool>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    qd: &[f64; N],
+    tau: &[f64; N],
+) -> [f64; N] {
+    #[cfg(all(feature = "batch", target_arch = "x86_64"))]
+    if let Some(simd) = fearless_simd::Level::baseline().as_sse2() {
+        return super::one_arm::accelerations::<N, WEIGHS>(simd, arm, q, qd, tau);
+    }
+    recursion::<f64, N, WEIGHS>(&arm.rods, &arm.gravity, q, qd, tau)
 }
 
 /// The joint accelerations of one arm or of several side by side, with or without gravity.
@@ -80,12 +98,25 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
     qd: &[T; N],
     tau: &[T; N],
 ) -> [T; N] {
-    let zero = q[0].like(0.0);
     let (sin, cos) = if WEIGHS {
         trig::sin_cos(q)
     } else {
         sin_cos_beyond_first(q)
     };
+    recursion_along::<T, N, WEIGHS>(rods, gravity, (&sin, &cos), qd, tau)
+}
+
+/// The recursion from the sines and cosines of all angles; where nothing weighs, the first are not looked at.
+#[inline(always)]
+pub(super) fn recursion_along<T: Number, const N: usize, const WEIGHS: bool>(
+    rods: &[Rod<T>; N],
+    gravity: &T,
+    (sin, cos): (&[T; N], &[T; N]),
+    qd: &[T; N],
+    tau: &[T; N],
+) -> [T; N] {
+    let zero = qd[0].like(0.0);
+    let x_axis = entries!(Planar::new(zero, zero), i => Planar::new(cos[i], sin[i]));
     let mut rate = qd[0];
     let w = entries!(zero, i => {
         if i > 0 {
@@ -93,50 +124,57 @@ pub(in crate::math) fn recursion<T: Number, const N: usize, const WEIGHS: bool>(
         }
         rods[i].length * rate * rate
     });
+    let u = entries!(zero, i => {
+        let transmitted = if i + 1 < N { tau[i] - tau[i + 1] } else { tau[i] };
+        transmitted * rods[i].per_mass_length
+    });
 
-    // From the tip to the base: what each link carries, and how its tip will answer its joint.
+    // From the tip to the base: what each link carries, and how its tip will answer the one before.
     let mut carried = Carried::nothing(zero);
     let mut hinges = [Hinge::none(zero); N];
-    let mut outer = zero;
-    for i in (0..N).rev() {
-        let u = (tau[i] - outer) * rods[i].per_mass_length;
-        outer = tau[i];
-        let big_w = carried.c * 3.0 + 1.0;
-        let per_w = zero.like(1.0) / big_w;
-        hinges[i] = Hinge {
-            free: per_w * 3.0 * (u - carried.bias.y),
-            along: per_w * 3.0 * carried.b,
-            across: per_w * 0.5,
+    let mut per_w = [zero; N];
+    for i in (1..N).rev() {
+        carried = if i + 1 == N {
+            Carried::outermost(u[i], w[i], rods[i].mass_ratio, x_axis[i])
+        } else {
+            let body = carried.with_rod(u[i], w[i]);
+            hinges[i] = carried.hinge(u[i], w[i], x_axis[i]);
+            per_w[i] = body.per_w();
+            body.turned(u[i], rods[i].mass_ratio, x_axis[i])
         };
-        if i > 0 {
-            let x_axis = Planar::new(cos[i], sin[i]);
-            carried = if i + 1 == N {
-                Body::bare(u, w[i]).turned(rods[i].mass_ratio, x_axis, x_axis)
-            } else {
-                let body = carried.with_rod(u, w[i], big_w, per_w);
-                let v = x_axis + x_axis.perp().scaled(body.k);
-                body.turned(rods[i].mass_ratio, x_axis, v)
-            };
-        }
     }
+    per_w[0] = zero.like(1.0) / carried.big_w;
 
     // From the base to the tip: accelerations, gravity being an acceleration of the base upwards.
-    let mut tip = Planar::new(zero, if WEIGHS { *gravity } else { zero });
-    let mut inner = zero;
-    entries!(zero, i => {
-        let x_axis = Planar::new(cos[i], sin[i]);
-        let joint = Planar::new(x_axis.dot(tip), x_axis.perp_dot(tip));
-        let along = joint.x - w[i];
-        let mut across = hinges[i].free - hinges[i].across * joint.y;
-        if i + 1 < N {
-            across = across - hinges[i].along * along;
-        }
+    let u3 = if N > 1 { tau[0] - tau[1] } else { tau[0] } * (rods[0].per_mass_length * 3.0);
+    let free = u3 - carried.bias_y3;
+    let (mut tip, mut inner);
+    if WEIGHS {
+        let joint = Planar::new(x_axis[0].y * *gravity, x_axis[0].x * *gravity);
+        let along = joint.x - w[0];
+        let across = (free.less_exact(joint.y, 0.5) - carried.b3 * along) * per_w[0];
         tip = Planar::new(along, across);
-        let link = (across - joint.y) * rods[i].per_length;
-        let relative = link - inner;
-        inner = link;
-        relative
-    })
+        inner = (across - joint.y) * rods[0].per_length;
+    } else {
+        tip = Planar::new(-w[0], (free + carried.b3 * w[0]) * per_w[0]);
+        inner = tip.y * rods[0].per_length;
+    }
+    let mut relative = [inner; N];
+    for i in 1..N {
+        let joint_y = x_axis[i].perp_dot(tip);
+        let per_length = rods[i].per_length;
+        if i + 1 == N {
+            relative[i] = (u[i] * (per_length * 3.0) - inner) - per_length * 1.5 * joint_y;
+        } else {
+            let hinge = hinges[i];
+            let along = (x_axis[i].x * tip.x - w[i]) + x_axis[i].y * tip.y;
+            let across = ((hinge.free - hinge.x * tip.x) - hinge.y * tip.y) * per_w[i];
+            let link = (across - joint_y) * per_length;
+            relative[i] = link - inner;
+            (tip, inner) = (Planar::new(along, across), link);
+        }
+    }
+    relative
 }
 
 /// Sines and cosines of all angles but the first, for which those of 0 stand.
@@ -167,42 +205,18 @@ impl<T: Number> Planar<T> {
     }
 
     #[inline(always)]
-    fn dot(self, other: Self) -> T {
-        self.x * other.x + self.y * other.y
-    }
-
-    /// Turned by a right angle.
-    #[inline(always)]
-    fn perp(self) -> Self {
-        Self::new(-self.y, self.x)
-    }
-
-    #[inline(always)]
     fn perp_dot(self, other: Self) -> T {
         self.x * other.y - self.y * other.x
     }
-
-    #[inline(always)]
-    fn scaled(self, factor: T) -> Self {
-        Self::new(factor * self.x, factor * self.y)
-    }
 }
 
-impl<T: Number> Add for Planar<T> {
-    type Output = Self;
-
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self::new(self.x + other.x, self.y + other.y)
-    }
-}
-
-/// How the tip of a link accelerates across it: `t_y = free - along t_x - across p_y`.
+/// How the tip of a link accelerates across it: `free - x p_x - y p_y`, where the tip of the link before, in whose frame
+/// `p` is, accelerates by `p`.
 #[derive(Clone, Copy)]
 struct Hinge<T> {
     free: T,
-    along: T,
-    across: T,
+    x: T,
+    y: T,
 }
 
 impl<T: Number> Hinge<T> {
@@ -210,67 +224,29 @@ impl<T: Number> Hinge<T> {
     fn none(zero: T) -> Self {
         Self {
             free: zero,
-            along: zero,
-            across: zero,
+            x: zero,
+            y: zero,
         }
     }
 }
 
-/// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass:
-/// `A' = x v vᵀ + d y yᵀ` with `v = (1, k)`, and `B' = x φ v + ψ y`.
-#[derive(Clone, Copy)]
-struct Body<T> {
-    x: T,
-    k: T,
-    d: T,
-    phi: T,
-    psi: T,
-}
-
-impl<T: Number> Body<T> {
-    /// The outermost link, which carries nothing.
-    #[inline(always)]
-    fn bare(u: T, w: T) -> Self {
-        Self {
-            x: u.like(1.0),
-            k: u.like(0.0),
-            d: u.like(0.25),
-            phi: w * -0.5,
-            psi: u * 1.5,
-        }
-    }
-
-    /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link and of
-    /// `v` in that frame.
-    #[inline(always)]
-    fn turned(self, mass_ratio: T, x_axis: Planar<T>, v: Planar<T>) -> Carried<T> {
-        let (x, d, psi) = (
-            mass_ratio * self.x,
-            mass_ratio * self.d,
-            mass_ratio * self.psi,
-        );
-        let y_axis = x_axis.perp();
-        Carried {
-            a: x * v.x * v.x + d * y_axis.x * y_axis.x,
-            b: x * v.x * v.y + d * y_axis.x * y_axis.y,
-            c: x * v.y * v.y + d * y_axis.y * y_axis.y,
-            det: x * d,
-            bias: v.scaled(x * self.phi) + y_axis.scaled(psi),
-            e: (x_axis.scaled(d * self.phi) + v.perp().scaled(psi)).scaled(x),
-        }
-    }
-}
-
-/// The load at the tip of a link, in the frame of that link and per unit of its mass: `A = (a b; b c)` and `B`.
+/// The load at the tip of a link, in the frame of that link and per unit of its mass, `A = (a b; b c)` and `B`, by what
+/// the link needs of it.
 #[derive(Clone, Copy)]
 struct Carried<T> {
     a: T,
-    b: T,
-    c: T,
-    det: T,
-    bias: Planar<T>,
-    /// `E = (c B_x - b B_y, a B_y - b B_x)`, without its cancellation.
-    e: Planar<T>,
+    /// `3 b`.
+    b3: T,
+    /// `W = 1 + 3 c`.
+    big_w: T,
+    /// `3 det A`.
+    det3: T,
+    /// `3 B_y`.
+    bias_y3: T,
+    /// `B_x + 3 E_x`.
+    stiff: T,
+    /// `B_y + E_y`.
+    soft: T,
 }
 
 impl<T: Number> Carried<T> {
@@ -278,27 +254,123 @@ impl<T: Number> Carried<T> {
     fn nothing(zero: T) -> Self {
         Self {
             a: zero,
-            b: zero,
-            c: zero,
-            det: zero,
-            bias: Planar::new(zero, zero),
-            e: Planar::new(zero, zero),
+            b3: zero,
+            big_w: zero.like(1.0),
+            det3: zero,
+            bias_y3: zero,
+            stiff: zero,
+            soft: zero,
         }
     }
 
-    /// Adds the rod that carries this and turns about its joint; `W` and `1 / W` are at hand.
+    /// The outermost link, which carries nothing: `A' = 1/4 + 3/4 x xᵀ`, `B' = -w/2 x + 3u/2 y`.
     #[inline(always)]
-    fn with_rod(&self, u: T, w: T, big_w: T, per_w: T) -> Body<T> {
-        let big_x = (self.a + 1.0) + (self.c + self.det) * 3.0;
-        let per_x = u.like(1.0) / big_x;
-        let along = self.bias.x + (self.e.x + self.b * u) * 3.0 + w * 0.5 * big_w;
-        let across = u * (self.a + 1.0) + self.b * 0.5 * w - self.bias.y - self.e.y;
+    fn outermost(u: T, w: T, mass_ratio: T, x_axis: Planar<T>) -> Self {
+        let Planar { x, y } = x_axis;
+        let m = mass_ratio;
+        let (quarter, three, nine) = (m * 0.25, m * 0.75, m * 2.25);
+        let (phi3, psi3) = (w * (m * -1.5), u * (m * 4.5));
+        Self {
+            a: quarter + three * (x * x),
+            b3: nine * (x * y),
+            big_w: (three + 1.0) + nine * (y * y),
+            det3: three * m,
+            bias_y3: phi3 * y + psi3 * x,
+            stiff: phi3 * ((quarter + THIRD) * x) - psi3 * ((m + THIRD) * y),
+            soft: phi3 * ((quarter * THIRD + THIRD) * y) + psi3 * ((m * THIRD + THIRD) * x),
+        }
+    }
+
+    /// How the tip that carries this answers its joint, `W` times over.
+    #[inline(always)]
+    fn hinge(&self, u: T, w: T, x_axis: Planar<T>) -> Hinge<T> {
+        Hinge {
+            free: (u * 3.0 + self.b3 * w) - self.bias_y3,
+            x: (self.b3 * x_axis.x).less_exact(x_axis.y, 0.5),
+            y: (self.b3 * x_axis.y).less_exact(x_axis.x, -0.5),
+        }
+    }
+
+    /// Adds the rod that carries this and turns about its joint.
+    #[inline(always)]
+    fn with_rod(&self, u: T, w: T) -> Body<T> {
+        let big_w = self.big_w;
+        let big_x = big_w + (self.a + self.det3);
+        let one_a = self.a + 1.0;
+        let half_b = self.b3 * (1.0 / 6.0);
         Body {
-            x: big_x * per_w,
-            k: self.b * -0.5 * per_x,
-            d: ((self.a + 1.0) * 0.25 + self.c + self.det) * per_x,
-            phi: along * per_x - w,
-            psi: u + across * (per_x * 0.5),
+            big_w,
+            big_x,
+            half_b,
+            d: big_x.less_exact(one_a, 0.25) * THIRD,
+            phi: (self.b3 * u - w * big_x.less_exact(big_w, 0.5)) + self.stiff,
+            psi: (u * one_a + half_b * w) - self.soft,
+            quotient: u.like(1.0) / (big_w * big_x),
+        }
+    }
+}
+
+/// A link and everything beyond it as its own joint feels it, in its own frame, per unit of its mass. Every product and
+/// sum is made before the one quotient that all of it needs, and that is waited for longest.
+#[derive(Clone, Copy)]
+struct Body<T> {
+    big_w: T,
+    big_x: T,
+    /// `-X k`.
+    half_b: T,
+    /// `X d`.
+    d: T,
+    /// `X φ`.
+    phi: T,
+    /// `2 X (ψ - u)`.
+    psi: T,
+    /// `1 / (W X)`.
+    quotient: T,
+}
+
+impl<T: Number> Body<T> {
+    /// `1 / W`.
+    #[inline(always)]
+    fn per_w(&self) -> T {
+        self.big_x * self.quotient
+    }
+
+    /// The same in the frame of the link before and per unit of *its* mass, from the direction of this link in that
+    /// frame.
+    #[inline(always)]
+    fn turned(&self, u: T, mass_ratio: T, x_axis: Planar<T>) -> Carried<T> {
+        let Planar { x, y } = x_axis;
+        let (m, m3) = (mass_ratio, mass_ratio * 3.0);
+        // X v, W X d and the axes by which the soft part goes.
+        let v = Planar::new(
+            self.big_x * x + self.half_b * y,
+            self.big_x * y - self.half_b * x,
+        );
+        let d = self.big_w * self.d;
+        let half_w = self.big_w * 0.5;
+        let q = self.quotient;
+        let m3q = m3 * q;
+        let bias = Planar::new(
+            self.phi * v.x - self.psi * (half_w * y),
+            self.phi * v.y + self.psi * (half_w * x),
+        );
+        // E, from its stiff and its soft part.
+        let psi = (u + self.psi * half_w * q) * self.big_x;
+        let d_phi = self.d * self.phi;
+        let e3 = Planar::new(
+            m * m3q * (d_phi * x - psi * v.y),
+            m * m3q * (d_phi * y + psi * v.x),
+        );
+        let bias_x = m * q * bias.x - m * u * y;
+        let bias_y3 = m3q * bias.y + m3 * (u * x);
+        Carried {
+            a: m * q * (v.x * v.x + d * (y * y)),
+            b3: m3q * (v.x * v.y - d * (x * y)),
+            big_w: m3 * (v.y * v.y + d * (x * x)) * q + 1.0,
+            det3: m * m3q * (self.d * self.big_x),
+            bias_y3,
+            stiff: bias_x + e3.x,
+            soft: (bias_y3 + e3.y) * THIRD,
         }
     }
 }

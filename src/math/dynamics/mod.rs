@@ -27,6 +27,10 @@
 )]
 
 mod articulated_body;
+#[cfg(feature = "batch")]
+pub mod batch;
+#[cfg(all(feature = "batch", target_arch = "x86_64"))]
+mod one_arm;
 
 #[cfg(feature = "batch")]
 pub(super) use articulated_body::recursion;

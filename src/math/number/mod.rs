@@ -1,4 +1,4 @@
-//! A number of the arm's formulas: one for one arm, or two registers full of them, a lane for each of several arms.
+//! A number of the arm's formulas: one for one arm, or a few registers full of them, a lane for each of several arms.
 //!
 //! Dynamics, methods and control law are written once, over [`Number`], and know no number of lanes. An operation is
 //! done in all lanes alike; the two that have to look at a lane by itself, the bound of an integral and the quadrant of
@@ -11,10 +11,14 @@
 mod arithmetic;
 #[cfg(feature = "batch")]
 mod register;
+#[cfg(feature = "batch")]
+mod registers;
 
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
-pub(super) use register::RegisterPair;
+pub(super) use register::Wide;
+#[cfg(feature = "batch")]
+pub use registers::Registers;
 
 /// An array with an entry for each `$i`, its length that of where it goes; `$any` is any number of the kind.
 ///
@@ -31,7 +35,7 @@ macro_rules! entries {
 }
 pub(super) use entries;
 
-/// A number, or as many as two registers have lanes. Constants are the same in all lanes.
+/// A number, or as many as a few registers have lanes. Constants are the same in all lanes.
 pub trait Number: Arithmetic {
     /// How many numbers these are.
     const LANES: usize;
@@ -45,7 +49,7 @@ pub trait Number: Arithmetic {
     #[must_use]
     fn clamped(self, limit: f64) -> Self;
 
-    /// Whether all lanes of all values are within `±limit`; what is not a number is not.
+    /// Whether all lanes of all values are sure to be within `±limit`; what is not a number is not.
     fn all_within(values: &[Self], limit: f64) -> bool;
 
     /// Sine and cosine of an angle by those of what is left of it beyond a number of quarter turns, the lowest two bits

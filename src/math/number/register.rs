@@ -1,33 +1,70 @@
-//! Two registers full of numbers, each as wide as the machine's are.
+//! One or two registers full of numbers, each as wide as the machine's are.
 //!
-//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations ahead,
-//! then always has one to do while the other waits for its result.
+//! Every operation is done in both, one behind the other: the processor, which looks some hundred operations
+//! ahead, then always has one to do while another waits for its result.
 //!
 //! **Invariant:** as in [`super`]: a lane has the bits of one number.
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "lanes run over those of the two registers"
+    reason = "registers run over 0..K of arrays that have K elements, lanes over those of all of them"
 )]
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
+use fearless_simd::f64x2;
 use fearless_simd::prelude::*;
 
 use super::{Arithmetic, Number};
 
-/// As many numbers as two registers of `S` have lanes.
-#[derive(Clone, Copy)]
-pub(in crate::math) struct RegisterPair<S: Simd>([S::f64s; 2]);
+/// `$do` for each register, 0 and, if there are two, 1: not as a loop, which the compiler would first have to take apart
+/// for every operation there is.
+macro_rules! each_register {
+    ($i:ident => $do:block) => {{
+        {
+            let $i = 0;
+            $do
+        }
+        if Self::TWO {
+            let $i = 1;
+            $do
+        }
+    }};
+}
 
-impl<S: Simd> RegisterPair<S> {
-    /// How many lanes one of the two has.
+/// As many numbers as `K` registers of `S` have lanes; `K` is 1 or 2.
+#[derive(Clone, Copy)]
+pub(in crate::math) struct Wide<S: Simd, const K: usize>([S::f64s; K]);
+
+impl<S: Simd, const K: usize> Wide<S, K> {
+    /// Whether there is a second register.
+    const TWO: bool = K == 2;
+
+    /// How many lanes one register has.
     pub(in crate::math) const WIDTH: usize = S::f64s::LEN;
 
     /// `value` in all lanes.
     #[inline(always)]
     pub(in crate::math) fn splat(simd: S, value: f64) -> Self {
-        Self([S::f64s::splat(simd, value); 2])
+        Self([S::f64s::splat(simd, value); K])
+    }
+
+    /// The first numbers of `column`, one in each lane; there are enough.
+    #[inline(always)]
+    pub(in crate::math) fn load(simd: S, column: &[f64]) -> Self {
+        let mut loaded = [S::f64s::splat(simd, 0.0); K];
+        each_register!(i => {
+            loaded[i] = S::f64s::from_slice(simd, &column[i * Self::WIDTH..][..Self::WIDTH]);
+        });
+        Self(loaded)
+    }
+
+    /// Puts the number of each lane into `column`, which has room for them.
+    #[inline(always)]
+    pub(in crate::math) fn store(self, column: &mut [f64]) {
+        each_register!(i => {
+            self.0[i].store_slice(&mut column[i * Self::WIDTH..][..Self::WIDTH]);
+        });
     }
 
     /// Whether all lanes of all values are finite.
@@ -39,25 +76,46 @@ impl<S: Simd> RegisterPair<S> {
         // Times 0 a finite number is 0, and any other is not a number.
         let mut sum = first.0[0] * 0.0;
         for value in some {
-            sum = value.0[0].mul_add(0.0, sum);
-            sum = value.0[1].mul_add(0.0, sum);
+            each_register!(i => {
+                sum = value.0[i].mul_add(0.0, sum);
+            });
         }
         for value in others {
-            sum = value.0[0].mul_add(0.0, sum);
-            sum = value.0[1].mul_add(0.0, sum);
+            each_register!(i => {
+                sum = value.0[i].mul_add(0.0, sum);
+            });
         }
         sum.simd_eq(0.0).all_true()
     }
 }
 
+/// A register of two, as plain `x86-64` has them.
+impl<S: Simd<f64s = f64x2<S>>> Wide<S, 1> {
+    /// A number in each lane.
+    #[inline(always)]
+    pub(in crate::math) fn two(simd: S, lower: f64, upper: f64) -> Self {
+        Self([f64x2::simd_from(simd, [lower, upper])])
+    }
+
+    /// The number of the upper lane in both.
+    #[inline(always)]
+    pub(in crate::math) fn upper(self) -> Self {
+        let [register] = self.0;
+        Self([register.zip_high(register)])
+    }
+}
+
 macro_rules! operator {
     ($operator:ident, $method:ident) => {
-        impl<S: Simd> $operator for RegisterPair<S> {
+        impl<S: Simd, const K: usize> $operator for Wide<S, K> {
             type Output = Self;
 
             #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                Self([self.0[0].$method(other.0[0]), self.0[1].$method(other.0[1])])
+            fn $method(mut self, other: Self) -> Self {
+                each_register!(i => {
+                    self.0[i] = self.0[i].$method(other.0[i]);
+                });
+                self
             }
         }
     };
@@ -68,16 +126,19 @@ operator!(Sub, sub);
 operator!(Mul, mul);
 operator!(Div, div);
 
-impl<S: Simd> Neg for RegisterPair<S> {
+impl<S: Simd, const K: usize> Neg for Wide<S, K> {
     type Output = Self;
 
     #[inline(always)]
-    fn neg(self) -> Self {
-        Self([-self.0[0], -self.0[1]])
+    fn neg(mut self) -> Self {
+        each_register!(i => {
+            self.0[i] = -self.0[i];
+        });
+        self
     }
 }
 
-impl<S: Simd> Add<f64> for RegisterPair<S> {
+impl<S: Simd, const K: usize> Add<f64> for Wide<S, K> {
     type Output = Self;
 
     #[inline(always)]
@@ -86,7 +147,7 @@ impl<S: Simd> Add<f64> for RegisterPair<S> {
     }
 }
 
-impl<S: Simd> Mul<f64> for RegisterPair<S> {
+impl<S: Simd, const K: usize> Mul<f64> for Wide<S, K> {
     type Output = Self;
 
     #[inline(always)]
@@ -95,7 +156,7 @@ impl<S: Simd> Mul<f64> for RegisterPair<S> {
     }
 }
 
-impl<S: Simd> Arithmetic for RegisterPair<S> {
+impl<S: Simd, const K: usize> Arithmetic for Wide<S, K> {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
         Self::splat(self.0[0].token(), value)
@@ -103,44 +164,52 @@ impl<S: Simd> Arithmetic for RegisterPair<S> {
 }
 
 /// Several arms.
-impl<S: Simd> Number for RegisterPair<S> {
-    const LANES: usize = 2 * S::f64s::LEN;
+impl<S: Simd, const K: usize> Number for Wide<S, K> {
+    const LANES: usize = K * S::f64s::LEN;
 
     #[inline(always)]
-    fn less_exact(self, factor: Self, other: f64) -> Self {
+    fn less_exact(mut self, factor: Self, other: f64) -> Self {
         let minus = S::f64s::splat(self.0[0].token(), -other);
-        Self([
-            factor.0[0].mul_add(minus, self.0[0]),
-            factor.0[1].mul_add(minus, self.0[1]),
-        ])
+        each_register!(i => {
+            self.0[i] = factor.0[i].mul_add(minus, self.0[i]);
+        });
+        self
     }
 
     #[inline(always)]
-    fn clamped(self, limit: f64) -> Self {
-        Self([
-            clamped::<S>(self.0[0], limit),
-            clamped::<S>(self.0[1], limit),
-        ])
+    fn clamped(mut self, limit: f64) -> Self {
+        each_register!(i => {
+            self.0[i] = clamped::<S>(self.0[i], limit);
+        });
+        self
     }
 
     #[inline(always)]
     fn all_within(values: &[Self], limit: f64) -> bool {
-        let [first, ..] = values else {
+        let [first, rest @ ..] = values else {
             return true;
         };
-        let mut within = first.0[0].abs().simd_le(limit);
-        for value in values {
-            within &= value.0[0].abs().simd_le(limit);
-            within &= value.0[1].abs().simd_le(limit);
+        // By the sum of all squares, which is no larger only if none is; so it asks for less than all.
+        let mut sums = first.0;
+        each_register!(i => {
+            sums[i] = sums[i] * sums[i];
+            for value in rest {
+                sums[i] = value.0[i].mul_add(value.0[i], sums[i]);
+            }
+        });
+        let mut within = sums[0].simd_le(limit * limit);
+        if Self::TWO {
+            within &= sums[1].simd_le(limit * limit);
         }
         within.all_true()
     }
 
     #[inline(always)]
-    fn turned(self, sine: Self, cosine: Self) -> (Self, Self) {
-        let first = turned::<S>(self.0[0], sine.0[0], cosine.0[0]);
-        let second = turned::<S>(self.0[1], sine.0[1], cosine.0[1]);
-        (Self([first.0, second.0]), Self([first.1, second.1]))
+    fn turned(self, mut sine: Self, mut cosine: Self) -> (Self, Self) {
+        each_register!(i => {
+            (sine.0[i], cosine.0[i]) = turned::<S>(self.0[i], sine.0[i], cosine.0[i]);
+        });
+        (sine, cosine)
     }
 
     #[inline(always)]
@@ -165,13 +234,24 @@ fn clamped<S: Simd>(value: S::f64s, limit: f64) -> S::f64s {
 #[inline(always)]
 fn turned<S: Simd>(shifted: S::f64s, sine: S::f64s, cosine: S::f64s) -> (S::f64s, S::f64s) {
     let simd = shifted.token();
-    let (one, two) = (S::u64s::splat(simd, 1), S::u64s::splat(simd, 2));
+    let one = S::u64s::splat(simd, 1);
+    let sign = S::u64s::splat(simd, 1 << 63);
     let quadrant: S::u64s = shifted.bitcast();
-    let odd = (quadrant & one).simd_eq(one);
-    let sin: S::u64s = odd.select(cosine, sine).bitcast();
-    let cos: S::u64s = odd.select(sine, cosine).bitcast();
-    let negative_sine = (quadrant & two) << 62;
-    let negative_cosine = ((quadrant + one) & two) << 62;
+    let (sin, cos): (S::u64s, S::u64s);
+    if S::f64s::LEN == 2 {
+        // Plain `x86-64` compares no integers of this length.
+        let odd = S::u64s::splat(simd, 0) - (quadrant & one);
+        let (sine, cosine): (S::u64s, S::u64s) = (sine.bitcast(), cosine.bitcast());
+        let exchange = (sine ^ cosine) & odd;
+        (sin, cos) = (sine ^ exchange, cosine ^ exchange);
+    } else {
+        let odd = (quadrant & one).simd_eq(one);
+        sin = odd.select(cosine, sine).bitcast();
+        cos = odd.select(sine, cosine).bitcast();
+    }
+    let half = quadrant << 62;
+    let negative_sine = half & sign;
+    let negative_cosine = (half + S::u64s::splat(simd, 1 << 62)) & sign;
     (
         (sin ^ negative_sine).bitcast(),
         (cos ^ negative_cosine).bitcast(),

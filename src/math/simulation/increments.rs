@@ -24,12 +24,35 @@ pub fn step_under<const N: usize>(
     h: f64,
 ) -> Increment<N> {
     let State { position, velocity } = state;
-    if leaves_out_first_angle(arm) {
-        let acceleration = |_, q: &[f64; N], v: &[f64; N]| weightless_dynamics(arm, q, v, effort);
-        increment(method, acceleration, 0.0, position, velocity, h)
+    if method == Method::Euler {
+        // In the caller's loop, where numbers stay in registers from a step to the next; of the other methods that
+        // would be four times as many copies of the dynamics.
+        increment(
+            Method::Euler,
+            #[inline(always)]
+            |_, q: &[f64; N], v: &[f64; N]| acceleration(arm, q, v, effort),
+            0.0,
+            position,
+            velocity,
+            h,
+        )
     } else {
-        let acceleration = |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(arm, q, v, effort);
+        let acceleration = |_, q: &[f64; N], v: &[f64; N]| acceleration(arm, q, v, effort);
         increment(method, acceleration, 0.0, position, velocity, h)
+    }
+}
+
+#[inline(always)]
+fn acceleration<const N: usize>(
+    arm: &Arm<N>,
+    q: &[f64; N],
+    v: &[f64; N],
+    effort: &[f64; N],
+) -> [f64; N] {
+    if leaves_out_first_angle(arm) {
+        weightless_dynamics(arm, q, v, effort)
+    } else {
+        forward_dynamics(arm, q, v, effort)
     }
 }
 

@@ -13,11 +13,13 @@
     reason = "indices run over 0..N and 0..2N of arrays of these lengths"
 )]
 
+use std::ops::ControlFlow;
+
 use super::sampled::SampledLoop;
 use crate::math::arm::State;
 use crate::math::dynamics::mass_matrix;
 use crate::math::pid::Setpoint;
-use crate::math::simulation::Simulation;
+use crate::math::simulation::{Simulation, batch};
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{equilibrium, gravity_gradient, no_control};
@@ -88,7 +90,9 @@ pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> O
         Sampling::Held => {
             let mut live = primed(control, &rest.integral)?;
             live.set_state(start);
-            watch(|| live.step().then(|| energy(live.state())).flatten())
+            let mut watch = Watch::default();
+            live.advance_with(STEPS, |now| watch.see(energy(now.state())));
+            watch.growth()
         }
         Sampling::Continuous => {
             let mut whole = ContinuousLoop {
@@ -99,6 +103,40 @@ pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> O
             watch(|| whole.step().then(|| energy(&whole.state)).flatten())
         }
     }
+}
+
+/// As [`growth`] of each of the loops. Arms whose efforts are held are stepped side by side.
+#[must_use]
+pub fn growths<const N: usize>(
+    controls: &[ControlLoop<N>],
+    sampling: Sampling,
+) -> Vec<Option<f64>> {
+    match sampling {
+        Sampling::Held => held_growths(controls),
+        // No live arm, which is all that lanes know to step.
+        Sampling::Continuous => controls
+            .iter()
+            .map(|control| growth(control, sampling))
+            .collect(),
+    }
+}
+
+fn held_growths<const N: usize>(controls: &[ControlLoop<N>]) -> Vec<Option<f64>> {
+    let watched = controls.iter().map(|control| {
+        let rest = equilibrium(control);
+        let mut live = primed(control, &rest.integral);
+        if let Some(live) = &mut live {
+            live.set_state(nudged(&rest.position, control.timestep));
+        }
+        let energy = energy_about(control, &rest.position);
+        (live, energy, Watch::default())
+    });
+    let mut watched: Vec<_> = watched.collect();
+    batch::advance_with(watched.iter_mut().filter_map(|(live, energy, watch)| {
+        let observe = |state: &State<N>| watch.see(energy(state));
+        Some((live.as_mut()?, STEPS, observe))
+    }));
+    watched.iter().map(|(_, _, watch)| watch.growth()).collect()
 }
 
 /// As [`growth`], per control period of `substeps` steps, each effort one period late if `delayed`.
@@ -125,7 +163,7 @@ pub fn sampled_growth<const N: usize>(
 fn energy_about<const N: usize>(
     control: &ControlLoop<N>,
     rest: &[f64; N],
-) -> impl Fn(&State<N>) -> Option<f64> {
+) -> impl Fn(&State<N>) -> Option<f64> + use<N> {
     let mass = mass_matrix(&control.arm, rest);
     let gravity = gravity_gradient(&control.arm, rest);
     let (rest, kp, h) = (*rest, control.gains.kp, control.timestep);
@@ -211,21 +249,52 @@ pub(super) fn boundary(guess: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
     Some(below)
 }
 
-/// Largest of the last eighth of [`STEPS`] energies per largest of the second; zero once one is zero, `None` once one
-/// is missing.
+/// The growth of what has so many energies.
 fn watch(mut energy: impl FnMut() -> Option<f64>) -> Option<f64> {
-    let window = STEPS / 8;
-    let (mut early, mut late) = (0.0_f64, 0.0_f64);
-    for step in 0..STEPS {
-        let energy = energy()?;
-        if energy == 0.0 {
-            return Some(0.0);
-        }
-        if step / window == 1 {
-            early = early.max(energy);
-        } else if step >= STEPS - window {
-            late = late.max(energy);
+    let mut watch = Watch::default();
+    for _ in 0..STEPS {
+        if watch.see(energy()).is_break() {
+            break;
         }
     }
-    Some(late / early)
+    watch.growth()
+}
+
+/// The energies of a deviation, as they come.
+#[derive(Debug, Default)]
+struct Watch {
+    seen: u64,
+    /// Largest of the second eighth of [`STEPS`], and of the last.
+    early: f64,
+    late: f64,
+    has_died: bool,
+}
+
+impl Watch {
+    /// Takes in the next energy, until one is zero or missing.
+    fn see(&mut self, energy: Option<f64>) -> ControlFlow<()> {
+        const WINDOW: u64 = STEPS / 8;
+        let Some(energy) = energy else {
+            return ControlFlow::Break(());
+        };
+        if energy == 0.0 {
+            self.has_died = true;
+            return ControlFlow::Break(());
+        }
+        if self.seen / WINDOW == 1 {
+            self.early = self.early.max(energy);
+        } else if self.seen >= STEPS - WINDOW {
+            self.late = self.late.max(energy);
+        }
+        self.seen += 1;
+        ControlFlow::Continue(())
+    }
+
+    /// The largest late energy per largest early one; zero if one was zero, `None` if one was missing.
+    fn growth(&self) -> Option<f64> {
+        if self.has_died {
+            return Some(0.0);
+        }
+        (self.seen == STEPS).then(|| self.late / self.early)
+    }
 }

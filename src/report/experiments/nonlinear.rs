@@ -15,6 +15,7 @@
 )]
 
 use std::f64::consts::FRAC_PI_2;
+use std::ops::ControlFlow;
 
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
@@ -83,20 +84,30 @@ pub fn spun(spin: f64) -> State<2> {
     }
 }
 
-/// Whether a free swing keeps its energy, above that of the hanging arm, below three times what it had.
+/// Whether each of the free swings, stepped side by side, keeps its energy, above that of the hanging arm, below three
+/// times what it had.
 #[must_use]
-pub fn is_carried(start: &State<2>, method: Method, timestep: f64) -> bool {
-    let arm = Arm::<2>::default();
-    let lowest = potential_energy(&arm, &[-FRAC_PI_2, 0.0]);
-    let most = 3.0 * (energy(&arm, start) - lowest);
-    let control = ControlLoop::free(arm).with_method(method);
-    let mut live = control.with_timestep(timestep).simulation(*start);
-    while live.time() < SWING {
-        if !(live.step() && energy(&arm, live.state()) - lowest <= most) {
-            return false;
-        }
-    }
-    true
+pub fn are_carried(swings: &[(ControlLoop<2>, State<2>)]) -> Vec<bool> {
+    let mut watched: Vec<_> = swings
+        .iter()
+        .map(|(control, start)| (control.simulation(*start), true))
+        .collect();
+    batch::advance_with(watched.iter_mut().map(|(live, carried)| {
+        let (arm, steps) = (*live.arm(), first_step_from(SWING, live.timestep()));
+        let lowest = potential_energy(&arm, &[-FRAC_PI_2, 0.0]);
+        let most = 3.0 * (energy(&arm, live.state()) - lowest);
+        let observe = move |state: &State<2>| {
+            *carried = energy(&arm, state) - lowest <= most;
+            if *carried {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        };
+        (live, steps, observe)
+    }));
+    let holds = |(live, carried): &(Simulation<2>, bool)| *carried && live.divergence().is_none();
+    watched.iter().map(holds).collect()
 }
 
 /// A swing of the free default arm that comes back to where it began: from rest, both links to one side, through the

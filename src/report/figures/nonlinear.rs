@@ -7,7 +7,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
-use crate::report::experiments::nonlinear::{arrive, is_carried, move_of, spun};
+use crate::report::experiments::nonlinear::{are_carried, arrive, move_of, spun};
 use crate::report::making::Making;
 use crate::report::section::{Block, Figure, Section, Verdict};
 use crate::report::svg::{Axis, Curve, Heat, Key, Plot, Unit};
@@ -123,15 +123,19 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
         let poses = limits(&move_of(1.0, method, 1e-3))
             .trusted()
             .unwrap_or(f64::INFINITY);
-        let row = |amplitude: f64| {
-            let motion = Motion::ahead(&move_of(amplitude, method, 1e-3), &State::rest());
-            let loops: Vec<_> = centres(MOVE_STEPS, columns)
-                .into_iter()
-                .map(|h| move_of(amplitude, method, h))
-                .collect();
-            (motion.timestep.min(poses), arrive(&loops))
+        let amplitudes = centres(AMPLITUDES, columns);
+        let steps = centres(MOVE_STEPS, columns);
+        let cells = amplitudes.iter().flat_map(|amplitude| {
+            let steps = steps.iter();
+            steps.map(|h| move_of(*amplitude, method, *h))
+        });
+        let verdicts = arrive(&cells.collect::<Vec<_>>());
+        let row = |(amplitude, verdicts): (&f64, &[bool])| {
+            let motion = Motion::ahead(&move_of(*amplitude, method, 1e-3), &State::rest());
+            (motion.timestep.min(poses), verdicts.to_vec())
         };
-        let rows = centres(AMPLITUDES, columns).into_iter().map(row).collect();
+        let rows = amplitudes.iter().zip(verdicts.chunks(columns));
+        let rows = rows.map(row).collect();
         maps.push(MotionMap { method, rows });
         making.at(maps.len(), 9);
     }
@@ -147,14 +151,19 @@ fn spins(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
         let small = limit_held(&free)
             .filter(|limit| *limit > 0.0)
             .unwrap_or(f64::INFINITY);
-        let row = |spin: f64| {
-            let motion = Motion::ahead(&free, &spun(spin));
-            let verdicts = centres(SWING_STEPS, columns)
-                .into_iter()
-                .map(|h| is_carried(&spun(spin), method, h));
-            (motion.timestep.min(small), verdicts.collect())
+        let speeds = centres(SPINS, columns);
+        let steps = centres(SWING_STEPS, columns);
+        let cells = speeds.iter().flat_map(|spin| {
+            let steps = steps.iter();
+            steps.map(|h| (free.with_timestep(*h), spun(*spin)))
+        });
+        let verdicts = are_carried(&cells.collect::<Vec<_>>());
+        let row = |(spin, verdicts): (&f64, &[bool])| {
+            let motion = Motion::ahead(&free, &spun(*spin));
+            (motion.timestep.min(small), verdicts.to_vec())
         };
-        let rows = centres(SPINS, columns).into_iter().map(row).collect();
+        let rows = speeds.iter().zip(verdicts.chunks(columns));
+        let rows = rows.map(row).collect();
         maps.push(MotionMap { method, rows });
         making.at(4 + maps.len(), 9);
     }

@@ -12,7 +12,8 @@
 //!
 //! *Throughput*, *independent*: independent states; *chained*, and steps that do not say: every result moves the next state. A *step* is
 //! `increment` and two sums, under an effort held over the step; a *live step* is the arm's own, with compensated sums, clock and check
-//! for divergence, PID off. *Lanes* are many such live arms side by side, a lane of a register for each, over ADVANCE steps a call.
+//! for divergence, PID off. *Lanes* are many such live arms side by side, a lane of a register for each, over ADVANCE steps a call, or
+//! for forward dynamics all states, in columns.
 
 mod compare;
 
@@ -24,8 +25,8 @@ use std::time::{Duration, Instant};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
+use pendularm::math::number::Registers;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::batch::Registers;
 use pendularm::math::simulation::{Simulation, step_under};
 use pendularm_benches::random::spread;
 
@@ -151,6 +152,35 @@ fn check_lanes<const N: usize>(registers: Registers, cases: &[Case<N>], method: 
     }
 }
 
+/// A column of each joint's numbers.
+fn columns<const N: usize>(cases: &[Case<N>], row: impl Fn(&Case<N>) -> [f64; N]) -> [Vec<f64>; N] {
+    std::array::from_fn(|i| cases.iter().map(|case| row(case)[i]).collect())
+}
+
+/// Positions, velocities and efforts in columns, and where accelerations go.
+type Columns<const N: usize> = [[Vec<f64>; N]; 4];
+
+fn in_columns<const N: usize>(cases: &[Case<N>]) -> Columns<N> {
+    [
+        columns(cases, |(state, _)| state.position),
+        columns(cases, |(state, _)| state.velocity),
+        columns(cases, |(_, effort)| *effort),
+        columns(cases, |_| [0.0; N]),
+    ]
+}
+
+/// Accelerations of all states side by side.
+fn accelerate<const N: usize>(registers: Registers, arm: &Arm<N>, columns: &mut Columns<N>) {
+    let [q, qd, tau, qdd] = columns;
+    registers.forward_dynamics(
+        arm,
+        q.each_ref().map(Vec::as_slice),
+        qd.each_ref().map(Vec::as_slice),
+        tau.each_ref().map(Vec::as_slice),
+        qdd.each_mut().map(Vec::as_mut_slice),
+    );
+}
+
 fn check<const N: usize>(path: &str) {
     let arm = Arm::<N>::default();
     let show = |name: &str, k: usize, numbers: &[f64]| {
@@ -161,6 +191,17 @@ fn check<const N: usize>(path: &str) {
     for registers in Registers::all() {
         check_lanes(registers, &cases, Method::Euler);
         check_lanes(registers, &cases, Method::Rk4);
+        let mut columns = in_columns(&cases);
+        accelerate(registers, &arm, &mut columns);
+        for (k, (state, effort)) in cases.iter().enumerate() {
+            let qdd = forward_dynamics(&arm, &state.position, &state.velocity, effort);
+            let together: [f64; N] = std::array::from_fn(|i| columns[3][i][k]);
+            assert_eq!(
+                together.map(f64::to_bits),
+                qdd.map(f64::to_bits),
+                "one of many accelerations"
+            );
+        }
     }
     for (k, (state, effort)) in cases.iter().enumerate() {
         let qdd = forward_dynamics(&arm, &state.position, &state.velocity, effort);
@@ -189,6 +230,16 @@ fn time<const N: usize>(path: &str) {
             *result = forward_dynamics(&arm, &state.position, &state.velocity, effort);
         }
     });
+    for registers in Registers::all() {
+        let mut columns = in_columns(&cases);
+        row::<N, _, _>(
+            &format!("pendularm {} lanes", registers.lanes()),
+            "forward dynamics, throughput",
+            CALLS as u64,
+            || (),
+            |()| accelerate(registers, &arm, black_box(&mut columns)),
+        );
+    }
     measure::<N, _>("forward dynamics, chained", || {
         let mut state = black_box(start::<N>());
         for _ in 0..CALLS {

@@ -194,6 +194,15 @@ impl Client {
         }
     }
 
+    /// A fault of a client that reads late. If it can hold more than is modest its stream may have ended before the end of a
+    /// frame: it held the most, and who has not read the frame before can't be told.
+    pub fn read_late(&self, fault: Fault) -> Fault {
+        Fault {
+            gave_way: fault.gave_way || (self.ended && self.may_hold > MODEST),
+            ..fault
+        }
+    }
+
     /// Appends a frame to what goes out next.
     pub fn push(&mut self, frame: &Value) {
         self.push_text(&frame.to_string());

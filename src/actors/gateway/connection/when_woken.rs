@@ -82,9 +82,11 @@ mod tests {
                 Poll::Ready(())
             }
         }));
+        // A clone: in an unoptimised program the original need not be known as the same as its clones.
+        let task = Waker::noop().clone();
         let mut poll = || {
             Pin::new(&mut part)
-                .poll(&mut Context::from_waker(Waker::noop()))
+                .poll(&mut Context::from_waker(&task))
                 .is_ready()
         };
         let wake = || own.borrow().iter().for_each(Waker::wake_by_ref);

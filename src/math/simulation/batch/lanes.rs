@@ -1,7 +1,6 @@
-//! Arms in the lanes of a few pairs of registers, and their steps.
+//! As many arms as a pair of registers has lanes: to and fro, and where a step leads to.
 //!
-//! **Invariant:** a lane whose arm has left holds one that rests without gravity, so that it can go on stepping beside
-//! the others without ever diverging.
+//! **Invariant:** no lane knows of another.
 
 #![allow(
     clippy::indexing_slicing,
@@ -10,125 +9,19 @@
 
 use std::array::from_fn;
 
-use fearless_simd::Simd;
-
-use super::seat::{Seat, StepKind};
+use super::seat::Seat;
 use crate::math::arm::{Rod, State};
 use crate::math::dynamics::recursion;
 use crate::math::integrator::Method;
-use crate::math::number::{Number, RegisterPair, entries};
+use crate::math::number::{Number, entries};
 use crate::math::pid::{Control, Gains, Setpoint, law};
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::stepped;
 
-/// Pairs of registers that take each step in turn.
-pub(super) const PAIRS: usize = 2;
-
-/// A few pairs' worth of arms of one kind.
-pub(super) struct Formation<'s, 'a, S: Simd, const N: usize> {
-    pairs: [Lanes<RegisterPair<S>, N>; PAIRS],
-    seats: &'s mut [Seat<'a, N>],
-}
-
-impl<'s, 'a, S: Simd, const N: usize> Formation<'s, 'a, S, N> {
-    /// Gives every arm a lane; there are enough.
-    #[inline(always)]
-    pub(super) fn new(simd: S, seats: &'s mut [Seat<'a, N>]) -> Self {
-        let mut pairs = [Lanes::resting(RegisterPair::splat(simd, 0.0)); PAIRS];
-        for (lanes, seats) in pairs.iter_mut().zip(seats.chunks(RegisterPair::<S>::LANES)) {
-            for (lane, seat) in seats.iter().enumerate() {
-                lanes.seat(lane, seat);
-            }
-        }
-        Self { pairs, seats }
-    }
-
-    /// Takes all steps of all arms.
-    #[inline(always)]
-    pub(super) fn run(mut self, kind: StepKind) {
-        while let Some(steps) = self.until_change() {
-            if kind.weighs {
-                self.take_steps::<true>(kind, steps);
-            } else {
-                self.take_steps::<false>(kind, steps);
-            }
-            self.look(steps);
-        }
-    }
-
-    /// How many steps all arms take before one of them has a change.
-    fn until_change(&self) -> Option<u64> {
-        let still = self.seats.iter().filter(|seat| seat.left > 0);
-        still.map(Seat::until_change).min()
-    }
-
-    #[inline(always)]
-    fn take_steps<const WEIGHS: bool>(&mut self, kind: StepKind, steps: u64) {
-        let used = self.seats.len().div_ceil(RegisterPair::<S>::LANES);
-        for step in 0..steps {
-            for (index, lanes) in self.pairs.iter_mut().take(used).enumerate() {
-                let mut next = lanes.next::<WEIGHS>(kind.method, kind.controlled);
-                if !RegisterPair::all_finite(&next.state.position, &next.state.velocity) {
-                    // Moved out of the way, so that otherwise nothing has to be in memory.
-                    let mut parted = next;
-                    let first = index * RegisterPair::<S>::LANES;
-                    part(lanes, &mut parted, &mut self.seats[first..], step);
-                    next = parted;
-                }
-                lanes.moving = next;
-            }
-        }
-    }
-
-    /// Counts the steps, has arms leave that have taken theirs, and ends disturbances.
-    fn look(&mut self, steps: u64) {
-        let chunks = self.seats.chunks_mut(RegisterPair::<S>::LANES);
-        for (lanes, seats) in self.pairs.iter_mut().zip(chunks) {
-            for (lane, seat) in seats
-                .iter_mut()
-                .enumerate()
-                .filter(|(_, seat)| seat.left > 0)
-            {
-                seat.taken += steps;
-                seat.left -= steps;
-                if seat.left == 0 {
-                    lanes.moving.write(lane, seat.arm);
-                    seat.end(seat.taken, false);
-                    lanes.rest(lane);
-                } else if !seat.is_pushed() {
-                    lanes
-                        .push
-                        .iter_mut()
-                        .for_each(|push| push.set_lane(lane, -0.0));
-                }
-            }
-        }
-    }
-}
-
-/// Has the arms leave whose next state is not finite; before it they took `step` steps of this run.
-#[cold]
-#[inline(never)]
-fn part<T: Number, const N: usize>(
-    lanes: &mut Lanes<T, N>,
-    next: &mut Moving<T, N>,
-    seats: &mut [Seat<'_, N>],
-    step: u64,
-) {
-    for (lane, seat) in (0..T::LANES).zip(seats) {
-        if !next.is_finite(lane) {
-            lanes.moving.write(lane, seat.arm);
-            seat.end(seat.taken + step, true);
-            lanes.rest(lane);
-            next.set(lane, &Moving::resting(0.0));
-        }
-    }
-}
-
 /// The parts of arms that a step changes.
 #[derive(Clone, Copy)]
-struct Moving<T, const N: usize> {
-    state: State<N, T>,
+pub(super) struct Moving<T, const N: usize> {
+    pub(super) state: State<N, T>,
     carry: State<N, T>,
     effort: [T; N],
     integral: [T; N],
@@ -136,7 +29,7 @@ struct Moving<T, const N: usize> {
 
 impl<T: Number, const N: usize> Moving<T, N> {
     #[inline(always)]
-    fn resting(zero: T) -> Self {
+    pub(super) fn resting(zero: T) -> Self {
         let at_rest = State {
             position: [zero; N],
             velocity: [zero; N],
@@ -149,7 +42,7 @@ impl<T: Number, const N: usize> Moving<T, N> {
         }
     }
 
-    fn set(&mut self, lane: usize, arm: &Moving<f64, N>) {
+    pub(super) fn set(&mut self, lane: usize, arm: &Moving<f64, N>) {
         let into = |lanes: &mut [T; N], values: &[f64; N]| {
             for (lanes, value) in lanes.iter_mut().zip(values) {
                 lanes.set_lane(lane, *value);
@@ -163,19 +56,19 @@ impl<T: Number, const N: usize> Moving<T, N> {
         into(&mut self.integral, &arm.integral);
     }
 
-    fn write(&self, lane: usize, arm: &mut Simulation<N>) {
-        let from = |lanes: &[T; N]| from_fn(|i| lanes[i].lane(lane));
-        let state = |state: &State<N, T>| State {
-            position: from(&state.position),
-            velocity: from(&state.velocity),
-        };
-        arm.state = state(&self.state);
-        arm.carry = state(&self.carry);
-        arm.effort = from(&self.effort);
-        arm.pid.commit(from(&self.integral));
+    pub(super) fn write(&self, lane: usize, arm: &mut Simulation<N>) {
+        arm.state = self.state(lane);
+        arm.carry = state_in(lane, &self.carry);
+        arm.effort = joints_in(lane, &self.effort);
+        arm.pid.commit(joints_in(lane, &self.integral));
     }
 
-    fn is_finite(&self, lane: usize) -> bool {
+    /// The state in a lane.
+    pub(super) fn state(&self, lane: usize) -> State<N> {
+        state_in(lane, &self.state)
+    }
+
+    pub(super) fn is_finite(&self, lane: usize) -> bool {
         let State { position, velocity } = &self.state;
         position
             .iter()
@@ -184,10 +77,21 @@ impl<T: Number, const N: usize> Moving<T, N> {
     }
 }
 
+fn state_in<T: Number, const N: usize>(lane: usize, state: &State<N, T>) -> State<N> {
+    State {
+        position: joints_in(lane, &state.position),
+        velocity: joints_in(lane, &state.velocity),
+    }
+}
+
+fn joints_in<T: Number, const N: usize>(lane: usize, joints: &[T; N]) -> [f64; N] {
+    from_fn(|i| joints[i].lane(lane))
+}
+
 /// As many arms as a pair of registers has lanes.
 #[derive(Clone, Copy)]
-struct Lanes<T, const N: usize> {
-    moving: Moving<T, N>,
+pub(super) struct Lanes<T, const N: usize> {
+    pub(super) moving: Moving<T, N>,
     rods: [Rod<T>; N],
     gravity: T,
     gains: Gains<N, T>,
@@ -200,7 +104,7 @@ struct Lanes<T, const N: usize> {
 impl<T: Number, const N: usize> Lanes<T, N> {
     /// Lanes without arms.
     #[inline(always)]
-    fn resting(zero: T) -> Self {
+    pub(super) fn resting(zero: T) -> Self {
         let one = zero.like(1.0);
         Self {
             moving: Moving::resting(zero),
@@ -227,7 +131,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
     }
 
     /// Puts an arm into a lane.
-    fn seat(&mut self, lane: usize, seat: &Seat<'_, N>) {
+    pub(super) fn seat(&mut self, lane: usize, seat: &Seat<'_, N>) {
         let arm = &*seat.arm;
         let (gains, setpoint) = (arm.pid.gains(), arm.pid.setpoint());
         let moving = Moving {
@@ -254,8 +158,15 @@ impl<T: Number, const N: usize> Lanes<T, N> {
         );
     }
 
+    /// Ends the disturbance in a lane.
+    pub(super) fn end_push(&mut self, lane: usize) {
+        for push in &mut self.push {
+            push.set_lane(lane, -0.0);
+        }
+    }
+
     /// Has nobody in a lane.
-    fn rest(&mut self, lane: usize) {
+    pub(super) fn rest(&mut self, lane: usize) {
         self.set(lane, &Lanes::resting(0.0));
     }
 
@@ -283,7 +194,11 @@ impl<T: Number, const N: usize> Lanes<T, N> {
 
     /// Where the next step leads to.
     #[inline(always)]
-    fn next<const WEIGHS: bool>(&self, method: Method, controlled: bool) -> Moving<T, N> {
+    pub(super) fn next<const WEIGHS: bool>(
+        &self,
+        method: Method,
+        controlled: bool,
+    ) -> Moving<T, N> {
         let Moving {
             state,
             carry,

@@ -10,99 +10,90 @@
 //! **Invariant:** every simulation is afterwards what [`Simulation::advance`] would have made of it, bit for bit,
 //! whoever stands beside it.
 
+mod formation;
 mod lanes;
 mod seat;
 
-use std::sync::OnceLock;
+use std::cmp::Reverse;
+use std::ops::ControlFlow;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::dispatch;
 
-use self::lanes::{Formation, PAIRS};
-use self::seat::{Seat, StepKind};
+use self::formation::Formation;
+use self::seat::{Observer, Seat, StepKind};
 use super::Simulation;
-use crate::math::number::RegisterPair;
+use crate::math::arm::State;
+use crate::math::number::Registers;
 
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
 const WORTH_A_LANE: u64 = 2;
 
-/// The registers of this machine that arms can share.
-#[derive(Debug, Clone, Copy)]
-pub struct Registers(Level);
+/// Most arms that wait for a lane: so many more than there are lanes that those which the last arms leave empty count
+/// for little.
+const QUEUE: usize = 1024;
 
 impl Registers {
-    /// The widest that there are.
-    #[must_use]
-    pub fn widest() -> Self {
-        // Asked of the processor once.
-        static LEVEL: OnceLock<Level> = OnceLock::new();
-        Self(*LEVEL.get_or_init(Level::new))
-    }
-
-    /// All that there are, the widest first; what steps take in any of them is the same.
-    #[must_use]
-    pub fn all() -> Vec<Self> {
-        let widest = Self::widest();
-        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-        let narrower = [
-            widest.0.as_avx2().map(Simd::level),
-            widest.0.as_sse4_2().map(Simd::level),
-        ];
-        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
-        let narrower: [Option<Level>; 0] = [];
-        let mut all = vec![widest];
-        for one in narrower.into_iter().flatten().map(Self) {
-            if all.iter().all(|other| other.lanes() != one.lanes()) {
-                all.push(one);
-            }
-        }
-        all
-    }
-
-    /// How many arms share one.
-    #[must_use]
-    pub fn lanes(self) -> usize {
-        dispatch!(self.0, simd => lanes_of(simd))
-    }
-
     /// [`advance`] in these.
     pub fn advance<'a, const N: usize>(
         self,
         arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>,
     ) {
-        let full = 2 * PAIRS * self.lanes();
+        self.take_all(arms.into_iter().map(|(arm, steps)| (arm, steps, None)));
+    }
+
+    /// [`advance_with`] in these.
+    pub fn advance_with<'a, const N: usize, O>(
+        self,
+        arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64, O)>,
+    ) where
+        O: FnMut(&State<N>) -> ControlFlow<()> + 'a,
+    {
+        let observed = |(arm, steps, observe): (_, _, O)| {
+            let observer: Observer<'a, N> = Box::new(observe);
+            (arm, steps, Some(observer))
+        };
+        self.take_all(arms.into_iter().map(observed));
+    }
+
+    fn take_all<'a, const N: usize>(
+        self,
+        arms: impl Iterator<Item = (&'a mut Simulation<N>, u64, Option<Observer<'a, N>>)>,
+    ) {
         let mut waiting: [Vec<Seat<'a, N>>; StepKind::COUNT] = std::array::from_fn(|_| Vec::new());
-        for (arm, steps) in arms {
+        for (arm, steps, observer) in arms {
             if steps == 0 || arm.divergence.is_some() {
                 continue;
             }
             let evaluations = steps.saturating_mul(arm.method.evaluations().into());
+            let kind = StepKind::of(arm);
+            let seat = Seat::new(arm, steps, observer);
             if evaluations < WORTH_A_LANE {
-                arm.advance(steps);
+                seat.alone();
                 continue;
             }
-            let kind = StepKind::of(arm);
-            let Some(seats) = waiting.get_mut(kind.index()) else {
+            let Some(queue) = waiting.get_mut(kind.index()) else {
                 continue;
             };
-            seats.push(Seat::new(arm, steps));
-            if seats.len() == full {
-                self.run(kind, seats);
+            queue.push(seat);
+            if queue.len() == QUEUE {
+                self.run(kind, queue);
             }
         }
-        for (kind, seats) in StepKind::all().zip(&mut waiting) {
-            self.run(kind, seats);
+        for (kind, queue) in StepKind::all().zip(&mut waiting) {
+            self.run(kind, queue);
         }
     }
 
-    /// Takes the steps of arms of one kind, at most as many as have a lane, who then leave their seats.
-    fn run<const N: usize>(self, kind: StepKind, seats: &mut Vec<Seat<'_, N>>) {
-        if let [seat] = seats.as_mut_slice() {
+    /// Takes the steps of arms of one kind, who then have left the queue.
+    fn run<const N: usize>(self, kind: StepKind, queue: &mut Vec<Seat<'_, N>>) {
+        if queue.len() < 2 {
             // Nobody to share a register with.
-            seat.alone();
-        } else if !seats.is_empty() {
-            dispatch!(self.0, simd => Formation::new(simd, seats).run(kind));
+            queue.drain(..).for_each(Seat::alone);
+            return;
         }
-        seats.clear();
+        // Who takes longest begins first, so that the last ones end together.
+        queue.sort_by_key(|seat| Reverse(seat.left()));
+        dispatch!(self.level(), simd => Formation::new(simd, queue.drain(..)).run(kind));
     }
 }
 
@@ -119,7 +110,27 @@ pub fn advance<'a, const N: usize>(arms: impl IntoIterator<Item = (&'a mut Simul
     Registers::widest().advance(arms);
 }
 
-#[inline(always)]
-fn lanes_of<S: Simd>(_: S) -> usize {
-    RegisterPair::<S>::WIDTH
+/// As [`advance`], and shows every state that a step leads to to the arm's own observer, which may end its advance
+/// there: what [`Simulation::advance_with`] is to one arm.
+///
+/// ```
+/// use std::ops::ControlFlow;
+/// use pendularm::math::{arm::{Arm, State}, pid::Gains, simulation::{Simulation, batch}};
+///
+/// let mut arms = vec![Simulation::<2>::new(Arm::default(), Gains::default()); 100];
+/// let mut lowest = vec![0.0_f64; 100];
+/// batch::advance_with(arms.iter_mut().zip(&mut lowest).map(|(arm, lowest)| {
+///     (arm, 1000, move |state: &State<2>| {
+///         *lowest = lowest.min(state.position[0]);
+///         if *lowest < -1.0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+///     })
+/// }));
+/// assert!(arms.iter().all(|arm| arm.steps() < 1000));
+/// ```
+pub fn advance_with<'a, const N: usize, O>(
+    arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64, O)>,
+) where
+    O: FnMut(&State<N>) -> ControlFlow<()> + 'a,
+{
+    Registers::widest().advance_with(arms);
 }

@@ -2,6 +2,9 @@
 //!
 //! **Invariant:** an arm is written back once, when its last step is taken or its result is not finite.
 
+use std::ops::ControlFlow;
+
+use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::math::simulation::increments::leaves_out_first_angle;
@@ -47,36 +50,55 @@ impl StepKind {
     }
 }
 
+/// Sees the states that an arm's steps lead to, and may end them there.
+pub(super) type Observer<'a, const N: usize> = Box<dyn FnMut(&State<N>) -> ControlFlow<()> + 'a>;
+
 /// An arm on its way.
-#[derive(Debug)]
 pub(super) struct Seat<'a, const N: usize> {
     pub(super) arm: &'a mut Simulation<N>,
-    /// Steps taken, and to be taken still; none once it has been written back.
-    pub(super) taken: u64,
-    pub(super) left: u64,
+    /// Steps taken, and to be taken still.
+    taken: u64,
+    left: u64,
     /// How many steps its disturbance acts in.
     pushes: u64,
+    observer: Option<Observer<'a, N>>,
 }
 
 impl<'a, const N: usize> Seat<'a, N> {
-    pub(super) fn new(arm: &'a mut Simulation<N>, steps: u64) -> Self {
+    /// An arm that is to take so many steps, one at least.
+    pub(super) fn new(
+        arm: &'a mut Simulation<N>,
+        steps: u64,
+        observer: Option<Observer<'a, N>>,
+    ) -> Self {
         let pushes = pushes(arm, steps);
         Self {
             arm,
             taken: 0,
             left: steps,
             pushes,
+            observer,
         }
     }
 
     /// Takes the steps without anybody beside it.
-    pub(super) fn alone(&mut self) {
-        self.arm.advance(self.left);
+    pub(super) fn alone(self) {
+        match self.observer {
+            Some(mut observe) => self.arm.advance_with(self.left, |arm| observe(arm.state())),
+            None => self.arm.advance(self.left),
+        };
     }
 
-    /// How many steps can be taken before the disturbance ends or all are taken.
-    pub(super) fn until_change(&self) -> u64 {
-        if self.is_pushed() {
+    /// How many steps it still has to take at most.
+    pub(super) fn left(&self) -> u64 {
+        self.left
+    }
+
+    /// How many steps can be taken before it is looked at: each, or until the disturbance ends or all are taken.
+    pub(super) fn until_look(&self) -> u64 {
+        if self.observer.is_some() {
+            1
+        } else if self.is_pushed() {
             self.left.min(self.pushes - self.taken)
         } else {
             self.left
@@ -88,18 +110,34 @@ impl<'a, const N: usize> Seat<'a, N> {
         self.taken < self.pushes
     }
 
-    /// Notes the steps that were taken, and whether the next one was tried and not taken.
-    pub(super) fn end(&mut self, taken: u64, diverged: bool) {
-        self.left = 0;
-        self.arm.steps += taken;
-        self.arm.steps_since_base += taken;
+    /// Counts steps that were taken; whether the disturbance ended with the last of them.
+    pub(super) fn count(&mut self, steps: u64) -> bool {
+        let was_pushed = self.is_pushed();
+        self.taken += steps;
+        self.left -= steps;
+        was_pushed && !self.is_pushed()
+    }
+
+    /// Whether no more steps are to be taken from `state` on.
+    pub(super) fn is_done(&mut self, state: impl FnOnce() -> State<N>) -> bool {
+        let ended = match &mut self.observer {
+            Some(observe) => observe(&state()).is_break(),
+            None => false,
+        };
+        ended || self.left == 0
+    }
+
+    /// Notes the steps that were taken on the arm, and whether the next one was tried and not taken.
+    pub(super) fn end(&mut self, diverged: bool) {
+        self.arm.steps += self.taken;
+        self.arm.steps_since_base += self.taken;
         if diverged {
             self.arm.divergence = Some(Divergence {
                 step: self.arm.steps + 1,
                 time: self.arm.time(),
             });
         }
-        if taken + u64::from(diverged) > self.pushes {
+        if self.taken + u64::from(diverged) > self.pushes {
             self.arm.disturbance = None;
         }
     }

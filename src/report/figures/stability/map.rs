@@ -6,7 +6,7 @@ use super::line::{Meter, stiffened};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
-use crate::report::experiments::measure::{STEPS, growth};
+use crate::report::experiments::measure::{STEPS, growths};
 use crate::report::making::Making;
 use crate::report::section::Figure;
 use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Plot, Point, Unit, seconds};
@@ -70,8 +70,15 @@ impl Map {
             ),
         );
         let (mut rows, mut line, mut disagreeing) = (Vec::new(), Vec::new(), Vec::new());
-        for factor in centres(&self.factors) {
-            let (limit, row) = self.row(factor, method, sampling, &mut disagreeing);
+        let (factors, timesteps) = (centres(&self.factors), centres(&self.timesteps));
+        let cells = factors.iter().flat_map(|factor| {
+            let control = stiffened(*factor).with_method(method);
+            let timesteps = timesteps.iter();
+            timesteps.map(move |h| control.with_timestep(*h))
+        });
+        let measured = growths(&cells.collect::<Vec<_>>(), sampling);
+        for (factor, measured) in factors.into_iter().zip(measured.chunks(timesteps.len())) {
+            let (limit, row) = self.row(factor, method, sampling, measured, &mut disagreeing);
             line.push((limit, factor));
             rows.push(row);
             meter.add(making, 1);
@@ -93,20 +100,20 @@ impl Map {
         self.plots.push(plot);
     }
 
-    /// Predicted limit and measured levels of one stiffness.
+    /// Predicted limit and levels of one stiffness, by the growths that were measured.
     fn row(
         &mut self,
         factor: f64,
         method: Method,
         sampling: Sampling,
+        measured: &[Option<f64>],
         disagreeing: &mut Vec<Point>,
     ) -> (f64, Vec<i8>) {
         let control = stiffened(factor).with_method(method);
         let linear = Linear::at_setpoint(&control);
         let limit = largest_timestep(&linear, method, sampling).unwrap_or(f64::INFINITY);
         let mut row = Vec::new();
-        for h in centres(&self.timesteps) {
-            let growth = growth(&control.with_timestep(h), sampling);
+        for (h, &growth) in centres(&self.timesteps).into_iter().zip(measured) {
             self.csv.row(&[
                 sampling.name().into(),
                 method.name().into(),

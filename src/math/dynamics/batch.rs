@@ -1,0 +1,145 @@
+//! Accelerations of one arm in many states, a lane of the machine's registers for each.
+//!
+//! Numbers come and go in columns, a slice per joint, which registers are filled from without a shuffle.
+//!
+//! **Invariant:** every state has the bits that [`super::forward_dynamics`] gives it, whichever stand beside it.
+
+#![allow(
+    clippy::indexing_slicing,
+    reason = "joints run over 0..N of arrays that have N elements, states over those that every column has"
+)]
+
+use fearless_simd::{Simd, SimdBase, dispatch};
+
+use super::recursion;
+use crate::math::arm::{Arm, Rod};
+use crate::math::number::{Arithmetic, Number, Registers, Wide, entries};
+
+/// A column per joint: entry `k` of each is of state `k`.
+pub type Columns<'a, const N: usize> = [&'a [f64]; N];
+
+impl Registers {
+    /// [`forward_dynamics`] in these.
+    pub fn forward_dynamics<const N: usize>(
+        self,
+        arm: &Arm<N>,
+        q: Columns<'_, N>,
+        qd: Columns<'_, N>,
+        tau: Columns<'_, N>,
+        mut qdd: [&mut [f64]; N],
+    ) {
+        let given = [q, qd, tau];
+        let lengths = given.iter().flatten().map(|column| column.len());
+        let count = lengths.chain(qdd.iter().map(|column| column.len())).min();
+        let count = count.unwrap_or(0);
+        let given = given.map(|columns| columns.map(|column| &column[..count]));
+        let mut qdd = qdd.each_mut().map(|column| &mut column[..count]);
+        if count < 2 * self.lanes() {
+            alone(arm, given, &mut qdd, count);
+        } else {
+            dispatch!(self.level(), simd => in_registers(simd, arm, given, &mut qdd, count));
+        }
+    }
+}
+
+/// Joint accelerations \[rad/s²\] at positions `q` \[rad\] and rates `qd` \[rad/s\] under the efforts `tau` \[N m\], of as
+/// many states as the shortest column has entries; longer columns of `qdd` keep the rest of theirs.
+///
+/// Never panics, and is as finite as [`super::forward_dynamics`].
+///
+/// ```
+/// use pendularm::math::{arm::Arm, dynamics::batch};
+///
+/// let (q, qd, tau) = ([0.3; 100], [0.0; 100], [1.0; 100]);
+/// let (mut first, mut second) = ([0.0; 100], [0.0; 100]);
+/// batch::forward_dynamics(
+///     &Arm::<2>::default(),
+///     [&q, &q],
+///     [&qd, &qd],
+///     [&tau, &tau],
+///     [&mut first, &mut second],
+/// );
+/// assert!(first.iter().all(|acceleration| *acceleration < 0.0));
+/// ```
+pub fn forward_dynamics<const N: usize>(
+    arm: &Arm<N>,
+    q: Columns<'_, N>,
+    qd: Columns<'_, N>,
+    tau: Columns<'_, N>,
+    qdd: [&mut [f64]; N],
+) {
+    Registers::widest().forward_dynamics(arm, q, qd, tau, qdd);
+}
+
+/// Too few states to fill the registers, one by one.
+fn alone<const N: usize>(
+    arm: &Arm<N>,
+    given: [Columns<'_, N>; 3],
+    qdd: &mut [&mut [f64]; N],
+    count: usize,
+) {
+    for at in 0..count {
+        let [q, qd, tau] = given.map(|columns| columns.map(|column| column[at]));
+        let accelerations = super::forward_dynamics(arm, &q, &qd, &tau);
+        for (column, acceleration) in qdd.iter_mut().zip(accelerations) {
+            column[at] = acceleration;
+        }
+    }
+}
+
+/// As many registers at a time as there is room for: a second one hides what the first waits for, and costs more than that
+/// where there are 16.
+#[inline(always)]
+fn in_registers<S: Simd, const N: usize>(
+    simd: S,
+    arm: &Arm<N>,
+    given: [Columns<'_, N>; 3],
+    qdd: &mut [&mut [f64]; N],
+    count: usize,
+) {
+    if S::f64s::LEN >= 8 {
+        together::<S, 2, N>(simd, arm, given, qdd, count);
+    } else {
+        together::<S, 1, N>(simd, arm, given, qdd, count);
+    }
+}
+
+/// States from the first on. The last registers begin earlier where the states do not fill them, and take some a second
+/// time.
+#[inline(always)]
+fn together<S: Simd, const K: usize, const N: usize>(
+    simd: S,
+    arm: &Arm<N>,
+    [q, qd, tau]: [Columns<'_, N>; 3],
+    qdd: &mut [&mut [f64]; N],
+    count: usize,
+) {
+    let lanes = Wide::<S, K>::LANES;
+    let zero = Wide::<S, K>::splat(simd, 0.0);
+    let gravity = zero.like(arm.gravity);
+    let rods = entries!(in_lanes(&arm.rods[0], zero), i => in_lanes(&arm.rods[i], zero));
+    let mut next = 0;
+    while next < count {
+        let at = next.min(count - lanes);
+        let q = entries!(zero, i => Wide::<S, K>::load(simd, &q[i][at..]));
+        let qd = entries!(zero, i => Wide::<S, K>::load(simd, &qd[i][at..]));
+        let tau = entries!(zero, i => Wide::<S, K>::load(simd, &tau[i][at..]));
+        let accelerations = recursion::<Wide<S, K>, N, true>(&rods, &gravity, &q, &qd, &tau);
+        for i in 0..N {
+            accelerations[i].store(&mut qdd[i][at..]);
+        }
+        next += lanes;
+    }
+}
+
+/// A rod that is the same in all lanes.
+#[inline(always)]
+fn in_lanes<T: Number>(rod: &Rod, any: T) -> Rod<T> {
+    Rod {
+        length: any.like(rod.length),
+        beyond: any.like(rod.beyond),
+        mass_ratio: any.like(rod.mass_ratio),
+        per_length: any.like(rod.per_length),
+        per_mass_length: any.like(rod.per_mass_length),
+    }
+}

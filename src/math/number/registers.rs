@@ -1,0 +1,57 @@
+//! The registers that this machine has.
+
+use std::sync::OnceLock;
+
+use fearless_simd::{Level, Simd, dispatch};
+
+use super::register::Wide;
+
+/// Registers of one width, whose lanes arms or states share.
+#[derive(Debug, Clone, Copy)]
+pub struct Registers(Level);
+
+impl Registers {
+    /// The widest that there are.
+    #[must_use]
+    pub fn widest() -> Self {
+        // Asked of the processor once.
+        static LEVEL: OnceLock<Level> = OnceLock::new();
+        Self(*LEVEL.get_or_init(Level::new))
+    }
+
+    /// All that there are, the widest first; what is reckoned in any of them is the same.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let widest = Self::widest();
+        #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+        let narrower = [
+            widest.0.as_avx2().map(Simd::level),
+            widest.0.as_sse4_2().map(Simd::level),
+        ];
+        #[cfg(not(any(target_arch = "x86", target_arch = "x86_64")))]
+        let narrower: [Option<Level>; 0] = [];
+        let mut all = vec![widest];
+        for one in narrower.into_iter().flatten().map(Self) {
+            if all.iter().all(|other| other.lanes() != one.lanes()) {
+                all.push(one);
+            }
+        }
+        all
+    }
+
+    /// How many numbers one has.
+    #[must_use]
+    pub fn lanes(self) -> usize {
+        dispatch!(self.0, simd => lanes_of(simd))
+    }
+
+    /// What the library of registers knows them as.
+    pub(in crate::math) fn level(self) -> Level {
+        self.0
+    }
+}
+
+#[inline(always)]
+fn lanes_of<S: Simd>(_: S) -> usize {
+    Wide::<S, 1>::WIDTH
+}

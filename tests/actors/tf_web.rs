@@ -1,0 +1,135 @@
+//! Frames for web viewers in virtual time: who gets which, how often, and until when.
+//!
+//! **Invariant:** virtual time, so messages are counted.
+
+use crate::stage::{Client, Stage, in_virtual_time, ms, number};
+use pendularm::actors::ros::tf_web::MAX_WISHES;
+use serde_json::{Value, json};
+
+const ACTION: &str = "/tf2_web_republisher";
+
+fn wish(target: &str, sources: &[&str], rate: f64) -> Value {
+    json!({"source_frames": sources, "target_frame": target, "rate": rate})
+}
+
+async fn send_goal(client: &mut Client, id: &str, args: Value) {
+    client
+        .send(
+            &json!({"op": "send_action_goal", "id": id, "action": ACTION, "args": args, "feedback": true,
+                "action_type": "tf2_web_republisher_interfaces/TFSubscription"}),
+        )
+        .await;
+}
+
+async fn with_op(client: &mut Client, op: &str) -> Value {
+    client.next_where(|frame| frame["op"] == op).await
+}
+
+/// Name and x of each frame.
+fn frames(message: &Value) -> Vec<(&str, f64)> {
+    let transforms = message["transforms"].as_array().unwrap().iter();
+    let named = transforms.map(|one| {
+        let x = number(&one["transform"]["translation"]["x"]);
+        (one["child_frame_id"].as_str().unwrap(), x)
+    });
+    named.collect()
+}
+
+#[test]
+fn a_goal_has_its_frames_at_its_rate_until_it_is_cancelled() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        send_goal(&mut client, "a", wish("link2", &["hand", "world"], 10.0)).await;
+        let feedback = with_op(&mut client, "action_feedback").await;
+        assert_eq!(feedback["id"], "a");
+        let expected = [("hand", 1.0), ("world", -1.0)];
+        assert_eq!(frames(&feedback["values"]), expected);
+        client.heard.clear();
+        client.messages_for(ms(3000), "").await;
+        let told = client.heard.iter();
+        let told = told
+            .filter(|frame| frame["op"] == "action_feedback")
+            .count();
+        // Looks come 60 times a second: one in seven is a tenth of a second after the last message.
+        assert!((25..=30).contains(&told), "{told}");
+        client
+            .send(&json!({"op": "cancel_action_goal", "id": "a", "action": ACTION}))
+            .await;
+        let end = with_op(&mut client, "action_result").await;
+        assert_eq!((&end["id"], &end["status"]), (&json!("a"), &json!(5)));
+        client.heard.clear();
+        client.messages_for(ms(1000), "").await;
+        assert!(client.heard.is_empty(), "{:?}", client.heard);
+    });
+}
+
+#[test]
+fn of_too_many_goals_the_oldest_ends_and_the_others_go_on() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        for n in 0..MAX_WISHES {
+            send_goal(&mut client, &n.to_string(), wish("world", &["hand"], 1.0)).await;
+        }
+        client.settle().await;
+        let ended = |client: &Client| {
+            let ends = client.heard.iter();
+            let ends = ends.filter(|frame| frame["op"] == "action_result");
+            ends.map(|end| (end["id"].clone(), end["status"].clone()))
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(ended(&client), [], "there is room for all of them");
+        send_goal(&mut client, "one more", wish("world", &["hand"], 1.0)).await;
+        client.settle().await;
+        assert_eq!(ended(&client), [(json!("0"), json!(6))]);
+    });
+}
+
+#[test]
+fn the_topic_has_every_frame_thirty_times_a_second_while_somebody_subscribes() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let named = client.ask("/republish_tfs", wish("world", &["hand"], 5.0));
+        let named = named.await["topic_name"].clone();
+        let topic = named.as_str().unwrap();
+        client.subscribe(topic).await;
+        let told = client.messages_for(ms(3000), topic).await;
+        assert!((85..=91).contains(&told.len()), "{}", told.len());
+        let expected = [("link1", 0.0), ("link2", 1.0), ("hand", 2.0)];
+        assert_eq!(frames(&told[0]), expected);
+        client.unsubscribe(topic).await;
+        assert_eq!(client.messages_for(ms(1000), topic).await.len(), 0);
+    });
+}
+
+#[test]
+fn a_published_goal_has_its_frames_under_its_id_until_it_is_cancelled_or_nobody_hears_of_it() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (goal, feedback) = (format!("{ACTION}/goal"), format!("{ACTION}/feedback"));
+        let publish = |id: &str| {
+            let msg = json!({"goal_id": {"id": id}, "goal": wish("world", &["link2"], 10.0)});
+            json!({"op": "publish", "topic": goal, "msg": msg})
+        };
+        client.subscribe(&feedback).await;
+        for id in ["first", "second"] {
+            client.send(&publish(id)).await;
+        }
+        let ids = |told: &[Value]| {
+            let ids = told.iter().map(|one| &one["status"]["goal_id"]["id"]);
+            ["first", "second"].map(|id| ids.clone().filter(|one| *one == id).count())
+        };
+        let told = client.messages_for(ms(1000), &feedback).await;
+        assert!(ids(&told).iter().all(|count| *count >= 8), "{told:?}");
+        assert_eq!(frames(&told[0]["feedback"]), [("link2", 1.0)]);
+        client
+            .send(&json!({"op": "publish", "topic": format!("{ACTION}/cancel"), "msg": {"id": "first"}}))
+            .await;
+        client.settle().await;
+        let told = client.messages_for(ms(1000), &feedback).await;
+        let [first, second] = ids(&told);
+        assert!(first == 0 && second >= 8, "{told:?}");
+        client.unsubscribe(&feedback).await;
+        client.subscribe(&feedback).await;
+        assert_eq!(client.messages_for(ms(1000), &feedback).await.len(), 0);
+    });
+}
