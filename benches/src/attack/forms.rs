@@ -1,6 +1,8 @@
 //! Aimed at the forms in which subscribers want messages: each form is made of the text for itself, and some are made
 //! by reading it.
 
+use std::time::Duration;
+
 use super::Attack;
 use super::script::{Client, each, filler, publish, subscribe};
 
@@ -71,18 +73,21 @@ fn sizes(
     further: impl Fn(usize) -> String,
     msg: &str,
 ) -> Vec<Client> {
-    let frame = publish("/attack/sizes", msg);
-    let pause = std::time::Duration::from_millis(500);
-    let publisher = Client::tcp()
-        .advertises("/attack/sizes")
-        .repeats(&frame)
-        .drips(frame.len() + 1, pause)
-        .after(300);
     let mut clients = each(0..count, |k| {
         door().says(&subscribe("/attack/sizes", &further(k)))
     });
-    clients.push(publisher);
+    clients.push(publisher("/attack/sizes", msg));
     clients
+}
+
+/// Two messages a second.
+fn publisher(topic: &str, msg: &str) -> Client {
+    let frame = publish(topic, msg);
+    Client::tcp()
+        .advertises(topic)
+        .repeats(&frame)
+        .drips(frame.len() + 1, Duration::from_millis(500))
+        .after(300)
 }
 
 fn text(bytes: usize) -> String {
@@ -133,19 +138,12 @@ fn deep_cbor() -> Vec<Client> {
 fn two_deep_cbor() -> Vec<Client> {
     let further = r#","compression":"cbor""#;
     let topics = ["/attack/one", "/attack/two"];
-    let msg = deep();
-    let publishers = topics.map(|topic| {
-        Client::tcp()
-            .advertises(topic)
-            .repeats(&publish(topic, &msg))
-            .after(300)
-    });
     let mut clients = each(0..20, |k| {
         let topic = topics[k % 2];
         let spelling = if k % 4 < 2 { topic } else { &topic[1..] };
         Client::web().says(&subscribe(spelling, further))
     });
-    clients.extend(publishers.into_iter().flat_map(|one| one.times(1)));
+    clients.extend(topics.map(|topic| publisher(topic, &deep())));
     clients
 }
 
