@@ -37,7 +37,7 @@ enum TreeNode<'a> {
 /// The length of an array or object.
 #[derive(Debug, Clone, Copy)]
 struct Extent {
-    /// BranchEntries or members.
+    /// Entries or members.
     count: usize,
     /// Nodes, its own included.
     nodes: usize,
