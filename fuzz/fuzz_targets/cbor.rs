@@ -38,11 +38,11 @@ fn check(input: &[u8]) {
     let &[kind, ref text @ ..] = input else {
         return;
     };
-    let read = MessageTree::read(text);
+    let tree = MessageTree::read(text);
     let Ok(msg) = serde_json::from_slice::<Value>(text) else {
-        return assert!(read.is_err(), "no JSON");
+        return assert!(tree.is_err(), "no JSON");
     };
-    let tree = read.expect("JSON");
+    let tree = tree.expect("JSON");
     assert!(tree.allocated() <= MessageTree::room(text));
     let known: Vec<&str> = types::all().map(|one| one.name).collect();
     let name = known.get(usize::from(kind)).copied();

@@ -102,8 +102,8 @@ FAULTS = [
     ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments.rs",
      "    let total = pieces.len();", "    let total = pieces.len();\n    if R(10) { pieces.swap(0, total - 1); }"),
     ("a number has another last bit in CBOR, one in 50", "src/protocol/ros/cbor.rs",
-     "    out.extend_from_slice(&value.to_be_bytes());",
-     "    out.extend_from_slice(&f64::from_bits(value.to_bits() ^ u64::from(R(50))).to_be_bytes());"),
+     "    out.extend(&value.to_be_bytes());",
+     "    out.extend(&f64::from_bits(value.to_bits() ^ u64::from(R(50))).to_be_bytes());"),
     ("one client's mistake is told to another, one in 10", f"{REGISTRY}/state.rs",
      "        if let Some(client) = self.clients.get(&to)\n            && client.verbosity.wants(level)",
      "        let other = if R(10) { self.clients.keys().find(|id| **id != to).copied() } else { None };\n"
