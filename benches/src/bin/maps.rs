@@ -11,8 +11,7 @@ use std::time::Instant;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::{energy, potential_energy};
 use pendularm::math::integrator::Method;
-use pendularm::math::pid::{Gains, Setpoint};
-use pendularm::report::experiments::measure::{growth, growths};
+use pendularm::report::experiments::measure::{growth, growths, stiffened};
 use pendularm::report::experiments::nonlinear::{are_carried, arrive, move_of, spun};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::stability::Sampling;
@@ -22,16 +21,6 @@ fn centres(least: f64, most: f64, cells: u32) -> Vec<f64> {
     let part = |cell| (f64::from(cell) + 0.5) / f64::from(cells);
     let centre = |cell| least * (most / least).powf(part(cell));
     (0..cells).map(centre).collect()
-}
-
-fn stiffened(factor: f64) -> ControlLoop<2> {
-    let Gains { kp, ki, kd } = Gains::<2>::default();
-    let gains = Gains {
-        kp: kp.map(|kp| kp * factor),
-        ki: ki.map(|ki| ki * factor.powf(1.5)),
-        kd: kd.map(|kd| kd * factor.sqrt()),
-    };
-    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
 /// As [`are_carried`] of one swing, whose arm is stepped alone.

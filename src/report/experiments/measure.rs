@@ -16,9 +16,9 @@
 use std::ops::ControlFlow;
 
 use super::sampled::SampledLoop;
-use crate::math::arm::State;
+use crate::math::arm::{Arm, State};
 use crate::math::dynamics::mass_matrix;
-use crate::math::pid::Setpoint;
+use crate::math::pid::{Gains, Setpoint};
 use crate::math::simulation::{Simulation, batch};
 use crate::study::continuous::ContinuousLoop;
 use crate::study::control_loop::ControlLoop;
@@ -77,6 +77,18 @@ pub fn measured_period<const N: usize>(
 #[must_use]
 pub fn decays<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> bool {
     growth(control, sampling).is_some_and(|growth| growth < 1.0)
+}
+
+/// The 2-link arm with the default gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
+#[must_use]
+pub fn stiffened(factor: f64) -> ControlLoop<2> {
+    let Gains { kp, ki, kd } = Gains::<2>::default();
+    let gains = Gains {
+        kp: kp.map(|kp| kp * factor),
+        ki: ki.map(|ki| ki * factor.powf(1.5)),
+        kd: kd.map(|kd| kd * factor.sqrt()),
+    };
+    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
 /// Largest energy of the deviation in the last eighth of the steps, per largest in the second eighth: in the first,

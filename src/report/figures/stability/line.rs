@@ -2,11 +2,8 @@
 //!
 //! **Invariant:** a limit that was not measured is said to be none, not guessed.
 
-use crate::math::arm::Arm;
 use crate::math::integrator::Method;
-use crate::math::pid::{Gains, Setpoint};
 use crate::report::making::Making;
-use crate::study::control_loop::ControlLoop;
 use crate::study::stability::Sampling;
 
 /// Measured and predicted limits may differ by this part.
@@ -57,17 +54,6 @@ pub(super) fn capital(words: &str) -> String {
     letters.next().map_or_else(String::new, |first| {
         first.to_uppercase().chain(letters).collect()
     })
-}
-
-/// The 2-link arm with the default gains stiffened by `factor`: kp by it, kd by its root, ki by its power of 3/2.
-pub(super) fn stiffened(factor: f64) -> ControlLoop<2> {
-    let Gains { kp, ki, kd } = Gains::<2>::default();
-    let gains = Gains {
-        kp: kp.map(|kp| kp * factor),
-        ki: ki.map(|ki| ki * factor.powf(1.5)),
-        kd: kd.map(|kd| kd * factor.sqrt()),
-    };
-    ControlLoop::new(Arm::default(), gains, Setpoint::at([0.4, 0.8]))
 }
 
 /// The line of the 2-link arm with its default gains.

@@ -2,11 +2,11 @@
 //!
 //! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
 
-use super::line::{Meter, stiffened};
+use super::line::Meter;
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
-use crate::report::experiments::measure::{STEPS, growths};
+use crate::report::experiments::measure::{STEPS, growths, stiffened};
 use crate::report::making::Making;
 use crate::report::section::Figure;
 use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Plot, Point, Unit, seconds};

@@ -10,7 +10,7 @@ mod regions;
 mod tables;
 mod words;
 
-use line::{LimitRow, Meter, stiffened};
+use line::{LimitRow, Meter};
 use map::map;
 use period::{growth, period_table, periods};
 use radius::radius_figure;
@@ -21,7 +21,7 @@ use words::{findings, verdicts};
 use crate::math::arm::Arm;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::report::experiments::measure::measured_limit;
+use crate::report::experiments::measure::{measured_limit, stiffened};
 use crate::report::making::Making;
 use crate::report::section::{Block, Section};
 use crate::study::control_loop::ControlLoop;

@@ -2,11 +2,11 @@
 //!
 //! **Invariant:** what takes too long to measure is called not measured.
 
-use super::line::{Meter, stiffened};
+use super::line::Meter;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::growth::growth_per_period;
-use crate::report::experiments::measure::measured_period;
+use crate::report::experiments::measure::{measured_period, stiffened};
 use crate::report::making::Making;
 use crate::report::section::{Cell, Figure, Table};
 use crate::report::svg::{Axis, Curve, Key, Mark, Marker, Plot, Point, Unit, number, seconds};

@@ -2,9 +2,10 @@
 //!
 //! **Invariant:** lines are predicted, marks are measured.
 
-use super::line::{LimitRow, capital, in_words, stiffened, with_default_gains};
+use super::line::{LimitRow, capital, in_words, with_default_gains};
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
+use crate::report::experiments::measure::stiffened;
 use crate::report::section::Figure;
 use crate::report::svg::{Axis, Curve, Key, Mark, Marker, Plot, Point, Unit, seconds};
 use crate::study::linear::Linear;
