@@ -67,6 +67,7 @@ for variant in step-2-rk4-free particle-rk4-constant; do
     valgrind --tool=callgrind --callgrind-out-file="$scratch/functions" "$target/release/work" "$variant" $count >/dev/null 2>&1
     put "arm-in-$variant" "$(awk "BEGIN { print $(of_functions 'Simulation|dynamics|articulated_body|work::step' "$scratch/functions") / $count }")" "instructions per step"
 done
+grep -q '^arm-in-step-2-rk4-free,0,' "$scratch/work.csv" && { echo "measure-work: the arm's functions have other names now" >&2; exit 1; }
 
 # The counting allocator's own words: "2 links, rk4 PID true 1000000 steps 0 allocations".
 "$target/release/allocations" >"$scratch/allocations"

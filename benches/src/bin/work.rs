@@ -14,6 +14,8 @@ use pendularm::math::particle::Particle;
 use pendularm::math::pid::Gains;
 use pendularm::report::experiments::step_scene::{ready, undamped};
 
+// A function of its own, so that the counts of the arm's code are found by its name however much is inlined into it.
+#[inline(never)]
 fn step<const N: usize>(method: Method, what: &str, count: u64)
 where
     Gains<N>: Default,
@@ -32,6 +34,7 @@ where
     black_box(simulation.state());
 }
 
+#[inline(never)]
 fn particle(method: Method, function: &str, count: u64) {
     let function = Expression::parse(function).expect("a function");
     let mut particle =
