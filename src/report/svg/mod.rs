@@ -205,7 +205,12 @@ impl Key {
     }
 }
 
-/// Panels and legend as one file: a grid `columns` wide, with its style inside.
+/// Between a sheet's edge and its text [px].
+const MARGIN: f64 = 14.0;
+/// A letter of a heading is no wider on average in the widest of the usual fonts [px].
+const LETTER: f64 = 10.4;
+
+/// Panels and legend as one file: a grid `columns` wide, with its style inside. Heading and legend take as many lines as they need.
 pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
     let columns = match panels.len() {
         few @ 0..=2 => few.max(1),
@@ -213,27 +218,37 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
         _ => 3,
     };
     let rows = panels.len().div_ceil(columns);
-    let header = 62.0;
-    let (width, height) = (
-        WIDTH * length_in_f64(columns),
-        HEIGHT * length_in_f64(rows) + header,
-    );
-    let mut out = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
-         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>\
-         <text class=\"heading\" x=\"14\" y=\"26\">{}</text>",
-        escape(title)
-    );
-    let mut x = 14.0;
+    let width = WIDTH * length_in_f64(columns);
+    let mut head = String::new();
+    let mut bottom = 4.0;
+    for line in lines(title, width - 2.0 * MARGIN) {
+        bottom += 22.0;
+        let _ = write!(
+            head,
+            "<text class=\"heading\" x=\"{MARGIN}\" y=\"{bottom}\">{}</text>",
+            escape(&line)
+        );
+    }
+    let (mut x, mut y) = (MARGIN, bottom + 14.0);
     for key in legend {
+        let entry = 52.0 + 6.6 * length_in_f64(key.label.chars().count());
+        if x > MARGIN && x + entry > width {
+            (x, y) = (MARGIN, y + 18.0);
+        }
         let swatch = key.swatch();
         let _ = write!(
-            out,
-            "<g transform=\"translate({x} 40)\">{swatch}<text class=\"label\" x=\"34\" y=\"10\">{}</text></g>",
+            head,
+            "<g transform=\"translate({x} {y})\">{swatch}<text class=\"label\" x=\"34\" y=\"10\">{}</text></g>",
             escape(&key.label)
         );
-        x += 52.0 + 6.6 * length_in_f64(key.label.chars().count());
+        x += entry;
     }
+    let header = y + 22.0;
+    let height = HEIGHT * length_in_f64(rows) + header;
+    let mut out = format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {width} {height}\" width=\"{width}\" \
+         height=\"{height}\"><style>{STYLE}</style><rect class=\"paper\" width=\"100%\" height=\"100%\"/>{head}"
+    );
     for (index, panel) in panels.iter().enumerate() {
         let (x, y) = (
             WIDTH * length_in_f64(index % columns),
@@ -250,10 +265,51 @@ pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
     out
 }
 
+/// A heading's words in lines of at most `room` pixels; a word that is longer stands alone.
+fn lines(heading: &str, room: f64) -> Vec<String> {
+    let mut lines = Vec::new();
+    let mut line = String::new();
+    for word in heading.split_whitespace() {
+        let length = line.chars().count() + 1 + word.chars().count();
+        if !line.is_empty() && LETTER * length_in_f64(length) > room {
+            lines.push(std::mem::take(&mut line));
+        }
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.push_str(word);
+    }
+    lines.push(line);
+    lines
+}
+
 /// Text for use between tags and in attributes.
 pub(crate) fn escape(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('>', "&gt;")
         .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LETTER, length_in_f64, lines};
+
+    #[test]
+    fn a_heading_takes_as_many_lines_as_it_needs_and_loses_no_word() {
+        let heading =
+            "With the effort held, midpoint, Verlet and RK4 go unstable at the same timestep";
+        for room in [100.0, 400.0, 812.0, 5000.0] {
+            let lines = lines(heading, room);
+            assert_eq!(lines.join(" "), heading);
+            for line in &lines {
+                let alone = !line.contains(' ');
+                assert!(
+                    alone || LETTER * length_in_f64(line.chars().count()) <= room,
+                    "{line}"
+                );
+            }
+        }
+        assert_eq!(lines(heading, 5000.0).len(), 1);
+    }
 }
