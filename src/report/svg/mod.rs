@@ -210,7 +210,8 @@ const MARGIN: f64 = 14.0;
 /// A letter of a heading is no wider on average in the widest of the usual fonts [px].
 const LETTER: f64 = 10.4;
 
-/// Panels and legend as one file: a grid `columns` wide, with its style inside. Heading and legend take as many lines as they need.
+/// Panels and legend as one file: a grid `columns` wide, with its style inside.
+/// Heading and legend take as many lines as they need.
 pub(crate) fn sheet(title: &str, legend: &[Key], panels: &[String]) -> String {
     let columns = match panels.len() {
         few @ 0..=2 => few.max(1),
