@@ -205,9 +205,9 @@ impl Key {
     }
 }
 
-/// Between a sheet's edge and its text [px].
+/// Between a sheet's edge and its text in pixels.
 const MARGIN: f64 = 14.0;
-/// A letter of a heading is no wider on average in the widest of the usual fonts [px].
+/// A letter of a heading is no wider on average in the widest of the usual fonts, in pixels.
 const LETTER: f64 = 10.4;
 
 /// Panels and legend as one file: a grid `columns` wide, with its style inside.
