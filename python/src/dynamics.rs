@@ -3,7 +3,7 @@
 //! **Invariant:** the numbers are those of the functions that step the live arm; nothing is reckoned a second time.
 
 use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
-use pendularm::math::{dynamics, kinematics};
+use pendularm::math::{self, dynamics, kinematics};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
@@ -23,6 +23,9 @@ enum Shape {
     Square,
 }
 
+/// States that go into the machine's registers in one go: their columns stay in the fastest of its caches.
+const BLOCK: usize = 64;
+
 /// Applies `function` to every row of the fields; a field of one row goes with every row of the others. The number `N`
 /// of links is that of the arm which `function` asks.
 fn each_row<'py, const N: usize, const K: usize>(
@@ -30,6 +33,20 @@ fn each_row<'py, const N: usize, const K: usize>(
     fields: [(&str, &Object<'py>); K],
     answer: Shape,
     function: impl Fn([[f64; N]; K], &mut Vec<f64>),
+) -> PyResult<Object<'py>> {
+    all_rows::<N, K>(py, fields, answer, |rows, count, out| {
+        for index in 0..count {
+            function(rows.each_ref().map(|row| row.row(index)), out);
+        }
+    })
+}
+
+/// As [`each_row`], with a `function` that takes all rows at once, and how many there are.
+fn all_rows<'py, const N: usize, const K: usize>(
+    py: Python<'py>,
+    fields: [(&str, &Object<'py>); K],
+    answer: Shape,
+    function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>),
 ) -> PyResult<Object<'py>> {
     let mut given = Vec::with_capacity(K);
     for (field, value) in fields {
@@ -48,9 +65,7 @@ fn each_row<'py, const N: usize, const K: usize>(
         .map_err(|_| refused("as many rows as fields"))?;
     let is_one = rows.iter().all(|row| row.count().is_none());
     let mut flat = Vec::new();
-    for index in 0..count.unwrap_or(1) {
-        function(rows.each_ref().map(|row| row.row(index)), &mut flat);
-    }
+    function(&rows, count.unwrap_or(1), &mut flat);
     let mut shape: Vec<usize> = count.filter(|_| !is_one).into_iter().collect();
     match answer {
         Shape::One => {}
@@ -129,10 +144,39 @@ pub(crate) fn forward_dynamics<'py>(
 ) -> PyResult<Object<'py>> {
     for_either!(Chain, &arm.get().chain, arm => {
         let fields = [("q", &q), ("qd", &qd), ("effort", &effort)];
-        each_row(py, fields, Shape::Joints, |[q, qd, effort], out| {
-            out.extend(dynamics::forward_dynamics(arm, &q, &qd, &effort));
+        all_rows(py, fields, Shape::Joints, |rows, count, out| {
+            forward_dynamics_of_rows(arm, rows, count, out);
         })
     })
+}
+
+/// Appends the accelerations of `count` rows of positions, rates and efforts, a block in registers at a time.
+fn forward_dynamics_of_rows<const N: usize>(
+    arm: &math::arm::Arm<N>,
+    rows: &[Rows<'_>; 3],
+    count: usize,
+    out: &mut Vec<f64>,
+) {
+    let mut given = [[[0.0; BLOCK]; N]; 3];
+    let mut found = [[0.0; BLOCK]; N];
+    out.reserve(count * N);
+    for start in (0..count).step_by(BLOCK) {
+        let block = start..count.min(start + BLOCK);
+        for (columns, rows) in given.iter_mut().zip(rows) {
+            for (at, index) in block.clone().enumerate() {
+                let row: [f64; N] = rows.row(index);
+                for (column, value) in columns.iter_mut().zip(row) {
+                    column[at] = value;
+                }
+            }
+        }
+        let [q, qd, effort] = given
+            .each_ref()
+            .map(|columns| columns.each_ref().map(|column| &column[..block.len()]));
+        let qdd = found.each_mut().map(|column| &mut column[..]);
+        dynamics::batch::forward_dynamics(arm, q, qd, effort, qdd);
+        out.extend((0..block.len()).flat_map(|at| found.each_ref().map(|column| column[at])));
+    }
 }
 
 /// The effort [N m] that gives the accelerations `qdd` [rad/s²] at `q` [rad] and `qd` [rad/s], each of shape (links,)

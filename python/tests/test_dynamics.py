@@ -52,6 +52,12 @@ def test_many_states_are_as_many_single_ones(links):
         together = function(arm, *fields)
         singly = [function(arm, *row) for row in zip(*fields, strict=True)]
         assert together.tolist() == np.array(singly).tolist()
+    # So many that they fill the machine's registers, in more than one go and with a rest.
+    many = [random.uniform(-3, 3, (1003, links)) for _ in range(3)]
+    together = dynamics.forward_dynamics(arm, *many)
+    singly = [dynamics.forward_dynamics(arm, *row) for row in zip(*many, strict=True)]
+    assert together.tolist() == np.array(singly).tolist()
+    assert dynamics.forward_dynamics(arm, *(np.empty((0, links)),) * 3).shape == (0, links)
     # One row goes with every row of the others.
     assert dynamics.coriolis(arm, q[0], qd).tolist() == dynamics.coriolis(arm, [q[0]] * 9, qd).tolist()
 

@@ -24,10 +24,10 @@ use std::time::{Duration, Instant};
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
-use pendularm::math::integrator::Method;
+use pendularm::math::integrator::{Method, increment};
 use pendularm::math::number::Registers;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::{Simulation, step_under};
+use pendularm::math::simulation::Simulation;
 use pendularm_benches::random::spread;
 
 // As in harness.h, which says what they mean.
@@ -102,6 +102,8 @@ fn start<const N: usize>() -> State<N> {
     }
 }
 
+/// A step of an arm that is known to have weight, as the peers' is: nobody asks at each step what may be left out of it.
+#[inline(always)]
 fn step<const N: usize>(
     arm: &Arm<N>,
     method: Method,
@@ -109,7 +111,23 @@ fn step<const N: usize>(
     state: &mut State<N>,
     h: f64,
 ) {
-    *state = state.plus(&step_under(arm, method, state, effort, h));
+    let State { position, velocity } = state;
+    let moved = if method == Method::Euler {
+        // Within the loop, as in `step_under`.
+        increment(
+            method,
+            #[inline(always)]
+            |_, q: &[f64; N], qd: &[f64; N]| forward_dynamics(arm, q, qd, effort),
+            0.0,
+            position,
+            velocity,
+            h,
+        )
+    } else {
+        let acceleration = |_, q: &[f64; N], qd: &[f64; N]| forward_dynamics(arm, q, qd, effort);
+        increment(method, acceleration, 0.0, position, velocity, h)
+    };
+    *state = state.plus(&moved);
 }
 
 fn gains<const N: usize>() -> Gains<N> {
@@ -250,22 +268,13 @@ fn time<const N: usize>(path: &str) {
         }
         state
     });
-    for method in [Method::Euler, Method::Rk4].map(black_box) {
-        measure::<N, _>(&format!("{method} step"), || {
-            let mut state = black_box(start());
-            for _ in 0..CALLS {
-                step(&arm, method, &effort, &mut state, h);
-            }
-            state
-        });
-        let mut results: Vec<State<N>> = vec![start(); CALLS];
-        measure::<N, _>(&format!("{method} step, independent"), || {
-            for ((state, effort), result) in black_box(&cases).iter().zip(black_box(&mut results)) {
-                *result = *state;
-                step(&arm, method, effort, result, h);
-            }
-        });
-    }
+    // With its method written into the loop, as in the peers' programs.
+    time_steps(&cases, "euler", |effort, state| {
+        step(&arm, Method::Euler, effort, state, h);
+    });
+    time_steps(&cases, "rk4", |effort, state| {
+        step(&arm, Method::Rk4, effort, state, h);
+    });
     for method in [Method::Euler, Method::Rk4] {
         measure::<N, _>(&format!("{method} step, live"), || {
             let mut simulation = Simulation::new(arm, gains());
@@ -277,6 +286,29 @@ fn time<const N: usize>(path: &str) {
             time_lanes(registers, &cases, method);
         }
     }
+}
+
+/// Times steps of one method, each from the one before and each from a state of its own.
+fn time_steps<const N: usize>(
+    cases: &[Case<N>],
+    method: &str,
+    step: impl Fn(&[f64; N], &mut State<N>),
+) {
+    let effort = black_box([0.0; N]);
+    let mut results: Vec<State<N>> = vec![start(); CALLS];
+    measure::<N, _>(&format!("{method} step"), || {
+        let mut state = black_box(start());
+        for _ in 0..CALLS {
+            step(&effort, &mut state);
+        }
+        state
+    });
+    measure::<N, _>(&format!("{method} step, independent"), || {
+        for ((state, effort), result) in black_box(cases).iter().zip(black_box(&mut results)) {
+            *result = *state;
+            step(effort, result);
+        }
+    });
 }
 
 /// Times live arms in lanes of these registers, [`ADVANCE`] steps a call.
