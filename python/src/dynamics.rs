@@ -34,16 +34,17 @@ fn each_row<'py, const N: usize, const K: usize>(
     answer: Shape,
     function: impl Fn([[f64; N]; K], &mut Vec<f64>),
 ) -> PyResult<Object<'py>> {
-    all_rows::<N, K>(py, fields, answer, |rows, count, out| {
+    all_rows(py, N, fields, answer, |rows, count, out| {
         for index in 0..count {
             function(rows.each_ref().map(|row| row.row(index)), out);
         }
     })
 }
 
-/// As [`each_row`], with a `function` that takes all rows at once, and how many there are.
-fn all_rows<'py, const N: usize, const K: usize>(
+/// As [`each_row`], for an arm of so many `links`, with a `function` that takes all rows at once, and how many they are.
+fn all_rows<'py, const K: usize>(
     py: Python<'py>,
+    links: usize,
     fields: [(&str, &Object<'py>); K],
     answer: Shape,
     function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>),
@@ -58,7 +59,7 @@ fn all_rows<'py, const N: usize, const K: usize>(
     });
     let mut rows: Vec<Rows<'_>> = Vec::with_capacity(K);
     for (_, numbers) in &given {
-        rows.push(numbers.rows(count.unwrap_or(1), N, None)?);
+        rows.push(numbers.rows(count.unwrap_or(1), links, None)?);
     }
     let rows: [Rows<'_>; K] = rows
         .try_into()
@@ -70,8 +71,8 @@ fn all_rows<'py, const N: usize, const K: usize>(
     match answer {
         Shape::One => {}
         Shape::Point => shape.push(2),
-        Shape::Joints => shape.push(N),
-        Shape::Square => shape.extend([N, N]),
+        Shape::Joints => shape.push(links),
+        Shape::Square => shape.extend([links, links]),
     }
     if shape.is_empty() {
         return Ok(flat
@@ -144,7 +145,7 @@ pub(crate) fn forward_dynamics<'py>(
 ) -> PyResult<Object<'py>> {
     for_either!(Chain, &arm.get().chain, arm => {
         let fields = [("q", &q), ("qd", &qd), ("effort", &effort)];
-        all_rows(py, fields, Shape::Joints, |rows, count, out| {
+        all_rows(py, arm.lengths().len(), fields, Shape::Joints, |rows, count, out| {
             forward_dynamics_of_rows(arm, rows, count, out);
         })
     })
