@@ -39,7 +39,7 @@ def main() -> None:
         with ThreadPoolExecutor(workers) as threads:
             on_threads = rate(settings, threads)
         here = {"host": "127.0.0.1", "dashboard_address": None, "threads_per_worker": 1}
-        with distributed.LocalCluster(workers, **here) as cluster, distributed.Client(cluster) as client:
+        with distributed.LocalCluster(n_workers=workers, **here) as cluster, distributed.Client(cluster) as client:
             print(f"| {workers} | {on_threads:,.0f} | {rate(settings, client.get_executor()):,.0f} |")
         workers *= 2
 
