@@ -5,7 +5,7 @@
 use super::control_loop::ControlLoop;
 use super::critical::{Critical, critical};
 use super::linear::{Linear, equilibrium};
-use super::poses::PoseSearch;
+use super::poses::{Judged, PoseSearch};
 use super::proof::{Proof, Proven};
 use super::stability::{Modes, Sampling, largest_timestep};
 
@@ -215,7 +215,7 @@ impl<const N: usize> LimitSearch<N> {
     /// search.
     fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
-        let mut found = (self.limits.held, self.limits.equilibrium);
+        let mut found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
         let search = |sampling, found| {
             let search = PoseSearch::new(control, sampling, found);
             LimitStage::Poses(sampling, search)
@@ -229,7 +229,7 @@ impl<const N: usize> LimitSearch<N> {
             && limit > 0.0
             && found.0.is_none_or(|least| limit < least)
         {
-            found = (there, pose);
+            found = (there, Judged::as_it_is(pose));
         }
         self.limits.bound = Some(timestep);
         if self.limits.held == Some(0.0) {
@@ -249,7 +249,7 @@ impl<const N: usize> LimitSearch<N> {
     fn conclude(
         &mut self,
         sampling: Sampling,
-        (least, pose): (Option<f64>, [f64; N]),
+        (least, worst): (Option<f64>, Judged<N>),
     ) -> LimitStage<N> {
         let control = &self.control;
         let limits = &mut self.limits;
@@ -265,11 +265,10 @@ impl<const N: usize> LimitSearch<N> {
             matches!((limits.bound, least), (Some(bound), Some(least)) if agree(bound, least));
         limits.advised = limits.trusted().map(|limit| ADVISED_PART * limit);
         if let Some(limit) = least {
-            limits.worst_pose = Some(pose);
-            let linear = Linear::at_pose(control, &pose);
-            limits.critical = critical(&linear, control.method, limit);
+            limits.worst_pose = Some(worst.pose);
+            limits.critical = critical(&worst.linear(control), control.method, limit);
         }
-        let known = (limits.continuous, limits.equilibrium);
+        let known = (limits.continuous, Judged::as_it_is(limits.equilibrium));
         let search = PoseSearch::new(control, Sampling::Continuous, known);
         LimitStage::Poses(Sampling::Continuous, search)
     }

