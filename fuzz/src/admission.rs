@@ -54,7 +54,7 @@ pub fn judge(bytes: &[u8], rules: Rules<'_>) -> Option<(Opinion, bool)> {
 const NO_TEXT: &str = "\u{fffd}";
 
 fn read(bytes: &[u8]) -> Option<Head> {
-    let ends = [&b"\r\n\r\n"[..], b"\n\n"];
+    let ends = [&b"\n\r\n"[..], b"\n\n"];
     let end = ends.iter().filter_map(|mark| {
         let at = bytes.windows(mark.len()).position(|window| window == *mark);
         at.map(|at| at + mark.len())

@@ -39,7 +39,8 @@ pub enum HeadError {
     Method,
 }
 
-/// End of the head, blank line included, if it is there; `seen` bytes were searched before.
+/// End of the head, blank line included, if it is there; `seen` bytes were searched before. A line ends with or without
+/// a carriage return (RFC 9112, section 2.2), as it does for who reads the head.
 #[must_use]
 pub fn end(bytes: &[u8], seen: usize) -> Option<usize> {
     let from = seen.saturating_sub(3);
@@ -48,7 +49,7 @@ pub fn end(bytes: &[u8], seen: usize) -> Option<usize> {
         let at = rest.windows(mark.len()).position(|window| window == mark);
         at.map(|at| from + at + mark.len())
     };
-    match (after(b"\r\n\r\n"), after(b"\n\n")) {
+    match (after(b"\n\r\n"), after(b"\n\n")) {
         (Some(one), Some(other)) => Some(one.min(other)),
         (one, other) => one.or(other),
     }
@@ -188,6 +189,7 @@ mod tests {
             assert_eq!(found, Some(27), "{cut}");
         }
         assert_eq!(end(b"GET / HTTP/1.1\n\nx", 0), Some(16));
+        assert_eq!(end(b"GET / HTTP/1.1\n\r\nUpgrade: x\r\n\r\n", 0), Some(17));
         assert_eq!(end(b"GET / HTTP/1.1\r\n", 0), None);
         assert_eq!(end(b"", 0), None);
     }
