@@ -133,3 +133,28 @@ fn a_published_goal_has_its_frames_under_its_id_until_it_is_cancelled_or_nobody_
         assert_eq!(client.messages_for(ms(1000), &feedback).await.len(), 0);
     });
 }
+
+#[test]
+fn published_wishes_have_three_hundred_messages_a_second_together_and_each_its_part() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (goal, feedback) = (format!("{ACTION}/goal"), format!("{ACTION}/feedback"));
+        client.subscribe(&feedback).await;
+        for id in 0..MAX_WISHES {
+            let goal_id = json!({"id": id.to_string()});
+            let msg = json!({"goal_id": goal_id, "goal": wish("world", &["link2"], 60.0)});
+            client
+                .send(&json!({"op": "publish", "topic": goal, "msg": msg}))
+                .await;
+        }
+        client.settle().await;
+        let told = client.messages_for(ms(3000), &feedback).await;
+        // 180 looks of five each, and one more or less at either end.
+        assert!((890..=910).contains(&told.len()), "{}", told.len());
+        for id in 0..MAX_WISHES {
+            let of = |one: &&Value| one["status"]["goal_id"]["id"] == id.to_string();
+            let part = told.iter().filter(of).count();
+            assert!((13..=15).contains(&part), "{part} of {id}");
+        }
+    });
+}

@@ -59,6 +59,9 @@ pub struct WishFrames {
     pub by: Wisher,
 }
 
+/// Messages of published wishes in one look: each goes to all who subscribe, and looks come 60 times a second.
+const TOPIC_AT_ONCE: usize = 5;
+
 /// Who wishes for frames.
 pub enum Wisher {
     /// A client that has sent a goal of the action.
@@ -238,16 +241,27 @@ impl<const N: usize> TfRepublisher<N> {
             self.topic = Some(now + TOPIC_PERIOD);
             publish(&self.publish, Topic::TfWeb, &seen(WORLD, &frames(N)));
         }
-        for (wish, due) in self.wishes.iter_mut().filter(|(_, due)| *due <= now) {
-            *due = now + wish.period;
-            let message = seen(&wish.target, &wish.sources);
+        let mut due: Vec<_> = self
+            .wishes
+            .iter_mut()
+            .filter(|(_, due)| *due <= now)
+            .collect();
+        // The longest due come first.
+        due.sort_by_key(|(_, due)| *due);
+        let mut published = 0;
+        for (wish, due) in due {
+            let message = || seen(&wish.target, &wish.sources);
             match &wish.by {
-                Wisher::Client(follower) => follower.feed_back(&message),
+                Wisher::Client(follower) => follower.feed_back(&message()),
+                Wisher::Topic(_) if published == TOPIC_AT_ONCE => continue,
                 Wisher::Topic(id) => {
+                    published += 1;
+                    let message = message();
                     let message = answers::feedback(stamp, id, &message);
                     publish(&self.publish, Topic::TfWebFeedback, &message);
                 }
             }
+            *due = now + wish.period;
         }
     }
 }
