@@ -9,10 +9,12 @@ use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, run, settle};
 use pendularm::actors::gateway::limits::{
     CALL_BYTES, MAX_RESPONSES_WAITING, REGISTRATION_BYTES, STALL_LIMIT,
 };
+use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::budget::{CONNECTION_BYTES, Memory};
 use pendularm::actors::wire::follower::{ActionRequest, GoalFollower};
-use pendularm::protocol::catalog::{Action, Service};
+use pendularm::protocol::catalog::{Action, Service, Topic};
+use pendularm::protocol::messages;
 use pendularm::protocol::outbox::{FRAME_BYTES, PLACE_BYTES};
 use pendularm::protocol::wire::fragments::PIECE_BYTES;
 use serde_json::json;
@@ -173,6 +175,36 @@ fn a_frame_that_is_not_complete() {
         let begun = format!("{{\"op\":\"publish\",\"msg\":\"{}", "x".repeat(3 * MIB));
         scene.flood(&begun).await;
         scene.holds(3 * MIB);
+        scene.end().await;
+    });
+}
+
+/// Under the spelling that it has not itself, a latched message is a copy for each who hears it.
+#[test]
+fn latched_messages_of_another_spelling_that_are_not_read() {
+    const SIZE: usize = 20_000;
+    const COUNT: usize = 50;
+    run(async {
+        let mut scene = Scene::new(KIB, Nodes::default()).await;
+        // There is a last message while somebody subscribes.
+        let mut watcher = scene.gateway.connect(WIDE);
+        watcher.subscribe("/robot_description").await;
+        let msg = json!({"data": "x".repeat(SIZE)});
+        scene.gateway.registry.do_send(Publish {
+            topic: Topic::RobotDescription,
+            frame: messages::publish("/robot_description", &msg).into(),
+        });
+        let name = json!("robot_description");
+        let mut pairs = format!("{}\n", json!({"op": "set_level", "level": "none"}));
+        for _ in 0..COUNT {
+            for op in ["subscribe", "unsubscribe"] {
+                pairs.push_str(&format!("{}\n", json!({"op": op, "topic": name})));
+            }
+        }
+        scene.flood(&pairs).await;
+        let held = scene.held();
+        assert!(held > COUNT / 2 * SIZE, "{held}");
+        drop(watcher);
         scene.end().await;
     });
 }

@@ -83,6 +83,28 @@ async fn receive_text(socket: &mut Client<DuplexStream>) -> String {
     }
 }
 
+/// The buffer that a long message is read into stays with the connection, so it stays charged.
+#[test]
+fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
+    const LONG: usize = 3 << 20;
+    run(async {
+        let memory = Memory::default();
+        let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
+        let mut socket = open(&gateway, WIDE).await;
+        settle().await;
+        let before = memory.held();
+        let long = json!({"op": "publish", "topic": "/nobody", "msg": {"data": "x".repeat(LONG)}});
+        send(&mut socket, long).await;
+        send(&mut socket, json!({"op": "set_level", "level": "none"})).await;
+        settle().await;
+        let held = memory.held() - before;
+        assert!((LONG..2 * LONG).contains(&held), "{held}");
+        drop(socket);
+        sleep(Duration::from_secs(60)).await;
+        assert_eq!(memory.held(), 0);
+    });
+}
+
 #[test]
 fn a_head_that_does_not_come_is_given_up_after_five_seconds() {
     run(async {

@@ -151,6 +151,42 @@ fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() 
     );
 }
 
+/// As for calls and goals: nobody fills the memory, and nobody ends another's connection, by asking a goal's end again
+/// and again.
+#[test]
+fn cancellations_for_a_client_that_never_reads_are_refused_when_too_many_wait() {
+    let runtime = Runtime::start();
+    let action = format!("/{}", "dance".repeat(40));
+    let mut pursuer = runtime.connect();
+    pursuer.send(&json!({"op": "advertise_action", "action": action, "type": "demo/Dance"}));
+    pursuer.status();
+    let mut client = runtime.connect();
+    client.send(&json!({"op": "send_action_goal", "id": "g", "action": action, "args": {}}));
+    let cancel = json!({"op": "cancel_action_goal", "id": "g", "action": action});
+    let mut refused = 0;
+    // Each takes some 300 bytes of the 64 MiB, and the system's buffers take some more.
+    for _ in 0..60 {
+        for _ in 0..5_000 {
+            client.send(&cancel);
+        }
+        client.send(&json!({"op": "call_service", "id": "end", "service": "/arm_sim/pause"}));
+        while let frame = client.receive()
+            && frame["id"] != "end"
+        {
+            refused += usize::from(frame["msg"].as_str().unwrap().contains("does not read"));
+        }
+        if refused > 0 {
+            break;
+        }
+    }
+    assert!(refused > 0, "all went on");
+    let peak = runtime.peak_memory();
+    assert!(
+        peak < BASE + MAX_BACKLOG + 32 * MIB,
+        "{peak} bytes for 64 MiB that may wait"
+    );
+}
+
 /// A flood is read as fast as the arm takes it: the others' calls go in between. Without that they would wait for
 /// all of it, minutes.
 #[test]

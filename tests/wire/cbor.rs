@@ -336,5 +336,7 @@ fn over_raw_tcp_binary_is_refused_and_png_comes_as_it_is() {
         assert_eq!(client.status()["level"], "info");
     }
     client.message("/clock");
-    assert!(client.kept.is_empty(), "{:?}", client.kept);
+    // Some may have come before the second subscription was answered.
+    let is_plain = |frame: &Value| frame["op"] == "publish" && frame["topic"] == "/clock";
+    assert!(client.kept.iter().all(is_plain), "{:?}", client.kept);
 }

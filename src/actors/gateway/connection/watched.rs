@@ -18,6 +18,8 @@ use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::budget::Share;
 use crate::protocol::limits::MAX_FRAME;
 
+/// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
+pub(super) const READ_BUFFER: usize = 8 * 1024;
 /// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.
 const TURN: usize = 32 * 1024;
 
@@ -31,6 +33,9 @@ pub(super) struct Watched<S> {
     unfinished: Unfinished,
     /// Bytes that belong to no complete message yet.
     pending: usize,
+    /// The longest message so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to
+    /// it, and stays so.
+    longest: usize,
     /// When the first of them came, later by the time that nothing was read.
     began: Option<Instant>,
     /// They do now.
@@ -58,6 +63,7 @@ impl<S> Watched<S> {
             is_blocked: false,
             unfinished,
             pending: 0,
+            longest: 0,
             began: None,
             is_complete: false,
             unsent,
@@ -95,7 +101,11 @@ impl<S> Watched<S> {
         }
         // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
         // kept.
-        self.unfinished.keep((2 * pending).min(3 * MAX_FRAME));
+        let unfinished = (2 * pending).min(3 * MAX_FRAME);
+        if pending > READ_BUFFER {
+            self.longest = self.longest.max(pending.min(MAX_FRAME));
+        }
+        self.unfinished.keep(unfinished.max(self.longest));
     }
 
     /// When the message that has begun is late.

@@ -28,7 +28,7 @@ use super::reception::Reception;
 use super::shared::{Ending, HELD_MOST, Shared};
 use super::transport::{Inbound, Outbound, read_some};
 use super::unfinished::{First, Unfinished};
-use super::watched::Watched;
+use super::watched::{READ_BUFFER, Watched};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::Request;
 use crate::actors::resources::budget::Share;
@@ -49,8 +49,6 @@ const FRAGMENT: usize = 64 * 1024;
 /// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
 /// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
 const WRITE_BUFFER: usize = 2 * FRAGMENT;
-/// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
-const READ_BUFFER: usize = 8 * 1024;
 
 impl Reception {
     /// Does what a client has asked for over HTTP; `behind` came after its request.

@@ -89,7 +89,11 @@ impl Registry {
             .subscribers(spelling)
             .and_then(|(_, all)| all.iter().find(|one| one.connection == to));
         if let (Some((topic, frame)), Some(subscriber)) = (latched, subscriber) {
-            let plain = messages::respelled(topic.name(), spelling, frame);
+            // A copy of its own, unless the spelling is the topic's, whose frame counts already.
+            let plain = match messages::respelled(topic.name(), spelling, frame) {
+                own if **spelling != *topic.name() => self.count(own),
+                shared => shared,
+            };
             let frames = if is_sent_plain(subscriber.encoding, &plain) {
                 Frames::Plain(plain)
             } else {

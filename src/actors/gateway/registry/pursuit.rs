@@ -171,6 +171,9 @@ impl Registry {
             return Err(why(action.to_owned()));
         };
         if let Some(pursuer) = self.clients.get(&goal.pursuer) {
+            if pursuer.backlog() > MAX_BACKLOG {
+                return Err(Refusal::ProviderBusy(action.to_owned()));
+            }
             pursuer.send(messages::cancellation(&goal.spelling, &id));
         }
         Ok(())
