@@ -125,6 +125,11 @@ impl Table {
     }
 }
 
+/// The head of a table with a column for each method, and others before and after them.
+pub(crate) fn by_method<'a>(before: &[&'a str], after: &[&'a str]) -> Vec<&'a str> {
+    [before, &Method::ALL.map(Method::name), after].concat()
+}
+
 /// A cell: its text, a line of detail under it, and a class that colours it.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Cell {

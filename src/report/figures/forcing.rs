@@ -10,7 +10,7 @@ use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::forcing::{COARSEST, DURATION, FORCES, Force};
 use crate::report::making::Making;
-use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict, by_method};
 use crate::report::svg::{Axis, Curve, Key, Plot, Point, Unit, number, power, seconds};
 
 /// Errors below this are rounding as much as truncation.
@@ -152,7 +152,7 @@ fn table(lines: &[Convergence]) -> Table {
             "Fitted to the {FITTED} finest runs with errors above {}.",
             power(ROUNDING.log10().round())
         ),
-        &["Force", "", "euler", "midpoint", "verlet", "rk4"],
+        &by_method(&["Force", ""], &[]),
     );
     for force in &FORCES {
         let mut row = vec![Cell::new(force.name), Cell::new(force.formula)];

@@ -11,7 +11,7 @@ use crate::report::experiments::moving::{
     DURATION, LookedAt, MovingScene, TIMESTEP, distance_behind,
 };
 use crate::report::making::Making;
-use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict};
+use crate::report::section::{Block, Cell, Figure, Section, Table, Verdict, by_method};
 use crate::report::svg::{
     Axis, Curve, Key, Marker, Plot, Point, Unit, number, scientific, seconds,
 };
@@ -217,7 +217,7 @@ fn table(lines: &[MovingLine]) -> Table {
         "moving",
         "Orders behind a moving setpoint, as expected and as observed",
         format!("Fitted to the {FITTED} finest runs with errors above rounding."),
-        &["Looked at", "euler", "midpoint", "verlet", "rk4"],
+        &by_method(&["Looked at"], &[]),
     );
     for behind in LookedAt::ALL {
         let mut row = vec![Cell::new(behind.name())];

@@ -5,7 +5,7 @@
 use super::data::{Data, Run, TARGETS, best};
 use crate::math::integrator::Method;
 use crate::report::csv::{Csv, CsvField};
-use crate::report::section::{Cell, Table};
+use crate::report::section::{Cell, Table, by_method};
 use crate::report::svg::{number, power, scientific, seconds};
 
 pub(super) fn cheapest(data: &[Data]) -> Table {
@@ -50,7 +50,7 @@ pub(super) fn orders(data: &[Data]) -> Table {
         "Fitted orders",
         "Slope of error against timestep through the four finest runs between 10⁻¹¹ and 10⁻³ rad; under it the \
          smallest error that any timestep gave.",
-        &["Scene", "euler", "midpoint", "verlet", "rk4"],
+        &by_method(&["Scene"], &[]),
     );
     for data in data {
         let mut row = vec![Cell::new(data.scene.title())];

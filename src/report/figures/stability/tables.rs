@@ -4,7 +4,7 @@
 
 use super::line::{AGREEMENT, LimitRow, in_words};
 use crate::math::integrator::Method;
-use crate::report::section::{Cell, Table};
+use crate::report::section::{Cell, Table, by_method};
 use crate::report::svg::seconds;
 use crate::study::stability::Sampling;
 
@@ -60,9 +60,7 @@ pub(super) fn edges(lines: &[LimitRow]) -> Table {
         "Largest stable timestep with the default gains at (0.4, 0.8), with 3 links at (0.4, 0.8, -0.5): elsewhere it \
          is another. Held for the step, the limit belongs to the control period: the effort answers a state that is \
          up to a step old. In every stage it belongs to the method.",
-        &[
-            "Arm", "Control", "euler", "midpoint", "verlet", "rk4", "Why",
-        ],
+        &by_method(&["Arm", "Control"], &["Why"]),
     );
     for links in [2, 3] {
         for sampling in Sampling::ALL {

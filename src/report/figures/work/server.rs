@@ -52,7 +52,7 @@ fn paused(counts: &Counts) -> Vec<Cell> {
     let paused = per_second(counts, "server-paused");
     vec![
         Cell::new("Stepping while paused"),
-        Cell::new("actors::arm_sim asks the pacer for no steps"),
+        Cell::new("actors::arm::sim asks the pacer for no steps"),
         rate(running, "running, nobody subscribed"),
         rate(paused, "paused"),
         percent_saved(running, paused),
