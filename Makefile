@@ -1,4 +1,4 @@
-# Every target says what it does and stops at the first failure. Needed: a Rust toolchain; bash and tar for packaging.
+# Every target says what it does and stops at the first failure. Needed: a Rust toolchain and a C compiler; bash and tar for packaging.
 
 CARGO ?= cargo
 TARGET_DIR := $(or $(CARGO_TARGET_DIR),target)
@@ -104,7 +104,7 @@ picture: build ## Take the README's picture of the page: docs/page.png; needs ch
 	PENDULARM="$(TARGET_DIR)/release/pendularm" python3 scripts/picture.py
 
 features: ## Build with and without each feature and print size, crates and build time; KEEP=1 puts them into the README
-	@echo "make features: five release builds from nothing, some minutes"
+	@echo "make features: seven release builds from nothing, some minutes"
 	@CARGO="$(CARGO)" python3 scripts/features.py $(if $(KEEP),--keep) $(ARGS)
 
 wheel: $(if $(PORTABLE),,build) ## Build the Python wheel with the program in it: python/target/wheels/; PORTABLE=1 for every Linux with glibc 2.17 or newer

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! There is a connection for each client, and one of everything else. The nodes are `arm_sim` on a thread of its own,
-//! `ik`, `ik_action`, `ik_trial`, `rosapi` and `rosout`, and `integration` and `study`, whose work the pool of workers
-//! does.
+//! `ik`, `ik_action`, `ik_trial`, `follow`, `rosapi`, `parameters`, `rosout`, `tf_web` and `recorder`, and
+//! `integration` and `study`, whose work the pool of workers does.
 //!
 //! A service is a question, [`node::Ask`]. Its [`node::Call`] comes from a client, read as the question's file says,
 //! or from another node; the [`node::Reply`] knows the way back.
@@ -37,13 +37,14 @@
 //! To `arm_sim`:
 //!
 //! - [`node::Call`] of [`SetIntegrator`], [`SetParams`], [`SetGains`], [`Pause`], [`Enable`], [`Reset`], [`Step`],
-//!   [`Disturb`], from the registry and `rosapi`: changes the arm; the answer echoes the values as they are.
+//!   [`Disturb`], from the registry, `rosapi` and `parameters`: changes the arm; the answer echoes the values as they
+//!   are.
 //! - [`SetSetpoint`], from the registry: a client's setpoint.
-//! - [`ArmPose`], from `ik` and `ik_trial`: lengths, positions and time, asked for every time.
+//! - [`ArmPose`], from `ik`, `ik_trial` and `tf_web`: lengths, positions and time, asked for every time.
 //! - [`ArmSettings`], from `study`: method, timestep, arm, gains and setpoint, asked for at every call.
 //! - [`TrackGoal`], [`CommandGoal`], [`EndGoal`], from `ik_action`: a goal; its setpoint, from which on it is judged at
 //!   every step; its end.
-//! - [`SimulationTime`], from `rosapi` and `rosout`: the time.
+//! - [`SimulationTime`], from `rosapi`, `rosout` and `tf_web`: the time.
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], [`RefuseSteps`], from the runtime: whom to ask for the largest stable timestep; the end, at which
 //!   steps that are still to be taken are refused.

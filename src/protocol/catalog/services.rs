@@ -1,6 +1,7 @@
 //! The services: one row each.
 //!
-//! **Invariant:** a service that a client can call is a row here, and a row that no node serves does not compile.
+//! **Invariant:** a service that a client can call is a row here, and a row that no node serves fails
+//! `tests/actors/rosapi.rs`.
 
 use super::entry::{Field, ServiceEntry, Type, message, optional, required, service};
 use super::node::Node;
