@@ -6,7 +6,7 @@
 use crate::common::Runtime;
 use crate::web_client::Socket;
 use pendularm_client::codec::Event;
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// A CBOR value.
 #[derive(Debug, Clone, PartialEq)]
