@@ -152,8 +152,9 @@ fn published_wishes_have_three_hundred_messages_a_second_together_and_each_its_p
         // 180 looks of five each, and one more or less at either end.
         assert!((890..=910).contains(&told.len()), "{}", told.len());
         for id in 0..MAX_WISHES {
-            let of = |one: &&Value| one["status"]["goal_id"]["id"] == id.to_string();
-            let part = told.iter().filter(of).count();
+            let name = id.to_string();
+            let of_it = |one: &&Value| one["status"]["goal_id"]["id"] == name.as_str();
+            let part = told.iter().filter(of_it).count();
             assert!((13..=15).contains(&part), "{part} of {id}");
         }
     });
