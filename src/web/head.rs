@@ -43,7 +43,7 @@ pub enum HeadError {
 /// a carriage return (RFC 9112, section 2.2), as it does for who reads the head.
 #[must_use]
 pub fn end(bytes: &[u8], seen: usize) -> Option<usize> {
-    let from = seen.saturating_sub(3);
+    let from = seen.saturating_sub(2);
     let rest = bytes.get(from..)?;
     let after = |mark: &[u8]| {
         let at = rest.windows(mark.len()).position(|window| window == mark);

@@ -34,7 +34,7 @@ pub(super) struct Watched<S> {
     /// Bytes that belong to no complete message yet.
     pending: usize,
     /// The longest message so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to
-    /// it, and stays so.
+    /// it, or to the longest frame of it, and stays so.
     longest: usize,
     /// When the first of them came, later by the time that nothing was read.
     began: Option<Instant>,

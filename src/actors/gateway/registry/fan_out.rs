@@ -89,11 +89,11 @@ impl Registry {
             .subscribers(spelling)
             .and_then(|(_, all)| all.iter().find(|one| one.connection == to));
         if let (Some((topic, frame)), Some(subscriber)) = (latched, subscriber) {
-            // A copy of its own, unless the spelling is the topic's, whose frame counts already.
-            let plain = match messages::respelled(topic.name(), spelling, frame) {
-                own if **spelling != *topic.name() => self.count(own),
-                shared => shared,
-            };
+            let mut plain = messages::respelled(topic.name(), spelling, frame);
+            // Under the topic's own name it is one frame for all, else a copy for this one.
+            if **spelling != *topic.name() {
+                plain = self.count(plain);
+            }
             let frames = if is_sent_plain(subscriber.encoding, &plain) {
                 Frames::Plain(plain)
             } else {

@@ -31,6 +31,8 @@ pub const MAX_FRAMES: usize = 32;
 const PERIOD: Duration = Duration::from_micros(16_667);
 /// Time between two messages of the topic.
 const TOPIC_PERIOD: Duration = Duration::from_millis(33);
+/// Messages of published wishes in one look: each goes to all who subscribe, and looks come 60 times a second.
+const TOPIC_AT_ONCE: usize = 5;
 
 /// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
 const NOT_ACTIVE: &str = "id must be that of a goal of this connection";
@@ -58,9 +60,6 @@ pub struct WishFrames {
     /// Who gets them.
     pub by: Wisher,
 }
-
-/// Messages of published wishes in one look: each goes to all who subscribe, and looks come 60 times a second.
-const TOPIC_AT_ONCE: usize = 5;
 
 /// Who wishes for frames.
 pub enum Wisher {
@@ -250,18 +249,21 @@ impl<const N: usize> TfRepublisher<N> {
         due.sort_by_key(|(_, due)| *due);
         let mut published = 0;
         for (wish, due) in due {
-            let message = || seen(&wish.target, &wish.sources);
+            if let Wisher::Topic(_) = wish.by {
+                if published == TOPIC_AT_ONCE {
+                    continue;
+                }
+                published += 1;
+            }
+            *due = now + wish.period;
+            let message = seen(&wish.target, &wish.sources);
             match &wish.by {
-                Wisher::Client(follower) => follower.feed_back(&message()),
-                Wisher::Topic(_) if published == TOPIC_AT_ONCE => continue,
+                Wisher::Client(follower) => follower.feed_back(&message),
                 Wisher::Topic(id) => {
-                    published += 1;
-                    let message = message();
                     let message = answers::feedback(stamp, id, &message);
                     publish(&self.publish, Topic::TfWebFeedback, &message);
                 }
             }
-            *due = now + wish.period;
         }
     }
 }
