@@ -23,6 +23,7 @@ mod arm_turns;
 mod connection;
 mod connection_end;
 mod encodings;
+mod endings;
 mod ik;
 mod ik_action;
 mod ik_trial;

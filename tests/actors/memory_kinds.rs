@@ -312,9 +312,9 @@ fn a_service_that_another_provides_is_charged_to_that_one() {
     });
 }
 
-/// Calls that wait for a day, and the answered ones, of which nothing is left: neither entry nor timer.
+/// Calls that wait for a day, and the answered ones, of which nothing is left.
 #[test]
-fn calls_that_wait_and_their_timers() {
+fn calls_that_wait() {
     run(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let mut provider = scene.gateway.connect(WIDE);
@@ -348,7 +348,7 @@ fn calls_that_wait_and_their_timers() {
         }
         settle().await;
         let left = scene.held() - idle;
-        assert!(left < 20 * CALL_BYTES, "{left}: their timers run on");
+        assert!(left < 20 * CALL_BYTES, "{left}: some are left");
         drop(provider);
         scene.end().await;
     });

@@ -1,22 +1,27 @@
 //! A record in the arm's place: what clients hear of it, forward, back and from anywhere.
 
+use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use actix::prelude::*;
+use pendularm::actors::gateway::messages::{Handled, PublishInTurn};
 use pendularm::actors::gateway::registry::{Attach, Registry};
-use pendularm::actors::player::{self, MAX_AT_ONCE, MAX_RATE};
+use pendularm::actors::node::Interest;
+use pendularm::actors::player::{self, DriveRecord, MAX_AT_ONCE, MAX_RATE, PlayedRecord, Player};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::wire::Nodes;
 use pendularm::protocol::catalog::Topic;
 use pendularm::record::{Content, RecordEntry};
 use serde_json::{Value, json};
+use tokio::sync::oneshot;
 use tokio::time::sleep;
 
 use crate::recorder::{Notes, file, passages, stop};
-use crate::stage::{Client, Stage, connect, in_virtual_time, ms, number, numbers};
+use crate::stage::{self, Client, Stage, connect, in_virtual_time, ms, number, numbers};
 
 /// A run of four seconds: the controller on, a setpoint, and after two seconds longer links and less gravity.
 async fn run() -> Vec<RecordEntry> {
@@ -449,6 +454,58 @@ fn many_messages_at_one_time_come_in_several_turns() {
         let sum: usize = counts.values().sum();
         // The one that is present is heard before it goes on, too.
         assert!((many..=many + 1).contains(&sum), "{sum}: {counts:?}");
+    });
+}
+
+/// A gateway whose subscribers take nothing yet: keeps the ends of what has come.
+#[derive(Default)]
+struct Deaf {
+    come: Rc<Cell<usize>>,
+    underway: Vec<oneshot::Sender<()>>,
+}
+
+impl Actor for Deaf {
+    type Context = Context<Self>;
+}
+
+impl Handler<PublishInTurn> for Deaf {
+    type Result = Handled;
+
+    fn handle(&mut self, PublishInTurn(messages): PublishInTurn, _: &mut Context<Self>) -> Handled {
+        self.come.set(self.come.get() + messages.len());
+        let (underway, end) = oneshot::channel();
+        self.underway.push(underway);
+        Handled::by_node(end)
+    }
+}
+
+/// However often the speed is changed, at whatever speed: nothing more is published while what was is underway.
+#[test]
+fn a_record_waits_for_its_subscribers() {
+    let entries = in_virtual_time(run());
+    in_virtual_time(async {
+        let come = Rc::new(Cell::new(0));
+        let deaf = Deaf {
+            come: Rc::clone(&come),
+            ..Deaf::default()
+        };
+        let path = on_disk("deaf", &file(&entries));
+        let record = PlayedRecord::<2>::open(fs::File::open(path).unwrap()).unwrap();
+        let player = Player::new(record, deaf.start().recipient()).start();
+        let wanted = true;
+        for topic in [Topic::JointStates, Topic::Clock, Topic::RobotDescription] {
+            player.send(Interest { topic, wanted }).await.unwrap();
+        }
+        sleep(ms(1)).await;
+        let underway = come.get();
+        assert!((1..=8).contains(&underway), "{underway}");
+        for n in 0..300 {
+            let rate = if n % 2 == 0 { MAX_RATE } else { -MAX_RATE };
+            stage::asked(&player, DriveRecord::Rate(rate)).await;
+            stage::asked(&player, DriveRecord::Seek(ms(n))).await;
+            sleep(ms(10)).await;
+        }
+        assert_eq!(come.get(), underway);
     });
 }
 

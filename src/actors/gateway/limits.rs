@@ -25,7 +25,7 @@ pub const MAX_WAITING_GOALS: usize = 256;
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
 /// Bytes of a registration, beside three times its name: its places in the tables.
 pub const REGISTRATION_BYTES: usize = 1024;
-/// Bytes of a call that waits for a client, beside its `id` and its name: its entry, and its timer.
+/// Bytes of a call that waits for a client, beside its `id` and its name: its entries in the tables.
 pub const CALL_BYTES: usize = 1024;
 /// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
 /// answers to its own calls) is refused: it has not been read for long then, but others would go on.
@@ -50,6 +50,8 @@ pub(super) const BATCH_BYTES: usize = 256 * 1024;
 pub(super) const BATCH_FRAMES: usize = 64;
 /// Frames of a chunk for which nobody stands in line: more than a client has under way that waits for responses.
 pub(super) const FREE_FRAMES: usize = 32;
+/// Subscribers of a message whose publisher stands in no line after it.
+pub(super) const FREE_DELIVERIES: usize = 32;
 /// Pieces of messages are looked at so long after they have become too old.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.

@@ -112,6 +112,7 @@ pub struct Request {
 pub struct Handled {
     node: Option<oneshot::Receiver<()>>,
     subscribers: Option<oneshot::Receiver<()>>,
+    deliveries: usize,
 }
 
 impl Handled {
@@ -123,20 +124,31 @@ impl Handled {
 
     /// The op has gone to a node, or to a client that provides a service.
     #[must_use]
-    pub const fn by_node(effect: oneshot::Receiver<()>) -> Self {
+    pub fn by_node(effect: oneshot::Receiver<()>) -> Self {
         Self {
             node: Some(effect),
-            subscribers: None,
+            ..Self::default()
         }
     }
 
-    /// The op's message has also gone to subscribers, if there is a receiver.
+    /// The op's message has also gone to so many subscribers, if there is a receiver.
     #[must_use]
-    pub fn and_by_subscribers(self, effect: Option<oneshot::Receiver<()>>) -> Self {
+    pub fn and_by_subscribers(
+        self,
+        effect: Option<oneshot::Receiver<()>>,
+        deliveries: usize,
+    ) -> Self {
         Self {
             subscribers: effect,
+            deliveries,
             ..self
         }
+    }
+
+    /// How many subscribers the op's message has gone to.
+    #[must_use]
+    pub const fn deliveries(&self) -> usize {
+        self.deliveries
     }
 
     /// Whether a node has yet to perform the op.
@@ -153,6 +165,11 @@ impl Handled {
         }
     }
 }
+
+/// Messages of a node that can wait: for [`Handled::effect`]. From the player.
+#[derive(Message)]
+#[rtype(result = "Handled")]
+pub struct PublishInTurn(pub Vec<Publish>);
 
 /// Asks for the topics and services that clients have. From `rosapi`.
 #[derive(Message, Debug, Clone, Copy)]
@@ -221,7 +238,7 @@ pub struct Deliver {
     pub underway: Option<Underway>,
 }
 
-/// Shared by the deliveries of a client's message: its publisher goes on when the last of them is dropped.
+/// Shared by the deliveries of a message whose publisher waits: it goes on when the last of them is dropped.
 pub type Underway = Arc<oneshot::Sender<()>>;
 
 /// Topic messages as a subscriber wants them.

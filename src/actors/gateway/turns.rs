@@ -30,6 +30,9 @@ const FREE_WRITES: usize = 128;
 /// Bytes of a message that count as another write.
 const LONG: usize = 4096;
 
+/// Bytes that a delivery counts as: some five hundred of them take half a millisecond.
+const DELIVERY: usize = BATCH_BYTES / 512;
+
 /// One who stands in a line.
 trait StandsInLine: 'static {
     /// It is their turn; false if they wait no longer.
@@ -80,8 +83,13 @@ thread_local! {
 
 /// Waits until it is this reader's turn.
 pub(super) async fn read() {
+    read_after(0).await;
+}
+
+/// The same where the reader's last message went to so many subscribers, as its next may.
+pub(super) async fn read_after(deliveries: usize) {
     let (go, goes) = oneshot::channel();
-    READERS.with(|line| line.stand(0, go));
+    READERS.with(|line| line.stand(deliveries * DELIVERY, go));
     // Where the task has ended before its time, the runtime that it ran in is ending too.
     let _ = goes.await;
 }

@@ -87,10 +87,10 @@ impl<const N: usize> Handler<Call<Enable>> for Player<N> {
 impl<const N: usize> Handler<Call<Pause>> for Player<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<Pause>, _: &mut Context<Self>) {
+    fn handle(&mut self, call: Call<Pause>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
         if let Some(paused) = ask.paused {
-            self.drive(DriveRecord::Pause(paused));
+            self.drive(DriveRecord::Pause(paused), ctx);
         }
         reply.conclude(Echo {
             values: self.state().is_paused,

@@ -4,11 +4,12 @@
 //! **Invariant:** nothing can be changed but the place in the record and the speed.
 
 mod arm;
+mod due;
 mod launch;
 mod settings;
 mod wire;
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::fs::File;
 use std::time::Duration;
 
@@ -20,24 +21,17 @@ pub use self::launch::{NotReplayed, start};
 use self::settings::{RecordedSettings, SettingsFollower};
 pub use self::wire::list_only_what_is_served;
 use crate::actors::arm::sim::SimulationTime;
-use crate::actors::node::{Ask, Call, Interest, Publish};
+use crate::actors::gateway::messages::PublishInTurn;
+use crate::actors::node::{Ask, Call, Interest};
 use crate::protocol::catalog::Topic;
 use crate::record::{Moment, ReadError, Reel, ReelPlace};
 
 /// Largest speed, either way: a tick is a second and a half of the record then.
 pub const MAX_RATE: f64 = 100.0;
-/// Messages that are published at one tick; what is due beyond waits for the next.
+/// Messages of the record that are looked at from one tick to the next; what is due beyond waits for that.
 pub const MAX_AT_ONCE: usize = 4096;
 /// Time between two ticks.
 const TICK: Duration = Duration::from_micros(16_667);
-/// After a longer stall the record goes on from where it stood.
-const CATCH_UP: Duration = Duration::from_millis(250);
-/// While the record stands, its present messages are published again so often, for who comes late.
-const REPEAT: Duration = Duration::from_secs(1);
-/// A message is present for so long: the slowest topic has one a second.
-const PRESENT: Duration = Duration::from_millis(1500);
-/// At the record's beginning a topic's first message is present already, if it comes so soon.
-const SOON: Duration = Duration::from_millis(100);
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
@@ -74,9 +68,19 @@ pub struct PlayerState {
 /// The player of a record of an arm of `N` links.
 pub struct Player<const N: usize> {
     tape: PlayedRecord<N>,
-    publish: Recipient<Publish>,
+    publish: Recipient<PublishInTurn>,
     /// Topics that somebody subscribes to.
     wanted: BTreeSet<Topic>,
+    /// Messages that are published before the record goes on: what is present, for who has come.
+    owed: VecDeque<Moment>,
+    /// Where the record is to be by now, in nanoseconds since its beginning, if it is not there yet.
+    target: Option<u64>,
+    /// How many of its messages may still be looked at before the next tick.
+    left: usize,
+    /// Whether messages are on their way to subscribers.
+    is_underway: bool,
+    /// How many may be at once.
+    at_once: usize,
     is_paused: bool,
     rate: f64,
     /// In nanoseconds since the record's beginning.
@@ -111,12 +115,17 @@ impl<const N: usize> PlayedRecord<N> {
 impl<const N: usize> Player<N> {
     /// Plays `tape` from its beginning.
     #[must_use]
-    pub fn new(tape: PlayedRecord<N>, publish: Recipient<Publish>) -> Self {
+    pub fn new(tape: PlayedRecord<N>, publish: Recipient<PublishInTurn>) -> Self {
         let now = Instant::now();
         Self {
             tape,
             publish,
             wanted: BTreeSet::new(),
+            owed: VecDeque::new(),
+            target: None,
+            left: MAX_AT_ONCE,
+            is_underway: false,
+            at_once: 1,
             is_paused: false,
             rate: 1.0,
             position: 0,
@@ -134,7 +143,11 @@ impl<const N: usize> Actor for Player<N> {
 
     fn started(&mut self, ctx: &mut Context<Self>) {
         self.ticked = Instant::now();
-        ctx.run_interval(TICK, |player, _| player.tick());
+        ctx.run_interval(TICK, |player, ctx| {
+            player.left = MAX_AT_ONCE;
+            player.tick();
+            player.go_on(ctx);
+        });
     }
 }
 
@@ -147,8 +160,8 @@ impl Ask for DriveRecord {
 impl<const N: usize> Handler<Call<DriveRecord>> for Player<N> {
     type Result = ();
 
-    fn handle(&mut self, call: Call<DriveRecord>, _: &mut Context<Self>) {
-        self.drive(call.ask);
+    fn handle(&mut self, call: Call<DriveRecord>, ctx: &mut Context<Self>) {
+        self.drive(call.ask, ctx);
         call.reply.conclude(self.state());
     }
 }
@@ -156,15 +169,17 @@ impl<const N: usize> Handler<Call<DriveRecord>> for Player<N> {
 impl<const N: usize> Handler<Interest> for Player<N> {
     type Result = ();
 
-    fn handle(&mut self, interest: Interest, _: &mut Context<Self>) {
+    fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         let topic = interest.topic;
         self.latched.remove(&topic);
+        self.owed.retain(|moment| moment.topic != topic);
         if interest.wanted {
             self.wanted.insert(topic);
             self.attempt(|player| {
-                player.publish_latched()?;
-                player.publish_present(&BTreeSet::from([topic]))
+                player.owe_latched()?;
+                player.owe_present(&BTreeSet::from([topic]))
             });
+            self.go_on(ctx);
         } else {
             self.wanted.remove(&topic);
         }
@@ -192,15 +207,21 @@ impl<const N: usize> Handler<SimulationTime> for Player<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Player<N> {
-    fn drive(&mut self, how: DriveRecord) {
+    fn drive(&mut self, how: DriveRecord, ctx: &mut Context<Self>) {
         self.tick();
+        self.go_on(ctx);
         match how {
             DriveRecord::Pause(is_paused) => self.is_paused = is_paused,
             DriveRecord::Toggle => self.is_paused = !self.is_paused,
-            DriveRecord::Rate(rate) => self.rate = rate,
+            DriveRecord::Rate(rate) => {
+                self.rate = rate;
+                // It may be the other way from here.
+                self.target = None;
+            }
             DriveRecord::Seek(to) => self.seek(to),
             DriveRecord::Look => {}
         }
+        self.go_on(ctx);
     }
 
     fn state(&self) -> PlayerState {
@@ -229,137 +250,14 @@ impl<const N: usize> Player<N> {
         }
     }
 
-    fn tick(&mut self) {
-        let now = Instant::now();
-        let passed = (now - self.ticked).min(CATCH_UP);
-        self.ticked = now;
-        if !self.is_paused && !self.is_over() {
-            self.attempt(|player| player.play(passed.mul_f64(player.rate.abs())));
-        } else if now >= self.repeat {
-            self.repeat = now + REPEAT;
-            self.attempt(Self::publish_all_present);
-        }
-    }
-
-    /// Publishes what comes within so much time of the record.
-    fn play(&mut self, passed: Duration) -> Result<(), ReadError> {
-        let passed = u64::try_from(passed.as_nanos()).unwrap_or(u64::MAX);
-        let is_forward = self.rate > 0.0;
-        let until = if is_forward {
-            let end = self.tape.reel.duration();
-            self.position.saturating_add(passed).min(end)
-        } else {
-            self.position.saturating_sub(passed)
-        };
-        for _ in 0..MAX_AT_ONCE {
-            let moment = if is_forward {
-                self.tape.reel.forward(until)?
-            } else {
-                self.tape.reel.backward(until)?
-            };
-            let Some(moment) = moment else {
-                self.position = until;
-                break;
-            };
-            self.position = moment.time;
-            if !moment.topic.is_latched() && self.wanted.contains(&moment.topic) {
-                self.publish(&moment);
-            }
-        }
-        self.publish_latched()
-    }
-
     fn seek(&mut self, to: Duration) {
         let to = u64::try_from(to.as_nanos()).unwrap_or(u64::MAX);
         self.position = to.min(self.tape.reel.duration());
+        self.target = None;
         self.attempt(|player| {
             player.tape.reel.wind(player.position)?;
-            player.publish_all_present()
+            player.owe_all_present()
         });
-    }
-
-    fn publish(&self, moment: &Moment) {
-        match moment.frame() {
-            Ok(frame) => self.publish.do_send(Publish {
-                topic: moment.topic,
-                frame: frame.into(),
-            }),
-            Err(error) => tracing::warn!(%error, "a message of the record is left out"),
-        }
-    }
-
-    fn publish_all_present(&mut self) -> Result<(), ReadError> {
-        self.publish_latched()?;
-        let wanted = self.wanted.clone();
-        self.publish_present(&wanted)
-    }
-
-    /// Publishes the last message of each of these topics, oldest first.
-    fn publish_present(&mut self, topics: &BTreeSet<Topic>) -> Result<(), ReadError> {
-        for moment in self.present(topics)?.iter().rev() {
-            self.publish(moment);
-        }
-        Ok(())
-    }
-
-    /// The last message of each of these topics, newest first, as far as they have one that is not long past.
-    fn present(&mut self, topics: &BTreeSet<Topic>) -> Result<Vec<Moment>, ReadError> {
-        let mut missing: BTreeSet<Topic> = topics
-            .iter()
-            .copied()
-            .filter(|topic| !topic.is_latched())
-            .collect();
-        let place = self.tape.reel.place();
-        let past = u64::try_from(PRESENT.as_nanos()).unwrap_or(u64::MAX);
-        let past = self.position.saturating_sub(past);
-        let mut found = Vec::new();
-        for _ in 0..MAX_AT_ONCE {
-            if missing.is_empty() {
-                break;
-            }
-            let Some(moment) = self.tape.reel.backward(past)? else {
-                break;
-            };
-            if missing.remove(&moment.topic) {
-                found.push(moment);
-            }
-        }
-        self.tape.reel.come_back(place);
-        let soon = u64::try_from(SOON.as_nanos()).unwrap_or(u64::MAX);
-        if self.position < soon {
-            for _ in 0..MAX_AT_ONCE {
-                let Some(moment) = self.tape.reel.forward(soon)? else {
-                    break;
-                };
-                if missing.remove(&moment.topic) {
-                    found.insert(0, moment);
-                }
-            }
-            self.tape.reel.come_back(place);
-        }
-        Ok(found)
-    }
-
-    /// Publishes the messages of latched topics that hold here and did not before.
-    fn publish_latched(&mut self) -> Result<(), ReadError> {
-        let wanted: Vec<Topic> = self
-            .wanted
-            .iter()
-            .copied()
-            .filter(|topic| topic.is_latched())
-            .collect();
-        for topic in wanted {
-            let place = self.tape.reel.latched(topic, self.position);
-            if let Some(place) = place
-                && self.latched.get(&topic) != Some(&place)
-            {
-                self.latched.insert(topic, place);
-                if let Some(moment) = self.tape.reel.moment(place)? {
-                    self.publish(&moment);
-                }
-            }
-        }
-        Ok(())
     }
 
     /// The arm's settings as they were.

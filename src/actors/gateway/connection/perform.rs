@@ -6,8 +6,9 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::reader::Reader;
-use crate::actors::gateway::limits::READ_HERE;
+use crate::actors::gateway::limits::{FREE_DELIVERIES, READ_HERE};
 use crate::actors::gateway::messages::{Request, Respond, form_of};
+use crate::actors::gateway::turns;
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::budget::Share;
@@ -168,7 +169,11 @@ impl Reader {
             if handled.is_with_a_node() {
                 stay_awake();
             }
+            let deliveries = handled.deliveries();
             handled.effect().await;
+            if deliveries > FREE_DELIVERIES {
+                turns::read_after(deliveries).await;
+            }
         }
         drop(share);
     }

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
-use tokio::time::{Instant, sleep_until};
+use tokio::time::Instant;
 
 use super::refusal::Refusal;
-use super::services::{Forwarded, Services, TimedOut};
+use super::services::{Forwarded, Services};
 use super::state::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{CALL_BYTES, DEFAULT_TIMEOUT, MAX_BACKLOG, MAX_WAITING_CALLS};
 use crate::actors::gateway::messages::{Handled, Overheard};
@@ -110,15 +110,8 @@ impl Registry {
         let account = &caller.outlets.account;
         client.send(frame);
         let id_bytes = origin.id.as_ref().map_or(0, Payload::allocated);
-        let share = account.take(CALL_BYTES / 2 + id_bytes + 2 * service.len());
-        let of_timer = account.take(CALL_BYTES / 2);
-        let registry = ctx.address();
+        let share = account.take(CALL_BYTES + id_bytes + 2 * service.len());
         let deadline = Instant::now() + call.timeout.unwrap_or(DEFAULT_TIMEOUT);
-        let timer = actix_rt::spawn(async move {
-            let _share = of_timer;
-            sleep_until(deadline).await;
-            registry.do_send(TimedOut(number));
-        });
         self.services.remember(
             number,
             Forwarded {
@@ -127,10 +120,10 @@ impl Registry {
                 provider: provider.connection,
                 service: service.into(),
                 deadline,
-                timer: timer.abort_handle(),
                 _share: share,
             },
         );
+        self.look_at_endings(ctx);
         Ok(())
     }
 

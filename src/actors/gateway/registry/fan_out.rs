@@ -13,37 +13,62 @@ use super::state::Registry;
 use super::topics::Subscriber;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::encoded::Encoded;
-use crate::actors::gateway::messages::{Deliver, Frames, Underway};
+use crate::actors::gateway::messages::{Deliver, Frames, Handled, Overheard, Publish, Underway};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
 use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::wire::series;
 
-/// Paces a client that publishes: it goes on when its message has been offered to the socket of every subscriber.
+/// Paces who publishes: it goes on when its message has been offered to the socket of every subscriber.
 #[derive(Default)]
-pub(super) struct Pace(Option<(Underway, oneshot::Receiver<()>)>);
+pub(super) struct Pace {
+    underway: Option<(Underway, oneshot::Receiver<()>)>,
+    deliveries: usize,
+}
 
 impl Pace {
     /// Goes with the message to a subscriber.
     fn underway(&mut self) -> Underway {
-        let (underway, _) = self.0.get_or_insert_with(|| {
+        self.deliveries += 1;
+        let (underway, _) = self.underway.get_or_insert_with(|| {
             let (underway, end) = oneshot::channel();
             (Arc::new(underway), end)
         });
         Arc::clone(underway)
     }
 
-    /// Ends when the message is underway to nobody any more; `None` if it never was.
-    pub(super) fn end(self) -> Option<oneshot::Receiver<()>> {
-        self.0.map(|(_, end)| end)
+    /// The message's publisher waits for `handled`, and until it is underway to nobody any more.
+    pub(super) fn and(self, handled: Handled) -> Handled {
+        let end = self.underway.map(|(_, end)| end);
+        handled.and_by_subscribers(end, self.deliveries)
     }
 }
 
 impl Registry {
+    /// Delivers a message of a node, and keeps it if its topic is latched.
+    pub(super) fn publish_own(
+        &mut self,
+        Publish { topic, frame }: Publish,
+        pace: Option<&mut Pace>,
+    ) {
+        let name = topic.name();
+        if !self.is_wanted(name) {
+            return;
+        }
+        let frame = frame.write();
+        self.ear.hear(Overheard::Published(topic, &frame));
+        self.fan_out(name, pace, |spelling| {
+            messages::respelled(name, spelling, &frame)
+        });
+        if topic.is_latched() {
+            self.latched.insert(topic, frame);
+        }
+    }
+
     /// Delivers a message, or a series of them, to everybody who subscribes to `topic`, an absolute name, under
     /// whichever spelling; `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait, which a
-    /// node can't.
+    /// live arm can't.
     pub(super) fn fan_out(
         &self,
         topic: &str,

@@ -7,8 +7,10 @@ mod actions;
 mod calls;
 mod census;
 mod ear;
+mod endings;
 mod fan_out;
 mod nodes;
+mod numbers;
 mod ops;
 mod pursuers;
 mod pursuit;
@@ -20,19 +22,18 @@ mod topics;
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
+use self::fan_out::Pace;
 pub use self::nodes::{Attach, Nodes};
 use self::refusal::Refusal;
-use self::services::TimedOut;
 use self::state::Client;
 pub use self::state::Registry;
 use super::messages::{
-    Connect, Disconnect, Ended, Finish, FinishAll, Handled, Overhear, Overheard, RefuseCalls,
-    Refused, Request, Retire, TakeCensus,
+    Connect, Disconnect, Ended, Finish, FinishAll, Handled, Overhear, Overheard, PublishInTurn,
+    RefuseCalls, Refused, Request, Retire, TakeCensus,
 };
 use crate::actors::ConnectionId;
 use crate::actors::node::{Publish, Respond};
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages as frames;
 use crate::protocol::ros::rosapi::Census;
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
@@ -54,12 +55,13 @@ impl Handler<Attach> for Registry {
 impl Handler<Connect> for Registry {
     type Result = Result<ConnectionId, Refused>;
 
-    fn handle(&mut self, Connect(outlets): Connect, _: &mut Context<Self>) -> Self::Result {
+    fn handle(&mut self, Connect(outlets): Connect, ctx: &mut Context<Self>) -> Self::Result {
         if self.closed.is_some() {
             return Err(Refused::Closed);
         }
         if self.clients.len() >= self.max_connections {
             self.displace();
+            self.look_at_endings(ctx);
         }
         if self.clients.len() >= self.max_connections {
             return Err(Refused::Full(self.max_connections));
@@ -85,8 +87,9 @@ impl Handler<Ended> for Registry {
 impl Handler<Retire> for Registry {
     type Result = Handled;
 
-    fn handle(&mut self, Retire(id): Retire, _: &mut Context<Self>) -> Handled {
+    fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
         self.withdraw(id);
+        self.look_at_endings(ctx);
         if self.services.waiting_for(id) == 0 {
             return Handled::at_once();
         }
@@ -101,8 +104,9 @@ impl Handler<Retire> for Registry {
 impl Handler<Disconnect> for Registry {
     type Result = ();
 
-    fn handle(&mut self, Disconnect(id): Disconnect, _: &mut Context<Self>) {
+    fn handle(&mut self, Disconnect(id): Disconnect, ctx: &mut Context<Self>) {
         self.forget(id);
+        self.look_at_endings(ctx);
     }
 }
 
@@ -120,19 +124,20 @@ impl Handler<Request> for Registry {
 impl Handler<Publish> for Registry {
     type Result = ();
 
-    fn handle(&mut self, Publish { topic, frame }: Publish, _: &mut Context<Self>) {
-        let name = topic.name();
-        if !self.is_wanted(name) {
-            return;
+    fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
+        self.publish_own(publish, None);
+    }
+}
+
+impl Handler<PublishInTurn> for Registry {
+    type Result = Handled;
+
+    fn handle(&mut self, PublishInTurn(messages): PublishInTurn, _: &mut Context<Self>) -> Handled {
+        let mut pace = Pace::default();
+        for message in messages {
+            self.publish_own(message, Some(&mut pace));
         }
-        let frame = frame.write();
-        self.ear.hear(Overheard::Published(topic, &frame));
-        self.fan_out(name, None, |spelling| {
-            frames::respelled(name, spelling, &frame)
-        });
-        if topic.is_latched() {
-            self.latched.insert(topic, frame);
-        }
+        pace.and(Handled::at_once())
     }
 }
 
@@ -219,17 +224,6 @@ impl Handler<FinishAll> for Registry {
         clients.sort_unstable_by_key(|(id, _)| **id);
         for (_, client) in clients {
             client.outlets.finish.do_send(Finish);
-        }
-    }
-}
-
-impl Handler<TimedOut> for Registry {
-    type Result = ();
-
-    fn handle(&mut self, TimedOut(number): TimedOut, _: &mut Context<Self>) {
-        if let Some(call) = self.services.take(number) {
-            let why = Refusal::TimedOut(call.service.to_string());
-            self.answer_forwarded(&call, &why);
         }
     }
 }

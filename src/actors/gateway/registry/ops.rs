@@ -171,7 +171,7 @@ impl Registry {
             messages::publish_raw(spelling, msg)
         });
         let Some(listener) = listener else {
-            return Handled::at_once().and_by_subscribers(pace.end());
+            return pace.and(Handled::at_once());
         };
         if let Some(topic) = Topic::from_name(topic) {
             self.ear.hear(Overheard::Heard(topic, msg));
@@ -184,7 +184,7 @@ impl Registry {
             id: origin.id,
             done,
         });
-        Handled::by_node(ended).and_by_subscribers(pace.end())
+        pace.and(Handled::by_node(ended))
     }
 
     /// Delivers messages of a client as they are, if it advertises the topic.
@@ -197,7 +197,7 @@ impl Registry {
                 messages::respelled(topic, spelling, &lines.frames)
             });
         }
-        Handled::at_once().and_by_subscribers(pace.end())
+        pace.and(Handled::at_once())
     }
 
     fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {

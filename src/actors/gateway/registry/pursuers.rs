@@ -3,9 +3,10 @@
 //! **Invariant:** a forwarded goal ends by its own pursuer's result, or with that client, and only once. Goals outlive
 //! who sent them; then nobody hears of them any more.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 
+use super::numbers::Numbers;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::registry::services::{Provider, Services};
 use crate::actors::resources::budget::Share;
@@ -33,9 +34,9 @@ pub(super) struct ForwardedGoal {
 pub(super) struct Pursuers {
     /// By absolute name.
     pursuers: HashMap<Box<str>, Provider>,
-    goals: BTreeMap<u64, ForwardedGoal>,
-    /// Numbers of goals by who sent them, so that neither the limit nor a cancellation costs a search.
-    sent: HashMap<ConnectionId, Vec<u64>>,
+    goals: HashMap<u64, ForwardedGoal>,
+    by_sender: Numbers,
+    by_pursuer: Numbers,
     goals_made: u64,
 }
 
@@ -61,14 +62,15 @@ impl Pursuers {
 
     /// Goals of `sender` that have not ended.
     pub(super) fn sent_by(&self, sender: ConnectionId) -> usize {
-        self.sent.get(&sender).map_or(0, Vec::len)
+        self.by_sender.count(sender)
     }
 
     /// Takes a goal in; gives the id under which it goes to its pursuer.
     pub(super) fn remember(&mut self, goal: ForwardedGoal) -> String {
         self.goals_made += 1;
         let number = self.goals_made;
-        self.sent.entry(goal.sender).or_default().push(number);
+        self.by_sender.add(goal.sender, number);
+        self.by_pursuer.add(goal.pursuer, number);
         self.goals.insert(number, goal);
         Services::call_id(number)
     }
@@ -94,8 +96,8 @@ impl Pursuers {
         action: &str,
         sender: ConnectionId,
     ) -> Option<(String, &ForwardedGoal)> {
-        let sent = self.sent.get(&sender)?.iter().rev();
-        let mut goals = sent.filter_map(|number| Some((*number, self.goals.get(number)?)));
+        let sent = self.by_sender.newest(sender);
+        let mut goals = sent.filter_map(|number| Some((number, self.goals.get(&number)?)));
         let action = names::absolute(action);
         let (number, goal) = goals
             .find(|(_, goal)| goal.id.as_ref() == id && names::absolute(&goal.action) == action)?;
@@ -109,32 +111,20 @@ impl Pursuers {
     /// Takes a goal out, which has ended.
     pub(super) fn take(&mut self, number: u64) -> Option<ForwardedGoal> {
         let goal = self.goals.remove(&number)?;
-        if let Some(sent) = self.sent.get_mut(&goal.sender) {
-            sent.retain(|one| *one != number);
-            if sent.is_empty() {
-                self.sent.remove(&goal.sender);
-            }
-        }
+        self.by_sender.remove(goal.sender, number);
+        self.by_pursuer.remove(goal.pursuer, number);
         Some(goal)
     }
 
-    /// Takes out the goals that `pursuer` has not ended, oldest first.
-    pub(super) fn take_pursued_by(&mut self, pursuer: ConnectionId) -> Vec<ForwardedGoal> {
-        let goals = self
-            .goals
-            .iter()
-            .filter(|(_, goal)| goal.pursuer == pursuer);
-        let numbers: Vec<u64> = goals.map(|(number, _)| *number).collect();
-        numbers
-            .into_iter()
-            .filter_map(|number| self.take(number))
-            .collect()
+    /// Takes the numbers of the goals that `pursuer` has not ended, and will not end.
+    pub(super) fn take_numbers(&mut self, pursuer: ConnectionId) -> BTreeSet<u64> {
+        self.by_pursuer.take(pursuer)
     }
 
     /// Forgets the goals that `sender` has sent.
     pub(super) fn forget_sender(&mut self, sender: ConnectionId) {
-        for number in self.sent.remove(&sender).unwrap_or_default() {
-            self.goals.remove(&number);
+        for number in self.by_sender.take(sender) {
+            self.take(number);
         }
     }
 }

@@ -2,13 +2,11 @@
 //!
 //! **Invariant:** a forwarded call is completed by its own provider's connection, or by its end, and only once.
 
-use std::collections::hash_map::Entry;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use actix::prelude::*;
-use tokio::task::AbortHandle;
 use tokio::time::Instant;
 
+use super::numbers::Numbers;
 use crate::actors::ConnectionId;
 use crate::actors::resources::budget::Share;
 use crate::protocol::names;
@@ -26,17 +24,11 @@ pub(super) struct Forwarded {
     pub(super) provider: ConnectionId,
     /// The service's name as the caller spells it.
     pub(super) service: Box<str>,
-    /// When the caller's patience ends. The timer may be heard of later than that, where the process has stood still.
+    /// When the caller's patience ends. The registry may look later than that, where the process has stood still.
     pub(super) deadline: Instant,
-    pub(super) timer: AbortHandle,
-    /// Its share of its caller's account. The timer has a share of its own.
+    /// Its share of its caller's account.
     pub(super) _share: Share,
 }
-
-/// A forwarded call has waited as long as its caller allowed. From the registry's own timers; holds the call's number.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub(super) struct TimedOut(pub(super) u64);
 
 /// Who provides a service.
 #[derive(Clone)]
@@ -52,8 +44,9 @@ pub(super) struct Services {
     /// By absolute name.
     providers: HashMap<Box<str>, Provider>,
     outstanding: BTreeMap<u64, Forwarded>,
-    /// Outstanding calls by caller, so that the limit costs no search.
-    waiting: HashMap<ConnectionId, usize>,
+    by_caller: Numbers,
+    by_provider: Numbers,
+    by_deadline: BTreeSet<(Instant, u64)>,
     calls_made: u64,
 }
 
@@ -99,13 +92,15 @@ impl Services {
     }
 
     pub(super) fn remember(&mut self, number: u64, call: Forwarded) {
-        *self.waiting.entry(call.caller).or_default() += 1;
+        self.by_caller.add(call.caller, number);
+        self.by_provider.add(call.provider, number);
+        self.by_deadline.insert((call.deadline, number));
         self.outstanding.insert(number, call);
     }
 
     /// Calls of `connection` that wait for a provider's answer.
     pub(super) fn waiting_for(&self, connection: ConnectionId) -> usize {
-        self.waiting.get(&connection).copied().unwrap_or_default()
+        self.by_caller.count(connection)
     }
 
     /// Takes the outstanding call that `provider` answers with `id`, if it is that provider's and of that service.
@@ -126,46 +121,42 @@ impl Services {
         self.take(number)
     }
 
-    /// Takes an outstanding call, whoever provides it, and stops its clock.
+    /// Takes an outstanding call, whoever provides it.
     pub(super) fn take(&mut self, number: u64) -> Option<Forwarded> {
         let call = self.outstanding.remove(&number)?;
-        call.timer.abort();
-        if let Entry::Occupied(mut waiting) = self.waiting.entry(call.caller) {
-            *waiting.get_mut() -= 1;
-            if *waiting.get() == 0 {
-                waiting.remove();
-            }
-        }
+        self.by_caller.remove(call.caller, number);
+        self.by_provider.remove(call.provider, number);
+        self.by_deadline.remove(&(call.deadline, number));
         Some(call)
     }
 
     /// Takes every outstanding call, oldest first.
     pub(super) fn take_all(&mut self) -> Vec<Forwarded> {
-        self.take_where(|_| true)
+        let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
+        let calls = numbers.into_iter().map(|number| self.take(number));
+        calls.flatten().collect()
     }
 
-    /// Takes the calls that wait for `provider`, oldest first.
-    pub(super) fn take_provided_by(&mut self, provider: ConnectionId) -> Vec<Forwarded> {
-        self.take_where(|call| call.provider == provider)
+    /// When the first outstanding call's time will be over.
+    pub(super) fn next_deadline(&self) -> Option<Instant> {
+        self.by_deadline.first().map(|(deadline, _)| *deadline)
+    }
+
+    /// Takes the call whose time has been over for longest, if there is one.
+    pub(super) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
+        let (_, number) = *self.by_deadline.first().filter(|(due, _)| *due <= now)?;
+        self.take(number)
+    }
+
+    /// Takes the numbers of the calls that wait for `provider`, which will not answer them.
+    pub(super) fn take_numbers(&mut self, provider: ConnectionId) -> BTreeSet<u64> {
+        self.by_provider.take(provider)
     }
 
     /// Forgets the calls that `caller` has made.
     pub(super) fn forget_caller(&mut self, caller: ConnectionId) {
-        if self.waiting_for(caller) > 0 {
-            self.take_where(|call| call.caller == caller);
+        for number in self.by_caller.take(caller) {
+            self.take(number);
         }
-    }
-
-    fn take_where(&mut self, wanted: impl Fn(&Forwarded) -> bool) -> Vec<Forwarded> {
-        let numbers: Vec<u64> = self
-            .outstanding
-            .iter()
-            .filter(|(_, call)| wanted(call))
-            .map(|(number, _)| *number)
-            .collect();
-        numbers
-            .into_iter()
-            .filter_map(|number| self.take(number))
-            .collect()
     }
 }

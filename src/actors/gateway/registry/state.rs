@@ -11,6 +11,7 @@ use tokio::sync::oneshot;
 
 use super::census::{Tally, Use};
 use super::ear::Ear;
+use super::endings::Endings;
 use super::nodes::Nodes;
 use super::pursuers::Pursuers;
 use super::refusal::Refusal;
@@ -34,6 +35,7 @@ pub struct Registry {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) pursuers: Pursuers,
+    pub(super) endings: Endings,
     pub(super) nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     pub(super) latched: HashMap<Topic, Bytes>,
@@ -81,6 +83,7 @@ impl Registry {
             topics: Topics::default(),
             services: Services::default(),
             pursuers: Pursuers::default(),
+            endings: Endings::default(),
             nodes: Nodes::default(),
             latched: HashMap::new(),
             fragmented: Arc::default(),
@@ -153,7 +156,8 @@ impl Client {
 }
 
 impl Registry {
-    /// Withdraws all that a client has registered, and fails the calls that wait for it as provider.
+    /// Withdraws all that a client has registered; the calls that wait for it as provider, and the goals that it pursues,
+    /// will be ended.
     pub(super) fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
@@ -174,14 +178,9 @@ impl Registry {
         for action in pursued.keys() {
             self.withdraw_action(action, id);
         }
-        for goal in self.pursuers.take_pursued_by(id) {
-            let why = Refusal::ProviderGone(goal.action.to_string());
-            self.abort(&goal, &why);
-        }
-        for call in self.services.take_provided_by(id) {
-            let why = Refusal::ProviderGone(call.service.to_string());
-            self.answer_forwarded(&call, &why);
-        }
+        let goals = self.pursuers.take_numbers(id);
+        let calls = self.services.take_numbers(id);
+        self.endings.leave(goals, calls);
     }
 
     /// Forgets a client and all that there was for it.
