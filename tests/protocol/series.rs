@@ -192,6 +192,57 @@ fn a_full_outbox_drops_the_oldest_messages_of_a_series_and_keeps_the_rest() {
     assert_eq!((batch.len(), outbox.topic_bytes()), (2, 0));
 }
 
+/// Whatever is dropped at once, it is what message by message would have gone, and as many are counted.
+#[test]
+fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n:06}}}"));
+    let length = numbered(0).len();
+    for kept in [
+        0,
+        1,
+        length - 1,
+        length,
+        length + 1,
+        500 * length,
+        999 * length,
+    ] {
+        let mut outbox = Outbox::new();
+        let series: String = (0..1000).map(numbered).collect();
+        outbox.push(&topic, Bytes::from(series), now);
+        outbox.push(&topic, Bytes::from(vec![b' '; MAX_TOPIC_BYTES - kept]), now);
+        let left = kept / length;
+        assert_eq!(outbox.dropped(), 1000 - left as u64, "{kept}");
+        let mut batch = Vec::new();
+        outbox.take_batch(now, 1, usize::MAX, &mut batch);
+        assert_eq!(left > 0, batch[0] == numbered(1000 - left), "{kept}");
+    }
+}
+
+#[test]
+fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
+    for length in [1, 2, 8, 9, 10, 50] {
+        let mut outbox = Outbox::new();
+        outbox.set_throttle(&topic, Some((Duration::from_millis(10), length)));
+        for series in [0..10, 10..20] {
+            let series: String = series.map(numbered).collect();
+            outbox.push(&topic, Bytes::from(series), now);
+        }
+        let mut batch = Vec::new();
+        for n in 0..30 {
+            let later = now + n * Duration::from_millis(10);
+            outbox.take_batch(later, 1, usize::MAX, &mut batch);
+        }
+        let first = 20 - length.min(19);
+        let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
+        assert_eq!(batch, wanted, "{length}");
+    }
+}
+
 #[test]
 fn a_throttled_topic_gets_each_message_of_a_series_by_itself() {
     let now = Instant::now();

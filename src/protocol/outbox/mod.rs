@@ -18,11 +18,11 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bytes::Bytes;
+use bytes::{Buf, Bytes};
 
 use crate::protocol::limits::MAX_FRAME;
 use crate::protocol::outbox::throttle::Throttles;
-use crate::protocol::wire::series::{first_message, messages};
+use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
 /// Most bytes of topic messages that wait for one connection: the longest message that a client may send (and the
 /// newline behind it), or minutes of the arm's own.
@@ -78,13 +78,13 @@ impl Outbox {
             let number = self.number();
             self.enqueue(number, frame);
         }
-        self.drop_while(|outbox| outbox.topic_bytes() > MAX_TOPIC_BYTES);
+        self.drop_oldest(|outbox| outbox.topic_bytes().saturating_sub(MAX_TOPIC_BYTES));
     }
 
     /// Drops topic messages, the oldest first, until those that are left take at most so many bytes, their places
     /// included.
     pub fn keep_topics(&mut self, bytes: usize) {
-        self.drop_while(|outbox| outbox.topic_cost() > bytes);
+        self.drop_oldest(|outbox| outbox.topic_cost().saturating_sub(bytes));
         self.shrink();
     }
 
@@ -248,14 +248,30 @@ impl Outbox {
         self.produced
     }
 
-    /// Gives the throttle each message by itself.
-    fn offer(&mut self, topic: &Arc<str>, frames: Bytes, now: Instant) {
-        for frame in messages(frames) {
-            let number = self.number();
-            if let Some(frame) = self.throttles.offer(topic, number, frame, now) {
-                self.enqueue(number, frame);
+    /// Gives the throttle each message by itself. Once one is held back, those behind it are too, and of these only the
+    /// newest would be left.
+    fn offer(&mut self, topic: &Arc<str>, mut frames: Bytes, now: Instant) {
+        while !frames.is_empty() {
+            let frame = frames.split_to(first_message(&frames));
+            if !self.offer_one(topic, frame, now) {
+                let left = self.throttles.queue_length(topic);
+                for frame in messages(last_messages(frames, left)) {
+                    self.offer_one(topic, frame, now);
+                }
+                return;
             }
         }
+    }
+
+    /// Gives the throttle a message; false if it is held back.
+    fn offer_one(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) -> bool {
+        let number = self.number();
+        let frame = self.throttles.offer(topic, number, frame, now);
+        let goes = frame.is_some();
+        if let Some(frame) = frame {
+            self.enqueue(number, frame);
+        }
+        goes
     }
 
     fn enqueue(&mut self, number: u64, frame: Bytes) {
@@ -274,25 +290,31 @@ impl Outbox {
         }
     }
 
-    /// Drops the oldest topic messages for as long as that is too many: of the queue's first and the longest held
-    /// back, the older.
-    fn drop_while(&mut self, too_many: impl Fn(&Self) -> bool) {
-        while too_many(self) {
+    /// Drops the oldest topic messages for as long as so many bytes are too many: of the queue's first and the longest
+    /// held back, the older. Those of a series that have to go, go together.
+    fn drop_oldest(&mut self, too_many: impl Fn(&Self) -> usize) {
+        loop {
+            let excess = too_many(self);
+            if excess == 0 {
+                return;
+            }
             let queued = self.topics.front().map(|(number, _)| *number);
             let held = self.throttles.oldest();
             if held.is_some_and(|held| queued.is_none_or(|queued| held < queued)) {
                 self.throttles.drop_oldest();
+                self.dropped += 1;
             } else if let Some((_, frames)) = self.topics.front_mut() {
-                let oldest = frames.split_to(first_message(frames));
+                let (bytes, count) = first_messages(frames, excess);
+                frames.advance(bytes);
                 if frames.is_empty() {
                     self.topics.pop_front();
                 }
-                self.topic_bytes -= oldest.len();
+                self.topic_bytes -= bytes;
+                self.dropped += count as u64;
             } else {
                 debug_assert!(false, "bytes are counted that no message has");
                 return;
             }
-            self.dropped += 1;
         }
     }
 

@@ -71,6 +71,11 @@ impl Throttles {
         self.topics.is_empty()
     }
 
+    /// How many messages of a topic may be held back.
+    pub(super) fn queue_length(&self, topic: &str) -> usize {
+        self.topics.get(topic).map_or(0, |one| one.queue_length)
+    }
+
     /// Bytes held back.
     pub(super) const fn bytes(&self) -> usize {
         self.bytes

@@ -71,8 +71,51 @@ pub fn first_message(frames: &[u8]) -> usize {
     if !frames.starts_with(HEAD) {
         return frames.len();
     }
-    let end = frames.iter().position(|byte| *byte == b'\n');
-    end.map_or(frames.len(), |end| end + 1)
+    first_line(frames)
+}
+
+/// The first messages of frames for one client that have so many bytes together, or all of them: how long these are,
+/// and how many. One at least.
+#[must_use]
+pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
+    if !frames.starts_with(HEAD) {
+        return (frames.len(), 1);
+    }
+    let from = bytes.saturating_sub(1).min(frames.len());
+    let (before, behind) = frames.split_at(from);
+    let end = from + first_line(behind);
+    (end, lines(before) + 1)
+}
+
+/// How many lines end in `bytes`. So few at a time that their number fits into a byte: the compiler makes that many
+/// times as fast.
+fn lines(bytes: &[u8]) -> usize {
+    let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
+    let parts = bytes.chunks(u8::MAX.into());
+    parts.map(|part| usize::from(ends(part))).sum()
+}
+
+fn first_line(bytes: &[u8]) -> usize {
+    let end = bytes.iter().position(|byte| *byte == b'\n');
+    end.map_or(bytes.len(), |end| end + 1)
+}
+
+/// The last messages of a series, at most so many.
+#[must_use]
+pub fn last_messages(mut frames: Bytes, count: usize) -> Bytes {
+    let mut start = frames.len();
+    for _ in 0..count {
+        // A message ends with a newline, its own.
+        let before = frames.get(..start.saturating_sub(1)).unwrap_or_default();
+        start = before
+            .iter()
+            .rposition(|byte| *byte == b'\n')
+            .map_or(0, |end| end + 1);
+        if start == 0 {
+            break;
+        }
+    }
+    frames.split_off(start)
 }
 
 /// Each message of `frames` by itself.
