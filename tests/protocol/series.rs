@@ -192,7 +192,7 @@ fn a_full_outbox_drops_the_oldest_messages_of_a_series_and_keeps_the_rest() {
     assert_eq!((batch.len(), outbox.topic_bytes()), (2, 0));
 }
 
-/// Whatever is dropped at once, it is what message by message would have gone, and as many are counted.
+/// As many go, and are counted, as would have gone message by message.
 #[test]
 fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
     let now = Instant::now();

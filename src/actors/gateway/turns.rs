@@ -2,15 +2,17 @@
 //!
 //! One thread serves every client, and a light call passes it some eight times on its way. Were each of two hundred
 //! clients that send all they can, or each of a thousand subscribers of a message, to go on every time around, the
-//! call would wait for all of them eight times. So a reader with a whole chunk or many frames at hand stands in one
-//! line, and a writer in another once much has been written of late.
+//! call would wait for all of them eight times. So a reader with a whole chunk or many frames at hand, or whose message
+//! has gone to many, stands in one line, and a writer in another once much has been written of late.
 //!
 //! **Invariant:** between two looks at what else there is to do, each line lets only so many go on, first come, first
 //! served.
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
+use std::future::poll_fn;
 use std::rc::{Rc, Weak};
+use std::task::Poll;
 
 use tokio::sync::oneshot;
 
@@ -162,7 +164,21 @@ impl<W: StandsInLine> LineTask<W> {
                     bytes += wanted;
                 }
             }
-            tokio::task::yield_now().await;
+            everybody_else().await;
         }
     }
+}
+
+/// Ends when all who are at hand have had a turn. `yield_now` ends before: when some sixty have.
+async fn everybody_else() {
+    let mut has_waited = false;
+    poll_fn(|cx| {
+        if std::mem::replace(&mut has_waited, true) {
+            return Poll::Ready(());
+        }
+        // Behind all who are awake now.
+        cx.waker().wake_by_ref();
+        Poll::Pending
+    })
+    .await;
 }

@@ -1,4 +1,4 @@
-//! What is due of the record, and its way to the subscribers.
+//! The part of the record that is due, and its way to the subscribers.
 //!
 //! **Invariant:** what is published next waits until what was has been offered to every subscriber.
 
@@ -119,7 +119,7 @@ impl<const N: usize> Player<N> {
         Ok(None)
     }
 
-    /// What is owed is what is present now.
+    /// Owes the messages that are present, and nothing else.
     pub(super) fn owe_all_present(&mut self) -> Result<(), ReadError> {
         for moment in self.owed.drain(..) {
             // It has not been published.

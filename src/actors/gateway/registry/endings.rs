@@ -2,8 +2,6 @@
 //!
 //! **Invariant:** however many end at one instant, everybody else has a turn after every few of them.
 
-use std::collections::{BTreeSet, VecDeque};
-
 use actix::prelude::*;
 use tokio::time::{Instant, sleep_until};
 
@@ -13,48 +11,14 @@ use super::state::Registry;
 /// Calls and goals that are ended in a row: a third of a millisecond's.
 const ENDED_IN_A_ROW: usize = 128;
 
-/// What is to be ended, beside the calls whose time will be over. Numbers stand together as they were left.
-#[derive(Default)]
-pub(super) struct Endings {
-    /// Calls whose providers have gone.
-    calls: VecDeque<BTreeSet<u64>>,
-    /// Goals whose pursuers have gone.
-    goals: VecDeque<BTreeSet<u64>>,
-    /// When the registry looks at it next, and the task that waits for that.
-    look: Option<(Instant, SpawnHandle)>,
-}
-
-impl Endings {
-    /// Somebody has gone who pursued these goals and provided these calls.
-    pub(super) fn leave(&mut self, goals: BTreeSet<u64>, calls: BTreeSet<u64>) {
-        self.goals.push_back(goals);
-        self.calls.push_back(calls);
-    }
-
-    fn is_empty(&self) -> bool {
-        self.goals.is_empty() && self.calls.is_empty()
-    }
-}
-
-/// Takes the next number out.
-fn next(left: &mut VecDeque<BTreeSet<u64>>) -> Option<u64> {
-    while let Some(numbers) = left.front_mut() {
-        if let Some(number) = numbers.pop_first() {
-            return Some(number);
-        }
-        left.pop_front();
-    }
-    None
-}
-
 impl Registry {
     /// Has a look taken at what is to be ended, in time for the next.
     pub(super) fn look_at_endings(&mut self, ctx: &mut Context<Self>) {
-        let left = (!self.endings.is_empty()).then(Instant::now);
+        let left = (!self.left.is_empty()).then(Instant::now);
         let Some(due) = left.or_else(|| self.services.next_deadline()) else {
             return;
         };
-        if let Some((look, waiting)) = self.endings.look {
+        if let Some((look, waiting)) = self.look {
             if look <= due {
                 return;
             }
@@ -65,11 +29,11 @@ impl Registry {
             sleep_until(due).await;
         };
         let waiting = ctx.spawn(wait.into_actor(self).map(|(), registry, ctx| {
-            registry.endings.look = None;
+            registry.look = None;
             registry.end_some();
             registry.look_at_endings(ctx);
         }));
-        self.endings.look = Some((due, waiting));
+        self.look = Some((due, waiting));
     }
 
     /// Ends some of what is to be ended.
@@ -79,9 +43,9 @@ impl Registry {
             if let Some(call) = self.services.take_due(now) {
                 let why = Refusal::TimedOut(call.service.to_string());
                 self.answer_forwarded(&call, &why);
-            } else if let Some(number) = next(&mut self.endings.goals) {
+            } else if let Some(number) = self.left.next_goal() {
                 self.end_goal(number);
-            } else if let Some(number) = next(&mut self.endings.calls) {
+            } else if let Some(number) = self.left.next_call() {
                 self.end_call(number);
             } else {
                 return;

@@ -6,13 +6,15 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use actix::SpawnHandle;
 use bytes::Bytes;
 use tokio::sync::oneshot;
+use tokio::time::Instant;
 
 use super::census::{Tally, Use};
 use super::ear::Ear;
-use super::endings::Endings;
 use super::nodes::Nodes;
+use super::numbers::Left;
 use super::pursuers::Pursuers;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
@@ -35,7 +37,10 @@ pub struct Registry {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) pursuers: Pursuers,
-    pub(super) endings: Endings,
+    /// Calls and goals of those who have gone, which will be ended.
+    pub(super) left: Left,
+    /// When the registry looks next at what is to be ended, and the task that waits for that.
+    pub(super) look: Option<(Instant, SpawnHandle)>,
     pub(super) nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     pub(super) latched: HashMap<Topic, Bytes>,
@@ -83,7 +88,8 @@ impl Registry {
             topics: Topics::default(),
             services: Services::default(),
             pursuers: Pursuers::default(),
-            endings: Endings::default(),
+            left: Left::default(),
+            look: None,
             nodes: Nodes::default(),
             latched: HashMap::new(),
             fragmented: Arc::default(),
@@ -156,8 +162,8 @@ impl Client {
 }
 
 impl Registry {
-    /// Withdraws all that a client has registered; the calls that wait for it as provider, and the goals that it pursues,
-    /// will be ended.
+    /// Withdraws all that a client has registered; the calls that wait for it as provider, and the goals that it
+    /// pursues, will be ended.
     pub(super) fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
@@ -180,7 +186,7 @@ impl Registry {
         }
         let goals = self.pursuers.take_numbers(id);
         let calls = self.services.take_numbers(id);
-        self.endings.leave(goals, calls);
+        self.left.add(goals, calls);
     }
 
     /// Forgets a client and all that there was for it.

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** an account is charged by whoever allocates, and given back by whoever frees.
 
+use std::cmp::Reverse;
 use std::sync::atomic::{AtomicU8, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 
@@ -9,6 +10,11 @@ use tokio::sync::Notify;
 
 use super::{MESSAGES_LEFT, MODEST};
 use crate::protocol::outbox::{FRAME_BYTES, PLACE_BYTES};
+
+/// The part of the limit by which it may be exceeded while those who give way are leaving.
+const LEAVING: usize = 64;
+/// The part of it that is made free where messages give way, so that the next message finds room.
+const ROOM: usize = 16;
 
 /// The sum of all accounts, and what is known of it.
 #[derive(Debug)]
@@ -20,6 +26,8 @@ pub(super) struct Sum {
     pub(super) promised: AtomicUsize,
     /// The part of it that waited for clients that are gone, and is being freed.
     pub(super) freed: AtomicUsize,
+    /// When more than this is held, a look is taken at who gives way.
+    look: AtomicUsize,
     accounts: Mutex<Vec<Weak<Account>>>,
     /// Connections that gave way.
     pub(super) cut_off: AtomicU64,
@@ -33,6 +41,7 @@ impl Sum {
             held: AtomicUsize::new(0),
             promised: AtomicUsize::new(0),
             freed: AtomicUsize::new(0),
+            look: AtomicUsize::new(limit),
             accounts: Mutex::default(),
             cut_off: AtomicU64::new(0),
         }
@@ -44,13 +53,16 @@ impl Sum {
     }
 
     pub(super) fn add(&self, bytes: usize) {
-        if self.held.fetch_add(bytes, Ordering::Relaxed) + bytes > self.limit {
+        let held = self.held.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        if held > self.look.load(Ordering::Relaxed) {
             self.relieve();
         }
     }
 
     pub(super) fn give_back(&self, bytes: usize) {
-        self.held.fetch_sub(bytes, Ordering::Relaxed);
+        if self.held.fetch_sub(bytes, Ordering::Relaxed) - bytes <= self.limit {
+            self.look.store(self.limit, Ordering::Relaxed);
+        }
     }
 
     /// The accounts of all who are connected.
@@ -61,20 +73,33 @@ impl Sum {
 
     /// Has clients give way, those that hold most first, until what is left will fit.
     fn relieve(&self) {
-        while self.held.load(Ordering::Relaxed) > self.limit {
-            let all = self.open();
-            let staying = self.held.load(Ordering::Relaxed);
-            if staying.saturating_sub(self.leaving(&all)) <= self.limit {
-                return;
+        let held = self.held.load(Ordering::Relaxed);
+        if held <= self.limit {
+            return;
+        }
+        let mut all = self.open();
+        let leaving = self.leaving(&all);
+        let mut staying = held.saturating_sub(leaving);
+        if staying > self.limit {
+            all.retain(|one| one.is_serving());
+            all.sort_by_cached_key(|one| Reverse(one.held()));
+            for most in &all {
+                let room = if most.has_messages() {
+                    self.limit / ROOM
+                } else {
+                    0
+                };
+                if staying + room <= self.limit || most.held() <= MODEST {
+                    break;
+                }
+                most.give_way();
+                staying = staying.saturating_sub(most.leaving());
             }
-            let serving = all.iter().filter(|one| one.is_serving());
-            let Some(most) = serving.max_by_key(|one| one.held()) else {
-                return;
-            };
-            if most.held() <= MODEST {
-                return;
-            }
-            most.give_way();
+        }
+        if staying < held {
+            // Until these have left, a look at a thousand clients at every allocation would cost more than all else.
+            let soon = held + self.limit / LEAVING;
+            self.look.store(soon, Ordering::Relaxed);
         }
     }
 
@@ -180,9 +205,17 @@ impl Account {
         }
     }
 
+    /// Whether its messages are worth asking for.
+    fn has_messages(&self) -> bool {
+        self.messages() > 2 * MESSAGES_LEFT
+    }
+
     fn give_way(&self) {
-        let has_messages = self.messages() > 2 * MESSAGES_LEFT;
-        let what = if has_messages { MESSAGES } else { CONNECTION };
+        let what = if self.has_messages() {
+            MESSAGES
+        } else {
+            CONNECTION
+        };
         let order = Ordering::SeqCst;
         let before = self.asked.compare_exchange(NOTHING, what, order, order);
         if before.is_err() {
