@@ -8,6 +8,7 @@
 pub mod admission;
 pub mod arm;
 pub mod computing;
+pub mod crowds;
 pub mod forms;
 pub mod gateway;
 pub mod memory;
@@ -98,7 +99,7 @@ impl Attack {
 }
 
 /// All attacks, by what they are aimed at.
-pub fn groups() -> [(&'static str, &'static [Attack]); 8] {
+pub fn groups() -> [(&'static str, &'static [Attack]); 9] {
     [
         ("gateway", gateway::ATTACKS),
         ("websocket", websocket::ATTACKS),
@@ -107,6 +108,7 @@ pub fn groups() -> [(&'static str, &'static [Attack]); 8] {
         ("memory", memory::ATTACKS),
         ("forms", forms::ATTACKS),
         ("names", names::ATTACKS),
+        ("crowds", crowds::ATTACKS),
         ("admission", admission::ATTACKS),
     ]
 }

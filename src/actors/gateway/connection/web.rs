@@ -13,7 +13,7 @@ use std::pin::Pin;
 use std::rc::Rc;
 use std::time::Duration;
 
-use bytes::{Bytes, BytesMut};
+use bytes::{Buf, Bytes, BytesMut};
 use futures_util::{SinkExt, StreamExt};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::{Instant, sleep_until};
@@ -298,15 +298,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         // Pongs that wait would take the room of what is put there.
         self.link.flush().await?;
         let mut written = 0;
-        for frame in frames {
+        let mut waiting = frames.iter().cloned();
+        let mut frame = waiting.next()?;
+        loop {
             let room = FRAGMENT.saturating_sub(written);
-            if written > 0 && frame.len() > room {
+            let kind = self.unfinished.unwrap_or_else(|| kind_of(&frame));
+            let (piece, is_last) = first_piece(&frame, kind == Data::Text, room);
+            if written > 0 && !is_last {
                 break;
             }
-            let kind = self.unfinished.unwrap_or_else(|| kind_of(frame));
-            let (piece, is_last) = first_piece(frame, kind == Data::Text, room);
             written += piece.len();
-            let is_whole = piece.len() == frame.len();
+            frame.advance(piece.len());
             let opcode = match self.unfinished {
                 Some(_) => Data::Continue,
                 None => kind,
@@ -318,8 +320,14 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
             };
             let part = Frame::message(payload, OpCode::Data(opcode), is_last);
             self.link.put(Message::Frame(part))?;
-            if !is_whole {
+            if !is_last {
                 break;
+            }
+            if frame.is_empty() {
+                let Some(next) = waiting.next() else {
+                    break;
+                };
+                frame = next;
             }
         }
         self.link.flush().await?;

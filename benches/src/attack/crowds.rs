@@ -1,0 +1,95 @@
+//! Aimed at the gateway's thread by numbers: hundreds of clients who all want a little at one instant.
+
+use super::Attack;
+use super::script::{Client, each, on_service, publish, subscribe};
+
+/// Subscribers, or callers: with those who attack them, nearly all places.
+const CROWD: usize = 800;
+/// Calls of a client that may wait.
+const WAITING: usize = 256;
+
+pub const ATTACKS: &[Attack] = &[
+    Attack::new(
+        "storm-beside-waiting",
+        "800 clients have 256 calls wait each; 50 connect, say nothing and go, over and over",
+        storm,
+    ),
+    Attack::new(
+        "late-together",
+        "800 clients have 256 calls wait each, whose time is over at one instant",
+        late_together,
+    ),
+    Attack::new(
+        "left-together",
+        "a provider goes that 800 clients have 256 calls wait for, and another returns",
+        left_together,
+    ),
+    Attack::new(
+        "publishers-to-deaf",
+        "120 clients publish a message each every millisecond to 800 that read nothing",
+        publishers_to_deaf,
+    ),
+    Attack::new(
+        "publishers-to-throttled",
+        "the same to 800 that have all but one message a minute held back",
+        publishers_to_throttled,
+    ),
+    Attack::new(
+        "floods-to-webs",
+        "20 clients flood a topic with short messages to 20 WebSockets that read",
+        floods_to_webs,
+    ),
+];
+
+/// A provider that answers nothing, and callers who are patient for so many seconds; one comes each millisecond.
+fn waiting(provider: Client, patience: impl Fn(usize) -> f64) -> Vec<Client> {
+    let provider = provider.says(&on_service("advertise_service", "/crowd"));
+    let callers = each(0..CROWD, |n| {
+        let timeout = patience(n);
+        let call = format!(r#"{{"op":"call_service","service":"/crowd","timeout":{timeout}}}"#);
+        let caller = Client::tcp().after(100 + n as u64);
+        caller.says_each(0..WAITING, |_| call.clone())
+    });
+    [vec![provider], callers].concat()
+}
+
+fn storm() -> Vec<Client> {
+    let goer = Client::tcp().after(1200).leaves_after(1).returns();
+    [waiting(Client::tcp(), |_| 86_400.0), goer.times(50)].concat()
+}
+
+fn late_together() -> Vec<Client> {
+    waiting(Client::tcp(), |n| 2.5 - n as f64 / 1000.0)
+}
+
+fn left_together() -> Vec<Client> {
+    waiting(Client::tcp().leaves_after(1500).returns(), |_| 86_400.0)
+}
+
+fn publishers(further: &str) -> Vec<Client> {
+    let subscriber = Client::tcp().says(&subscribe("/crowd", further)).deaf();
+    let message = format!("{}\n", publish("/crowd", "{}"));
+    let publisher = Client::tcp()
+        .after(300)
+        .advertises("/crowd")
+        .repeats_bytes(message.as_bytes())
+        .drips(message.len(), std::time::Duration::from_millis(1));
+    [subscriber.times(CROWD), publisher.times(120)].concat()
+}
+
+fn publishers_to_deaf() -> Vec<Client> {
+    publishers("")
+}
+
+fn publishers_to_throttled() -> Vec<Client> {
+    publishers(r#","throttle_rate":60000,"queue_length":1"#)
+}
+
+fn floods_to_webs() -> Vec<Client> {
+    let reader = Client::web().says(&subscribe("/crowd", ""));
+    let flood = Client::tcp()
+        .after(100)
+        .advertises("/crowd")
+        .floods(&publish("/crowd", "{}"));
+    [reader.times(20), flood.times(20)].concat()
+}
