@@ -12,6 +12,7 @@
 //! **Invariant:** dropping removes whole messages, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages
 //! wait, held back ones included.
 
+mod blocks;
 mod throttle;
 
 use std::collections::VecDeque;
@@ -21,6 +22,7 @@ use std::time::{Duration, Instant};
 use bytes::{Buf, Bytes};
 
 use crate::protocol::limits::MAX_FRAME;
+use crate::protocol::outbox::blocks::Blocks;
 use crate::protocol::outbox::throttle::Throttles;
 use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
 
@@ -32,16 +34,14 @@ pub const MAX_TOPIC_BYTES: usize = MAX_FRAME + 1;
 pub const FRAME_BYTES: usize = 192;
 /// Bytes of a place in the queue of topic messages, that of one that is held back, with its two indexes, included.
 pub const PLACE_BYTES: usize = 128;
-/// Room for this many frames is kept while nothing waits: a tick's worth.
-const KEPT_FRAMES: usize = 64;
 
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
 pub struct Outbox {
     /// Topic messages in order, each with its number.
-    topics: VecDeque<(u64, Bytes)>,
+    topics: Blocks<(u64, Bytes)>,
     /// Responses and statuses in order, each with its number.
-    responses: VecDeque<(u64, Bytes)>,
+    responses: Blocks<(u64, Bytes)>,
     throttles: Throttles,
     /// Numbers given so far. Of what is queued the lower leaves first; of what may be dropped the lower is the older.
     produced: u64,
@@ -85,7 +85,6 @@ impl Outbox {
     /// included.
     pub fn keep_topics(&mut self, bytes: usize) {
         self.drop_oldest(|outbox| outbox.topic_cost().saturating_sub(bytes));
-        self.shrink();
     }
 
     /// Whether [`push`](Self::push) and [`take_batch`](Self::take_batch) look at the time that they are given.
@@ -172,7 +171,6 @@ impl Outbox {
             self.in_flight.push_back((length, is_response));
             batch.push(frame);
         }
-        self.shrink();
     }
 
     /// The next `bytes` of what was taken have been written.
@@ -315,44 +313,6 @@ impl Outbox {
                 debug_assert!(false, "bytes are counted that no message has");
                 return;
             }
-        }
-    }
-
-    /// Gives back the memory of a burst once it has been taken.
-    fn shrink(&mut self) {
-        for queue in [&mut self.topics, &mut self.responses] {
-            if queue.is_empty() && queue.capacity() > 4 * KEPT_FRAMES {
-                queue.shrink_to(KEPT_FRAMES);
-            }
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Room for `frames` topic messages and as many responses, taken at once: what of it is still held.
-    fn held_after(frames: usize) -> [usize; 2] {
-        let mut outbox = Outbox::new();
-        let (now, topic) = (Instant::now(), Arc::<str>::from("/a"));
-        for _ in 0..frames {
-            outbox.push(&topic, Bytes::from_static(b"x"), now);
-            outbox.push_response(Bytes::from_static(b"y"), &[]);
-        }
-        let mut batch = Vec::new();
-        outbox.take_batch(now, usize::MAX, usize::MAX, &mut batch);
-        assert_eq!(batch.len(), 2 * frames);
-        [outbox.topics.capacity(), outbox.responses.capacity()]
-    }
-
-    #[test]
-    fn the_memory_of_a_burst_is_given_back_and_that_of_a_few_ticks_kept() {
-        for held in held_after(10_000) {
-            assert!((KEPT_FRAMES..4 * KEPT_FRAMES).contains(&held), "{held}");
-        }
-        for held in held_after(4 * KEPT_FRAMES) {
-            assert!(held >= 4 * KEPT_FRAMES, "{held}");
         }
     }
 }

@@ -1,0 +1,102 @@
+//! A queue in blocks. Used by the [outbox](crate::protocol::outbox) alone.
+//!
+//! **Invariant:** it grows and shrinks by one block at a time. A thousand clients that take nothing are all sent the
+//! same: were their queues doubled and copied, it would be at the same moment.
+
+use std::collections::VecDeque;
+
+/// Places in a block: a tick's worth of frames. One block is kept while nothing waits.
+const BLOCK: usize = 64;
+
+/// A queue of blocks.
+#[derive(Debug)]
+pub(super) struct Blocks<T> {
+    /// None is empty, unless it is the only one.
+    blocks: VecDeque<VecDeque<T>>,
+    len: usize,
+}
+
+impl<T> Default for Blocks<T> {
+    fn default() -> Self {
+        Self {
+            blocks: VecDeque::new(),
+            len: 0,
+        }
+    }
+}
+
+impl<T> Blocks<T> {
+    pub(super) const fn len(&self) -> usize {
+        self.len
+    }
+
+    pub(super) const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    pub(super) fn front(&self) -> Option<&T> {
+        self.blocks.front()?.front()
+    }
+
+    pub(super) fn front_mut(&mut self) -> Option<&mut T> {
+        self.blocks.front_mut()?.front_mut()
+    }
+
+    pub(super) fn push_back(&mut self, item: T) {
+        self.len += 1;
+        if let Some(last) = self.blocks.back_mut().filter(|last| last.len() < BLOCK) {
+            return last.push_back(item);
+        }
+        // The first grows to its size: most queues stay short.
+        let room = if self.blocks.is_empty() { 0 } else { BLOCK };
+        let mut block = VecDeque::with_capacity(room);
+        block.push_back(item);
+        self.blocks.push_back(block);
+    }
+
+    pub(super) fn pop_front(&mut self) -> Option<T> {
+        let first = self.blocks.front_mut()?;
+        let item = first.pop_front()?;
+        self.len -= 1;
+        if first.is_empty() && self.blocks.len() > 1 {
+            self.blocks.pop_front();
+        }
+        Some(item)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_goes_in_comes_out_in_order_and_one_block_is_kept() {
+        let mut queue = Blocks::default();
+        let (mut pushed, mut popped) = (0, 0);
+        for (more, less) in [
+            (1, 1),
+            (BLOCK, 1),
+            (1000, 1030),
+            (0, 33),
+            (5 * BLOCK, 5 * BLOCK),
+        ] {
+            for _ in 0..more {
+                queue.push_back(pushed);
+                pushed += 1;
+            }
+            for _ in 0..less {
+                assert_eq!(queue.front(), Some(&popped));
+                assert_eq!(queue.pop_front(), Some(popped));
+                popped += 1;
+            }
+            assert_eq!(queue.len(), pushed - popped);
+            assert!(queue.blocks.len() <= queue.len() / BLOCK + 2);
+        }
+        assert_eq!(
+            (queue.pop_front(), queue.front(), queue.is_empty()),
+            (None, None, true)
+        );
+        let places: usize = queue.blocks.iter().map(VecDeque::capacity).sum();
+        assert_eq!(places, BLOCK);
+    }
+}
