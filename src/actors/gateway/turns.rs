@@ -10,9 +10,7 @@
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
-use std::future::poll_fn;
 use std::rc::{Rc, Weak};
-use std::task::Poll;
 
 use tokio::sync::oneshot;
 
@@ -164,21 +162,7 @@ impl<W: StandsInLine> LineTask<W> {
                     bytes += wanted;
                 }
             }
-            everybody_else().await;
+            tokio::task::yield_now().await;
         }
     }
-}
-
-/// Ends when all who are at hand have had a turn. `yield_now` ends before: when some sixty have.
-async fn everybody_else() {
-    let mut has_waited = false;
-    poll_fn(|cx| {
-        if std::mem::replace(&mut has_waited, true) {
-            return Poll::Ready(());
-        }
-        // Behind all who are awake now.
-        cx.waker().wake_by_ref();
-        Poll::Pending
-    })
-    .await;
 }
