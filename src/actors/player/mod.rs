@@ -238,6 +238,7 @@ impl<const N: usize> Player<N> {
         if let Err(error) = what(self) {
             tracing::error!(%error, "the record stands still");
             self.is_paused = true;
+            self.target = None;
         }
     }
 
