@@ -76,11 +76,13 @@
 //! `EndRecord`, from the runtime: the beginning and the end of a record.
 //!
 //! `player` is there in the arm's place when a record is replayed. To it: [`node::Call`] of `DriveRecord`, from the
-//! registry, and of the questions to `arm_sim` that ask for settings.
+//! registry, and of the questions to `arm_sim` that ask for settings. From it to the registry: [`PublishInTurn`], whose
+//! end it waits for.
 //!
 //! To `rosapi`: [`node::Call`] of [`Look`], [`GetParam`], [`SetParam`] and so on, from the registry: what there is.
 //!
 //! [`ArmMotion`]: arm::sim::ArmMotion
+//! [`PublishInTurn`]: gateway::messages::PublishInTurn
 //! [`MoveSetpoint`]: arm::sim::MoveSetpoint
 //! [`FollowPath`]: arm::follow::FollowPath
 //! [`StopFollowing`]: arm::follow::StopFollowing

@@ -58,12 +58,7 @@ impl<const N: usize> Player<N> {
         }
         let mut messages = Vec::new();
         while messages.len() < self.at_once {
-            let mut due = None;
-            self.attempt(|player| {
-                due = player.next_due()?;
-                Ok(())
-            });
-            let Some(moment) = due else {
+            let Some(moment) = self.attempt(Self::next_due).flatten() else {
                 break;
             };
             match moment.frame() {

@@ -190,17 +190,17 @@ impl<const N: usize> Handler<SimulationTime> for Player<N> {
     type Result = f64;
 
     fn handle(&mut self, _: SimulationTime, _: &mut Context<Self>) -> f64 {
-        let mut time = 0.0;
-        self.attempt(|player| {
-            if let Some(clock) = player.present(&BTreeSet::from([Topic::Clock]))?.first() {
-                let clock = clock.message()?;
-                let part = |path: &str| clock.pointer(path).and_then(Value::as_f64);
-                let part = |path: &str| part(path).unwrap_or_default();
-                time = part("/clock/sec") + 1e-9 * part("/clock/nanosec");
-            }
-            Ok(())
+        let time = self.attempt(|player| {
+            let present = player.present(&BTreeSet::from([Topic::Clock]))?;
+            let Some(clock) = present.first() else {
+                return Ok(0.0);
+            };
+            let clock = clock.message()?;
+            let part = |path: &str| clock.pointer(path).and_then(Value::as_f64);
+            let part = |path: &str| part(path).unwrap_or_default();
+            Ok(part("/clock/sec") + 1e-9 * part("/clock/nanosec"))
         });
-        time
+        time.unwrap_or_default()
     }
 }
 
@@ -234,12 +234,14 @@ impl<const N: usize> Player<N> {
     }
 
     /// A record that can't be read on stands still.
-    fn attempt(&mut self, what: impl FnOnce(&mut Self) -> Result<(), ReadError>) {
-        if let Err(error) = what(self) {
-            tracing::error!(%error, "the record stands still");
-            self.is_paused = true;
-            self.target = None;
-        }
+    fn attempt<T>(&mut self, what: impl FnOnce(&mut Self) -> Result<T, ReadError>) -> Option<T> {
+        what(self)
+            .inspect_err(|error| {
+                tracing::error!(%error, "the record stands still");
+                self.is_paused = true;
+                self.target = None;
+            })
+            .ok()
     }
 
     /// Whether there is nothing more to come in the direction in which it goes.

@@ -68,10 +68,7 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
 /// all of it.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
-    if !frames.starts_with(HEAD) {
-        return frames.len();
-    }
-    first_line(frames)
+    first_messages(frames, 0).0
 }
 
 /// The first messages of frames for one client that have so many bytes together, or all of them: how long these are,
@@ -83,7 +80,8 @@ pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
     }
     let from = bytes.saturating_sub(1).min(frames.len());
     let (before, behind) = frames.split_at(from);
-    let end = from + first_line(behind);
+    let end = behind.iter().position(|byte| *byte == b'\n');
+    let end = end.map_or(frames.len(), |end| from + end + 1);
     (end, lines(before) + 1)
 }
 
@@ -93,11 +91,6 @@ fn lines(bytes: &[u8]) -> usize {
     let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
     let parts = bytes.chunks(u8::MAX.into());
     parts.map(|part| usize::from(ends(part))).sum()
-}
-
-fn first_line(bytes: &[u8]) -> usize {
-    let end = bytes.iter().position(|byte| *byte == b'\n');
-    end.map_or(bytes.len(), |end| end + 1)
 }
 
 /// The last messages of a series, at most so many.
