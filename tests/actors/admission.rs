@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** virtual time and in-memory pipes only; whoever has the token gets in at once, whatever the others do.
 
+use crate::system::in_virtual_time;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::gate::{
     FREE_GUESSES, GUESS_INTERVAL, Gate, MAX_UNAUTHENTICATED,
 };
@@ -105,7 +106,7 @@ async fn rest(stream: &mut DuplexStream) -> String {
 /// The time begins when the client connects, and nothing that it sends makes it longer.
 #[test]
 fn a_client_has_five_seconds_from_connecting_to_its_token() {
-    run(async {
+    in_virtual_time(async {
         for drip in [
             "",
             " ",
@@ -137,7 +138,7 @@ fn a_client_has_five_seconds_from_connecting_to_its_token() {
 #[cfg(feature = "web")]
 #[test]
 fn over_http_the_same_five_seconds_run_from_connecting_to_the_end_of_the_head() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let began = Instant::now();
         let mut client = guarded.connect();
@@ -154,7 +155,7 @@ fn over_http_the_same_five_seconds_run_from_connecting_to_the_end_of_the_head() 
 
 #[test]
 fn who_has_shown_the_token_in_time_may_be_silent() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut client = guarded.holder().await;
         sleep(Duration::from_secs(3600)).await;
@@ -167,7 +168,7 @@ fn who_has_shown_the_token_in_time_may_be_silent() {
 /// More than there are places for clients: they take none of those, and of their own only as many as there are.
 #[test]
 fn silent_connections_without_end_keep_out_nobody_who_has_the_token() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut holders = Vec::new();
         let mut silent = Vec::new();
@@ -192,7 +193,7 @@ fn silent_connections_without_end_keep_out_nobody_who_has_the_token() {
 
 #[test]
 fn clients_with_the_token_are_counted_apart_from_those_without() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut holders = Vec::new();
         let silent = guarded.silent(MAX_UNAUTHENTICATED);
@@ -209,7 +210,7 @@ fn clients_with_the_token_are_counted_apart_from_those_without() {
 /// One that has sent its token is let in though its place is lost before it was read.
 #[test]
 fn who_has_sent_the_token_loses_nothing_to_those_who_come_behind() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut holder = guarded.connect();
         holder.write_all(AUTH.as_bytes()).await.unwrap();
@@ -224,7 +225,7 @@ fn who_has_sent_the_token_loses_nothing_to_those_who_come_behind() {
 
 #[test]
 fn wrong_tokens_of_one_address_are_answered_ten_a_second_and_the_right_one_at_once() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let began = Instant::now();
         let mut guesses = Vec::new();
@@ -258,7 +259,7 @@ fn wrong_tokens_of_one_address_are_answered_ten_a_second_and_the_right_one_at_on
 #[cfg(feature = "web")]
 #[test]
 fn wrong_tokens_over_http_are_slowed_down_with_the_others() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let began = Instant::now();
         for number in 0..FREE_GUESSES + 10 {
@@ -291,7 +292,7 @@ fn wrong_tokens_over_http_are_slowed_down_with_the_others() {
 /// So many guesses that most wait too long to be answered: none of them keeps the holder out, and in all no more are answered.
 #[test]
 fn a_flood_of_guesses_is_answered_no_faster_and_keeps_out_nobody() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut guesses = Vec::new();
         for _ in 0..1000 {
@@ -313,7 +314,7 @@ fn a_flood_of_guesses_is_answered_no_faster_and_keeps_out_nobody() {
 #[cfg(feature = "web")]
 #[test]
 fn slow_requests_without_the_token_keep_out_no_page_of_who_has_it() {
-    run(async {
+    in_virtual_time(async {
         let guarded = Guarded::new().await;
         let mut slow = Vec::new();
         for _ in 0..5 * MAX_UNAUTHENTICATED {

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
+use crate::system::in_virtual_time;
 use std::cell::RefCell;
 use std::io::IoSlice;
 use std::pin::Pin;
@@ -10,7 +11,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::limits::{
     MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING, STALL_LIMIT,
@@ -55,7 +56,7 @@ async fn throttled(gateway: &Gateway, throttle_rate: u64, queue_length: u64) -> 
 
 #[test]
 fn a_throttled_topic_comes_at_its_rate_and_the_newest_are_kept() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = throttled(&gateway, 100, 2).await;
         let began = Instant::now();
@@ -88,7 +89,7 @@ fn a_throttled_topic_comes_at_its_rate_and_the_newest_are_kept() {
 /// Messages can be late by what was read at once; the last of n can't come before (n - 1) intervals.
 #[test]
 fn no_more_messages_come_than_the_interval_allows() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = throttled(&gateway, 1000, 5).await;
         let began = Instant::now();
@@ -104,7 +105,7 @@ fn no_more_messages_come_than_the_interval_allows() {
 
 #[test]
 fn after_an_unsubscription_nothing_that_was_held_back_comes() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
         publisher.advertise("/t").await;
@@ -124,7 +125,7 @@ fn after_an_unsubscription_nothing_that_was_held_back_comes() {
 
 #[test]
 fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, _, calls) = held_back().await;
         let mut client = gateway.connect(WIDE);
         client
@@ -155,7 +156,7 @@ fn a_response_of_the_arm_discards_what_throttling_holds_back_of_its_state() {
 
 #[test]
 fn a_client_that_takes_nothing_while_responses_wait_is_disconnected_after_twenty_seconds() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(64);
         client.call("/none", 1).await;
@@ -170,7 +171,7 @@ fn a_client_that_takes_nothing_while_responses_wait_is_disconnected_after_twenty
 
 #[test]
 fn every_byte_that_it_takes_gives_a_client_twenty_seconds_more() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(16);
         client.call("/none", 1).await;
@@ -186,7 +187,7 @@ fn every_byte_that_it_takes_gives_a_client_twenty_seconds_more() {
 
 #[test]
 fn a_client_that_takes_no_topic_message_is_never_disconnected() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut client) = (gateway.connect(WIDE), gateway.connect(64));
         client.subscribe("/t").await;
@@ -202,7 +203,7 @@ fn a_client_that_takes_no_topic_message_is_never_disconnected() {
 
 #[test]
 fn the_twenty_seconds_begin_with_the_response_not_with_the_messages_before_it() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut client) = (gateway.connect(WIDE), gateway.connect(128));
         client.subscribe("/t").await;
@@ -221,7 +222,7 @@ fn the_twenty_seconds_begin_with_the_response_not_with_the_messages_before_it() 
 
 #[test]
 fn responses_and_messages_leave_in_the_order_in_which_they_were_produced() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         client.subscribe("/t").await;
@@ -241,7 +242,7 @@ fn responses_and_messages_leave_in_the_order_in_which_they_were_produced() {
 
 #[test]
 fn the_next_frame_is_taken_only_when_the_last_call_has_ended() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, _, calls) = held_back().await;
         let mut client = gateway.connect(WIDE);
         client.call(PARAMS, 1).await;
@@ -268,7 +269,7 @@ fn the_next_frame_is_taken_only_when_the_last_call_has_ended() {
 
 #[test]
 fn a_call_that_its_node_drops_is_answered_all_the_same() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations, calls) = held_back().await;
         let mut client = gateway.connect(WIDE);
         for (service, held) in [(PARAMS, &calls), (STEP, &computations)] {
@@ -285,7 +286,7 @@ fn a_call_that_its_node_drops_is_answered_all_the_same() {
 
 #[test]
 fn one_computation_runs_sixteen_wait_and_then_nothing_more_is_read() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations, calls) = held_back().await;
         let mut client = gateway.connect(WIDE);
         // One runs, and one place in the queue is left: another call is still taken.
@@ -319,7 +320,7 @@ fn one_computation_runs_sixteen_wait_and_then_nothing_more_is_read() {
 
 #[test]
 fn computations_of_one_connection_hold_up_no_other() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations, calls) = held_back().await;
         let (mut heavy, mut other) = (gateway.connect(WIDE), gateway.connect(WIDE));
         for n in 0..40 {
@@ -338,7 +339,7 @@ fn computations_of_one_connection_hold_up_no_other() {
 
 #[test]
 fn while_more_than_32_mebibytes_wait_no_computation_starts_and_nothing_is_read() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations, calls) = held_back().await;
         let mut client = gateway.connect(1024);
         for n in 0..2 {
@@ -414,7 +415,7 @@ impl AsyncWrite for Noting {
 
 #[test]
 fn several_frames_leave_in_one_write_but_not_to_a_client_that_ends_no_line() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         for (end, expected) in [("\n", vec![1, 5]), ("", vec![1, 1, 1, 1, 1, 1])] {
             let writes = Rc::default();

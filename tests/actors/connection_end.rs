@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
+use crate::system::in_virtual_time;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
 use actix::prelude::*;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
@@ -31,7 +32,7 @@ fn id(frame: &Value) -> u64 {
 
 #[test]
 fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations) = held_back().await;
         let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -57,7 +58,7 @@ fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
 /// Whether it has only stopped sending or is gone altogether can't be told until something is sent to it.
 #[test]
 fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations) = held_back().await;
         let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -81,7 +82,7 @@ fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
 /// With its queue full no frame of it is performed, but its end is seen all the same.
 #[test]
 fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations) = held_back().await;
         let mut client = gateway.connect(WIDE);
         for n in 0..30 {
@@ -112,7 +113,7 @@ fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
 /// Bytes that are read ahead are counted, and few.
 #[test]
 fn a_client_whose_queue_is_full_is_read_a_little_further_and_all_of_it_is_performed() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations) = held_back().await;
         let mut client = gateway.connect(WIDE);
         let calls: u64 = 3000;
@@ -134,7 +135,7 @@ fn a_client_whose_queue_is_full_is_read_a_little_further_and_all_of_it_is_perfor
 
 #[test]
 fn a_half_closed_client_that_reads_nothing_is_let_go() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         // Responses wait: twenty seconds, as ever.
         let mut client = gateway.connect(64);
@@ -164,7 +165,7 @@ fn a_half_closed_client_that_reads_nothing_is_let_go() {
 
 #[test]
 fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_stream_ends() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, computations) = held_back().await;
         let mut client = gateway.connect(WIDE);
         for n in 0..17 {
@@ -195,7 +196,7 @@ fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_str
 
 #[test]
 fn at_the_end_of_the_runtime_forwarded_calls_are_refused_and_streams_end() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -228,7 +229,7 @@ fn at_the_end_of_the_runtime_forwarded_calls_are_refused_and_streams_end() {
 
 #[test]
 fn a_foreign_client_gets_its_line_and_the_end_at_once() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         let began = Instant::now();
@@ -245,7 +246,7 @@ fn a_foreign_client_gets_its_line_and_the_end_at_once() {
 /// Where all places are taken, who only waits for answers gives way, the oldest first, and knows why.
 #[test]
 fn who_comes_gets_the_place_of_the_oldest_client_that_has_stopped_sending() {
-    run(async {
+    in_virtual_time(async {
         let gauges = Arc::new(Gauges::default());
         let registry = Registry::new(Arc::clone(&gauges))
             .serving_at_most(4)

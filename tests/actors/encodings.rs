@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** what is made elsewhere comes in its place: order is checked with every message.
 
+use crate::system::in_virtual_time;
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, run};
+use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE};
 use pendularm::actors::gateway::limits::{MAX_FRAGMENT_SIZES, READ_HERE};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
@@ -39,7 +40,7 @@ async fn next_message(peer: &mut Peer) -> (Value, u64) {
 
 #[test]
 fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_is_refused() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut peers = Vec::new();
         for n in 0..MAX_FRAGMENT_SIZES {
@@ -89,7 +90,7 @@ fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_is_refused() {
 
 #[test]
 fn messages_keep_their_order_though_long_ones_are_cut_up_elsewhere() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
         subscribe_in_pieces(&mut subscriber, 1000).await;
@@ -131,7 +132,7 @@ async fn hear_what_was_kept(gateway: &Gateway, peer: &mut Peer, messages: u64) -
 #[test]
 fn nothing_is_cut_up_for_a_client_that_does_not_read() {
     const MESSAGES: u64 = 100;
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
         subscribe_in_pieces(&mut subscriber, 65_536).await;
@@ -151,7 +152,7 @@ fn nothing_is_cut_up_for_a_client_that_does_not_read() {
 /// Pieces of 64 bytes have more than as much around them: of 3 MB they are longer than any outbox takes.
 #[test]
 fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had_them() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut publisher = gateway.connect(WIDE);
         let mut subscribers = [gateway.connect(WIDE), gateway.connect(WIDE)];
@@ -176,7 +177,7 @@ fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had
 #[test]
 fn each_message_of_a_series_that_had_to_go_is_counted() {
     const MESSAGES: u64 = 2000;
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
         subscribe_in_pieces(&mut subscriber, 4096).await;
@@ -198,7 +199,7 @@ fn each_message_of_a_series_that_had_to_go_is_counted() {
 #[test]
 fn of_a_series_a_throttled_subscriber_hears_the_first_and_then_the_newest() {
     const MESSAGES: u64 = 1200;
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
         let throttled =
@@ -228,7 +229,7 @@ fn of_a_series_a_throttled_subscriber_hears_the_first_and_then_the_newest() {
 /// Everything about a frame that is read elsewhere comes before everything about the next one.
 #[test]
 fn long_frames_are_answered_in_their_place() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         let pad = "[1e5,\"\\u00e9\"],".repeat(READ_HERE / 8);
@@ -262,7 +263,7 @@ fn long_frames_are_answered_in_their_place() {
 /// use for.
 #[test]
 fn a_node_never_gets_long_arguments() {
-    run(async {
+    in_virtual_time(async {
         let held = Held::default();
         let mut nodes = Nodes::default();
         Node::holding(&held).attach(&mut nodes, &[Service::SetParams], &[]);

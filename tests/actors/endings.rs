@@ -2,9 +2,10 @@
 //!
 //! **Invariant:** what still waits is told by the memory that is counted for it.
 
+use crate::system::in_virtual_time;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Peer, WIDE, run};
+use crate::virtual_time::{Gateway, Peer, WIDE};
 use pendularm::actors::gateway::limits::{CALL_BYTES, MAX_WAITING_CALLS, MAX_WAITING_GOALS};
 use serde_json::{Value, json};
 
@@ -18,7 +19,7 @@ fn assert_ends_in_turns(
     end: impl AsyncFnOnce(Peer),
     is_end: impl Fn(&Value) -> bool,
 ) {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut provider = gateway.connect(WIDE);
         provider.provide("/s").await;

@@ -1,5 +1,6 @@
 //! `/arm_sim/integration_step` on the worker pool: turns, ends, and one answer each.
 
+use crate::system::in_real_time;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -122,7 +123,7 @@ fn heavy() -> IntegrationStep {
 
 #[test]
 fn the_answer_is_the_particles_own() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::new();
         bench.call(1, request("sin(5*t)*exp(-t)", 5000));
         let (connection, answer) = bench.answer().await;
@@ -139,7 +140,7 @@ fn the_answer_is_the_particles_own() {
 
 #[test]
 fn a_light_call_is_done_while_a_heavy_one_takes_turns_with_it() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::new();
         let heavy = bench.call(1, heavy());
         for connection in 2..10 {
@@ -160,7 +161,7 @@ fn a_light_call_is_done_while_a_heavy_one_takes_turns_with_it() {
 
 #[test]
 fn a_call_whose_caller_has_gone_ends_early_and_once() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::new();
         let call = bench.call(1, heavy());
         call.gone.store(true, Ordering::Relaxed);
@@ -175,7 +176,7 @@ fn a_call_whose_caller_has_gone_ends_early_and_once() {
 
 #[test]
 fn a_caller_that_leaves_at_any_moment_is_answered_once() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::new();
         for microseconds in (0..2000).step_by(40) {
             let call = bench.call(1, request("t", 300));
@@ -190,7 +191,7 @@ fn a_caller_that_leaves_at_any_moment_is_answered_once() {
 
 #[test]
 fn the_end_of_the_pool_refuses_what_runs_what_waits_and_what_comes() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::new();
         for connection in 1..=5 {
             bench.call(connection, heavy());
@@ -212,7 +213,7 @@ fn the_end_of_the_pool_refuses_what_runs_what_waits_and_what_comes() {
 
 #[test]
 fn what_is_refused_does_not_take_a_turn_away() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::new();
         for (connection, ask) in [
             (1, IntegrationStep::default()),

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** who has been accepted stays connected when the listening ends; who comes later is not accepted.
 
+use crate::system::in_real_time;
 use std::sync::Arc;
 
 use actix::prelude::*;
@@ -26,7 +27,7 @@ async fn exchange(stream: &mut BufReader<TcpStream>) {
 
 #[test]
 fn accepted_clients_outlive_the_listening() {
-    System::new().block_on(async {
+    in_real_time(async {
         let socket = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
         let address = socket.local_addr().unwrap();
         let gauges = Arc::new(Gauges::default());
@@ -54,7 +55,7 @@ fn accepted_clients_outlive_the_listening() {
 
 #[test]
 fn a_port_in_use_is_an_error() {
-    System::new().block_on(async {
+    in_real_time(async {
         let socket = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
         assert!(bind(socket.local_addr().unwrap()).await.is_err());
     });
@@ -64,7 +65,7 @@ fn a_port_in_use_is_an_error() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_silent_client_is_asked_after_a_while_whether_it_is_there() {
-    System::new().block_on(async {
+    in_real_time(async {
         let socket = bind("127.0.0.1:0".parse().unwrap()).await.unwrap();
         let address = socket.local_addr().unwrap();
         let gauges = Arc::new(Gauges::default());

@@ -44,6 +44,8 @@ mod slow;
 #[path = "../support/stage.rs"]
 mod stage;
 mod study;
+#[path = "../support/system.rs"]
+mod system;
 mod tf_web;
 #[path = "../support/virtual_time.rs"]
 mod virtual_time;

@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** a client that asks for little and reads what it gets is served whatever the others do.
 
+use crate::system::{in_real_time, in_virtual_time};
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Node, Peer, WIDE, run, settle};
+use crate::virtual_time::{Gateway, Node, Peer, WIDE, settle};
 use actix::prelude::*;
 use bytes::Bytes;
 use pendularm::actors::compute::integration::Integration;
@@ -146,7 +147,7 @@ fn a_message_counts_once_in_all_and_whole_for_each_who_waits_for_it() {
 
 #[test]
 fn the_largest_gives_way_first_and_only_until_the_rest_fits() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(8 * MIB);
         let accounts: Vec<Arc<Account>> = (0..4).map(|_| memory.open()).collect();
         let mut shares: Vec<_> = accounts
@@ -179,7 +180,7 @@ fn the_largest_gives_way_first_and_only_until_the_rest_fits() {
 
 #[test]
 fn messages_go_first_and_the_connection_if_that_is_not_enough() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(4 * MIB);
         let (hog, other) = (memory.open(), memory.open());
         let frame = memory.count(Bytes::from(vec![0; 2 * MIB]));
@@ -200,7 +201,7 @@ fn messages_go_first_and_the_connection_if_that_is_not_enough() {
 /// Freeing the messages of a client that is gone takes a while, on another thread.
 #[test]
 fn nobody_gives_way_for_what_is_being_freed() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(4 * MIB);
         let (gone, other) = (memory.open(), memory.open());
         let frame = memory.count(Bytes::from(vec![0; 3 * MIB]));
@@ -220,7 +221,7 @@ fn nobody_gives_way_for_what_is_being_freed() {
 
 #[test]
 fn who_holds_little_never_gives_way() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(MIB);
         let accounts: Vec<Arc<Account>> = (0..8).map(|_| memory.open()).collect();
         let shares: Vec<_> = accounts
@@ -286,7 +287,7 @@ fn a_modest_answer_finds_room_beside_long_ones() {
 
 #[test]
 fn the_client_that_holds_most_is_told_so_and_disconnected_and_no_other() {
-    run(async {
+    in_virtual_time(async {
         let gateway = gateway(Memory::of(8 * MIB)).await;
         let mut honest = gateway.connect(WIDE);
         let mut hogs: Vec<Peer> = (0..3).map(|_| gateway.connect(WIDE)).collect();
@@ -317,7 +318,7 @@ fn the_client_that_holds_most_is_told_so_and_disconnected_and_no_other() {
 
 #[test]
 fn a_deaf_client_that_holds_most_is_gone_at_once_and_all_that_it_had() {
-    run(async {
+    in_virtual_time(async {
         let gateway = gateway(Memory::of(4 * MIB)).await;
         let mut deaf = gateway.connect(KIB);
         let id = "x".repeat(50 * KIB);
@@ -340,7 +341,7 @@ fn a_deaf_client_that_holds_most_is_gone_at_once_and_all_that_it_had() {
 
 #[test]
 fn hogs_of_registrations_do_not_keep_newcomers_from_subscribing() {
-    run(async {
+    in_virtual_time(async {
         let gateway = gateway(Memory::of(8 * MIB)).await;
         let mut hogs = Vec::new();
         for n in 0..8 {
@@ -363,7 +364,7 @@ fn hogs_of_registrations_do_not_keep_newcomers_from_subscribing() {
 
 #[test]
 fn calls_of_a_day_do_not_keep_others_from_calling() {
-    run(async {
+    in_virtual_time(async {
         let gateway = gateway(Memory::of(8 * MIB)).await;
         let mut provider = gateway.connect(WIDE);
         provider.provide("/never").await;
@@ -403,7 +404,7 @@ fn calls_of_a_day_do_not_keep_others_from_calling() {
 
 #[test]
 fn topic_messages_go_before_any_connection_and_the_oldest_of_them_first() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(8 * MIB);
         let gateway = gateway(memory.clone()).await;
         let mut publisher = gateway.connect(WIDE);
@@ -450,7 +451,7 @@ fn topic_messages_go_before_any_connection_and_the_oldest_of_them_first() {
 /// The contract's 4 MiB hold for each of any number of clients, because what they share is there once.
 #[test]
 fn a_message_that_many_clients_wait_for_is_there_once() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(24 * MIB);
         let gateway = gateway(memory.clone()).await;
         let mut publisher = gateway.connect(WIDE);
@@ -494,7 +495,7 @@ async fn ask_steps(client: &mut Peer, steps: usize) {
 
 #[test]
 fn computations_that_fit_only_after_one_another_wait_for_one_another() {
-    System::new().block_on(async {
+    in_real_time(async {
         let workers = WorkerPool::start(2).unwrap();
         // Room for two answers of 10,000 steps at a time, beside what 12 connections take.
         let gateway = computing(5 * MIB, &workers).await;
@@ -518,7 +519,7 @@ fn computations_that_fit_only_after_one_another_wait_for_one_another() {
 
 #[test]
 fn computations_for_whose_answers_there_is_no_room_are_refused_and_all_others_arrive_whole() {
-    System::new().block_on(async {
+    in_real_time(async {
         let workers = WorkerPool::start(2).unwrap();
         let limit = 8 * MIB;
         let gateway = computing(limit, &workers).await;
@@ -566,7 +567,7 @@ fn computations_for_whose_answers_there_is_no_room_are_refused_and_all_others_ar
 /// An answer of more than [`SMALL_ANSWER`] for a client that has little: whoever lets much more lie gives way to it.
 #[test]
 fn who_asks_for_less_than_others_hold_has_it() {
-    System::new().block_on(async {
+    in_real_time(async {
         let workers = WorkerPool::start(2).unwrap();
         let gateway = computing(4 * MIB, &workers).await;
         let hog = gateway.gauges.memory().open();

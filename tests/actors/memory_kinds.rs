@@ -2,10 +2,11 @@
 //!
 //! **Invariant:** what is counted is at least what is allocated; the test says how much that is.
 
+use crate::system::in_virtual_time;
 use std::sync::Mutex;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, run, settle};
+use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, settle};
 use pendularm::actors::gateway::limits::{
     CALL_BYTES, MAX_RESPONSES_WAITING, REGISTRATION_BYTES, STALL_LIMIT,
 };
@@ -91,7 +92,7 @@ fn answering() -> Nodes {
 
 #[test]
 fn statuses_that_are_not_read() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         // The pipe takes more than any outbox: so the answers are counted while they are on their way.
         let mut deaf = Scene::new(KIB, Nodes::default()).await;
@@ -109,7 +110,7 @@ fn statuses_that_are_not_read() {
 /// The smallest answers there are: a client that reads none is not read on when they cost 32 MiB, whatever their text comes to.
 #[test]
 fn responses_cost_what_they_take_and_a_deaf_client_is_not_read_on_at_32_mib() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(256 * KIB, answering()).await;
         let call = format!("{{\"op\":\"call_service\",\"service\":\"{PAUSE}\"}}\n");
         let mut held = 0;
@@ -141,7 +142,7 @@ async fn publish_small(scene: &mut Scene, publisher: &mut Peer, count: usize) {
 
 #[test]
 fn small_messages_that_are_not_read() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(KIB, Nodes::default()).await;
         scene.client.subscribe("/t").await;
         let mut publisher = scene.gateway.connect(WIDE);
@@ -154,7 +155,7 @@ fn small_messages_that_are_not_read() {
 /// A throttle holds back message by message.
 #[test]
 fn small_messages_that_are_held_back() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let subscribe = json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1_000_000, "queue_length": 10_000});
         scene.client.send(subscribe).await;
@@ -170,7 +171,7 @@ fn small_messages_that_are_held_back() {
 
 #[test]
 fn a_frame_that_is_not_complete() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let begun = format!("{{\"op\":\"publish\",\"msg\":\"{}", "x".repeat(3 * MIB));
         scene.flood(&begun).await;
@@ -184,7 +185,7 @@ fn a_frame_that_is_not_complete() {
 fn latched_messages_of_another_spelling_that_are_not_read() {
     const SIZE: usize = 20_000;
     const COUNT: usize = 50;
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(KIB, Nodes::default()).await;
         // There is a last message while somebody subscribes.
         let mut watcher = scene.gateway.connect(WIDE);
@@ -211,7 +212,7 @@ fn latched_messages_of_another_spelling_that_are_not_read() {
 
 #[test]
 fn a_frame_that_is_skipped_is_not_kept() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let long = format!("{{\"op\":\"publish\",\"msg\":\"{}", "x".repeat(9 * MIB));
         scene.flood(&long).await;
@@ -224,7 +225,7 @@ fn a_frame_that_is_skipped_is_not_kept() {
 
 #[test]
 fn fragments_without_text() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         for message in 0..8 {
             for num in 0..1000 {
@@ -245,7 +246,7 @@ fn fragments_without_text() {
 
 #[test]
 fn fragments_with_text() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         for num in 0..6 {
             let data = "x".repeat(MIB / 2);
@@ -260,7 +261,7 @@ fn fragments_with_text() {
 
 #[test]
 fn subscriptions_topics_and_services() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let quiet = json!({"op": "set_level", "level": "none"});
         scene.client.send(quiet).await;
@@ -299,7 +300,7 @@ fn subscriptions_topics_and_services() {
 /// A service that goes to another provider is not the first one's any more.
 #[test]
 fn a_service_that_another_provides_is_charged_to_that_one() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let mut other = scene.gateway.connect(WIDE);
         scene.client.provide("/s").await;
@@ -315,7 +316,7 @@ fn a_service_that_another_provides_is_charged_to_that_one() {
 /// Calls that wait for a day, and the answered ones, of which nothing is left.
 #[test]
 fn calls_that_wait() {
-    run(async {
+    in_virtual_time(async {
         let mut scene = Scene::new(WIDE, Nodes::default()).await;
         let mut provider = scene.gateway.connect(WIDE);
         provider.provide("/s").await;
@@ -356,7 +357,7 @@ fn calls_that_wait() {
 
 #[test]
 fn requests_of_computations_that_wait() {
-    run(async {
+    in_virtual_time(async {
         let held = Held::default();
         let mut nodes = Nodes::default();
         Node::holding(&held).attach(&mut nodes, &[Service::IntegrationStep], &[]);
@@ -384,7 +385,7 @@ fn requests_of_computations_that_wait() {
 fn arguments_are_counted_as_they_are_kept() {
     // As they came and as they are written: the same; shorter by one of six; both longer than the text, six and five for four.
     for (entry, kept) in [("1000,", 5), ("1e999,", 6 + 5), ("NaN,", 6 + 5)] {
-        run(async {
+        in_virtual_time(async {
             let held = Held::default();
             let mut nodes = Nodes::default();
             Node::holding(&held).attach(&mut nodes, &[Service::IntegrationStep], &[]);
@@ -417,7 +418,7 @@ fn arguments_are_counted_as_they_are_kept() {
 fn ids_of_goals_that_are_pursued() {
     const COUNT: usize = 300;
     const ID: usize = 1000;
-    run(async {
+    in_virtual_time(async {
         // A node that sets every goal in motion and reaches none.
         let pursued = Mutex::new(Vec::<GoalFollower>::new());
         let pursue = move |request| {
@@ -456,7 +457,7 @@ fn ids_of_goals_that_are_pursued() {
 /// From the first moment on: who says nothing, and who has begun a request, has a buffer as well.
 #[test]
 fn what_is_read_before_it_is_clear_who_comes() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::default();
         let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
         let mut clients = Vec::new();

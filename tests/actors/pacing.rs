@@ -4,6 +4,7 @@
 //!
 //! **Invariant:** what is counted is what had arrived when the publisher's next frame was handled.
 
+use crate::system::in_real_time;
 use std::cell::Cell;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -11,7 +12,6 @@ use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
-use actix::prelude::*;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
@@ -54,7 +54,7 @@ fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
     let spelled = format!("{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
     let otherwise = format!("{{ \"op\":\"publish\",\"topic\":\"/t\",\"msg\":{msg}}}\n");
     for publish in [spelled, otherwise] {
-        System::new().block_on(async {
+        in_real_time(async {
             let subscribers = Rc::new(std::cell::RefCell::new(Vec::<TcpStream>::new()));
             let arrived = Rc::new(Cell::new(usize::MAX));
             let (seen, all) = (Rc::clone(&arrived), Rc::clone(&subscribers));

@@ -1,5 +1,6 @@
 //! A record in the arm's place: what clients hear of it, forward, back and from anywhere.
 
+use crate::system::in_virtual_time;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,7 +22,7 @@ use tokio::sync::oneshot;
 use tokio::time::sleep;
 
 use crate::recorder::{Notes, file, passages, stop};
-use crate::stage::{self, Client, Stage, connect, in_virtual_time, ms, number, numbers};
+use crate::stage::{self, Client, Stage, connect, ms, number, numbers};
 
 /// A run of four seconds: the controller on, a setpoint, and after two seconds longer links and less gravity.
 async fn run() -> Vec<RecordEntry> {

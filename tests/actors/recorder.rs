@@ -1,5 +1,6 @@
 //! Runs on record: what arm and registry tell, and that it is enough to take every step again.
 
+use crate::system::in_virtual_time;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
@@ -16,7 +17,7 @@ use pendularm::record::{
 use serde_json::{Value, json};
 use tokio::time::{Instant, sleep};
 
-use crate::stage::{Client, Stage, in_virtual_time, ms};
+use crate::stage::{Client, Stage, ms};
 
 /// Entries as they come, in the order in which they are told.
 #[derive(Clone, Default)]

@@ -2,11 +2,12 @@
 //!
 //! **Invariant:** nodes are closures that note what they are told; nothing else stands in for the runtime.
 
+use crate::system::in_virtual_time;
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_CONNECTIONS};
 use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
@@ -20,7 +21,7 @@ type Log<T> = Rc<RefCell<Vec<T>>>;
 
 #[test]
 fn a_call_waits_ten_seconds_for_its_provider_or_as_long_as_its_caller_says() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -49,7 +50,7 @@ fn a_call_waits_ten_seconds_for_its_provider_or_as_long_as_its_caller_says() {
 /// Where the process has stood still, answer and timeout are heard of at the same moment, and the answer may be the first.
 #[test]
 fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_since() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -66,7 +67,7 @@ fn an_answer_after_its_time_is_too_late_even_if_nobody_has_looked_at_the_clock_s
 
 #[test]
 fn an_answer_in_time_stops_the_clock() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -81,7 +82,7 @@ fn an_answer_in_time_stops_the_clock() {
 
 #[test]
 fn a_caller_that_goes_leaves_no_call_behind() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut provider, mut caller) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
@@ -101,7 +102,7 @@ fn a_caller_that_goes_leaves_no_call_behind() {
 
 #[test]
 fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
-    run(async {
+    in_virtual_time(async {
         let heard: Log<(Topic, bool)> = Rc::default();
         let log = Rc::clone(&heard);
         let node = Node {
@@ -140,7 +141,7 @@ fn a_node_hears_of_the_first_subscriber_and_of_the_end_of_the_last() {
 #[test]
 fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_and_not_the_listener()
 {
-    run(async {
+    in_virtual_time(async {
         let heard: Log<String> = Rc::default();
         let log = Rc::clone(&heard);
         let node = Node {
@@ -169,7 +170,7 @@ fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_an
 /// The sender's next frame waits until the node is done with its message.
 #[test]
 fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
-    run(async {
+    in_virtual_time(async {
         let held = Rc::new(RefCell::new(Vec::new()));
         let log = Rc::clone(&held);
         let node = Node {
@@ -197,7 +198,7 @@ fn a_trajectory_has_taken_effect_before_its_senders_next_frame_is_taken() {
 
 #[test]
 fn a_service_without_a_node_is_refused() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         for service in Service::ALL {
@@ -217,7 +218,7 @@ fn a_service_without_a_node_is_refused() {
 
 #[test]
 fn one_client_too_many_is_told_so_and_closed_and_there_is_room_again() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut clients: Vec<_> = (0..MAX_CONNECTIONS)
             .map(|_| gateway.connect(1024))
@@ -241,7 +242,7 @@ fn one_client_too_many_is_told_so_and_closed_and_there_is_room_again() {
 
 #[test]
 fn a_client_that_comes_and_goes_a_thousand_times_leaves_nothing_behind() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut watcher = gateway.connect(WIDE);
         watcher.subscribe("/t").await;

@@ -1,11 +1,12 @@
 //! Recorded steps taken again: those along a path, and those of a record that lies.
 
+use crate::system::in_virtual_time;
 use pendularm::record::{AT_ONCE, Content, MAX_LEAP, RecordEntry, ReplayError, replay};
 use serde_json::json;
 use tokio::time::sleep;
 
 use crate::recorder::{Notes, file, replayed, stop};
-use crate::stage::{Stage, in_virtual_time, ms};
+use crate::stage::{Stage, ms};
 
 /// A run of half a second with the controller on.
 async fn short_run() -> Vec<RecordEntry> {

@@ -1,5 +1,6 @@
 //! The node `rosapi`: what it asks of the arm for other nodes and for clients.
 
+use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik_action::GoalTracker;
 use pendularm::actors::arm::sim::{ArmSim, SetParams};
@@ -23,7 +24,7 @@ use pendularm::protocol::ros::parameters::Parameter;
 use serde_json::{Value, json};
 
 use crate::stage::start_goal_nodes;
-use crate::virtual_time::{Gateway, Peer, WIDE, run};
+use crate::virtual_time::{Gateway, Peer, WIDE};
 
 /// A gateway with the arm and `rosapi` behind it.
 async fn start() -> (Gateway, Addr<Rosapi<2>>) {
@@ -41,7 +42,7 @@ async fn start() -> (Gateway, Addr<Rosapi<2>>) {
 
 #[test]
 fn a_parameter_is_set_and_read_as_a_value() {
-    run(async {
+    in_virtual_time(async {
         let (_gateway, rosapi) = start().await;
         let set = |gravity| {
             let change = SetParams {
@@ -65,7 +66,7 @@ fn a_parameter_is_set_and_read_as_a_value() {
 
 #[test]
 fn every_service_that_is_listed_is_served() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let publish = || gateway.registry.clone().recipient();
         let gauges = std::sync::Arc::clone(&gateway.gauges);
@@ -113,7 +114,7 @@ async fn response(client: &mut Peer, question: &str, args: Value) -> Value {
 
 #[test]
 fn a_question_without_its_field_or_with_arguments_of_another_form_is_refused() {
-    run(async {
+    in_virtual_time(async {
         let (gateway, _) = start().await;
         let mut client = gateway.connect(WIDE);
         let nameless = response(&mut client, "topic_type", json!({})).await;

@@ -2,9 +2,10 @@
 //!
 //! **Invariant:** virtual time, so a minute here is exactly that.
 
+use crate::system::in_virtual_time;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::limits::{FRAME_TIME, MAX_CONNECTIONS};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::Service;
@@ -16,7 +17,7 @@ const SECOND: Duration = Duration::from_secs(1);
 
 #[test]
 fn a_client_that_sends_a_byte_per_second_is_told_after_a_minute_and_closed() {
-    run(async {
+    in_virtual_time(async {
         // A line that is no frame is refused after 32 bytes, and from then on has its time to end.
         for (opening, time) in [
             ("{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{", FRAME_TIME),
@@ -46,7 +47,7 @@ fn a_client_that_sends_a_byte_per_second_is_told_after_a_minute_and_closed() {
 
 #[test]
 fn a_frame_that_comes_in_time_is_served_and_the_next_has_its_own_time() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut slow = gateway.connect(WIDE);
         for id in 0..3 {
@@ -70,7 +71,7 @@ fn a_frame_that_comes_in_time_is_served_and_the_next_has_its_own_time() {
 /// A line that is longer than a frame may be is skipped to its end: it has a minute for every 4 MiB.
 #[test]
 fn a_frame_that_is_skipped_has_time_by_its_length() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         client.send_text("{\"op\":\"publish\",\"msg\":\"").await;
@@ -94,7 +95,7 @@ fn a_frame_that_is_skipped_has_time_by_its_length() {
 /// The time counts only while the client is waited for: here its own call takes an hour.
 #[test]
 fn a_client_that_is_not_read_meanwhile_loses_no_time() {
-    run(async {
+    in_virtual_time(async {
         let held = Held::default();
         let mut nodes = Nodes::default();
         Node::holding(&held).attach(&mut nodes, &[Service::Pause], &[]);
@@ -116,7 +117,7 @@ fn a_client_that_is_not_read_meanwhile_loses_no_time() {
 /// As many as there are places: a minute later all of them are free again.
 #[test]
 fn slow_clients_are_bounded_in_number_and_give_their_places_back() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let began = Instant::now();
         let mut slow: Vec<Peer> = (0..MAX_CONNECTIONS)

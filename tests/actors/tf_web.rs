@@ -2,7 +2,8 @@
 //!
 //! **Invariant:** virtual time, so messages are counted.
 
-use crate::stage::{Client, Stage, in_virtual_time, ms, number};
+use crate::stage::{Client, Stage, ms, number};
+use crate::system::in_virtual_time;
 use pendularm::actors::ros::tf_web::MAX_WISHES;
 use serde_json::{Value, json};
 

@@ -3,11 +3,12 @@
 //! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
 
 #![cfg(feature = "web")]
+use crate::system::in_virtual_time;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, run, settle};
+use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
 use bytes::Bytes;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::connection::gate::{Gate, MAX_HEADS};
@@ -87,7 +88,7 @@ async fn receive_text(socket: &mut Client<DuplexStream>) -> String {
 #[test]
 fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
     const LONG: usize = 3 << 20;
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::default();
         let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
         let mut socket = open(&gateway, WIDE).await;
@@ -107,7 +108,7 @@ fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
 
 #[test]
 fn a_head_that_does_not_come_is_given_up_after_five_seconds() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut stream = connect(&gateway, WIDE);
         stream.write_all(HEAD.as_bytes()).await.unwrap();
@@ -131,7 +132,7 @@ fn a_head_that_does_not_come_is_given_up_after_five_seconds() {
 
 #[test]
 fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut silent = connect(&gateway, WIDE);
         let mut begun = connect(&gateway, WIDE);
@@ -159,7 +160,7 @@ fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() 
 /// concerned.
 #[test]
 fn files_of_a_report_that_are_being_sent_have_a_total() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let folder = std::env::temp_dir().join(format!("pendularm-files-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
@@ -204,7 +205,7 @@ fn files_of_a_report_that_are_being_sent_have_a_total() {
 /// Clients that take no byte of their answers keep nobody from one, nor do those that don't get to the end of their heads.
 #[test]
 fn of_too_many_requests_at_once_the_oldest_makes_room() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let gate = Arc::default();
         let request = format!("{HEAD}\r\n");
@@ -243,7 +244,7 @@ fn of_too_many_requests_at_once_the_oldest_makes_room() {
 
 #[test]
 fn a_browser_that_takes_no_byte_of_its_answer_is_given_up() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         // The answer is longer than the pipe.
         let mut stream = connect(&gateway, 64);
@@ -260,7 +261,7 @@ fn a_browser_that_takes_no_byte_of_its_answer_is_given_up() {
 
 #[test]
 fn a_peer_that_answers_pings_stays_and_is_pinged_every_fifteen_seconds() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut socket = open(&gateway, WIDE).await;
         let began = Instant::now();
@@ -275,7 +276,7 @@ fn a_peer_that_answers_pings_stays_and_is_pinged_every_fifteen_seconds() {
 
 #[test]
 fn a_peer_without_a_sign_of_life_is_closed_thirty_seconds_after_it_was_asked() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let socket = open(&gateway, WIDE).await;
         settle().await;
@@ -292,7 +293,7 @@ fn a_peer_without_a_sign_of_life_is_closed_thirty_seconds_after_it_was_asked() {
 /// Over a slow line a message can take longer than a pong may: its bytes are as good a sign of life.
 #[test]
 fn a_peer_in_the_middle_of_a_long_message_is_alive() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let socket = open(&gateway, WIDE).await;
         let mut stream = socket.into_stream();
@@ -316,7 +317,7 @@ fn a_peer_in_the_middle_of_a_long_message_is_alive() {
 /// A node that answers after ten minutes: meanwhile the connection reads nothing, so it sees no pong.
 #[test]
 fn while_the_client_is_not_read_it_need_not_show_life() {
-    run(async {
+    in_virtual_time(async {
         let held = Held::default();
         let mut nodes = Nodes::default();
         Node::holding(&held).attach(&mut nodes, &[Service::Pause], &[]);
@@ -342,7 +343,7 @@ fn while_the_client_is_not_read_it_need_not_show_life() {
 /// With its queue full no frame of it is performed, but its close is seen all the same.
 #[test]
 fn a_peer_that_closes_while_its_queue_is_full_is_gone_at_once() {
-    run(async {
+    in_virtual_time(async {
         let held = Held::default();
         let mut nodes = Nodes::default();
         Node::holding(&held).attach(&mut nodes, &[Service::IntegrationStep], &[]);
@@ -371,7 +372,7 @@ fn a_peer_that_closes_while_its_queue_is_full_is_gone_at_once() {
 
 #[test]
 fn a_client_that_takes_no_byte_while_responses_wait_is_disconnected() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut socket = open(&gateway, 1024).await;
         send(&mut socket, json!({"op": "set_level", "level": "info"})).await;
@@ -390,7 +391,7 @@ fn a_client_that_takes_no_byte_while_responses_wait_is_disconnected() {
 
 #[test]
 fn a_slow_client_loses_the_oldest_messages_and_no_response() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut socket = open(&gateway, 1024).await;
         send(
@@ -464,7 +465,7 @@ async fn farewell(stream: &mut DuplexStream) -> (u16, String) {
 /// Byte by byte within a frame; and in parts of a message, between which the peer answers every ping.
 #[test]
 fn a_message_that_does_not_end_is_given_up_after_a_minute() {
-    run(async {
+    in_virtual_time(async {
         for pongs in [false, true] {
             let gateway = Gateway::bare().await;
             let mut stream = open(&gateway, WIDE).await.into_stream();
@@ -506,7 +507,7 @@ fn a_message_that_does_not_end_is_given_up_after_a_minute() {
 
 #[test]
 fn a_peer_that_holds_most_is_closed_with_a_reason() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::of(4 * 1024 * 1024);
         let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
         let mut modest = open(&gateway, WIDE).await;
@@ -549,7 +550,7 @@ fn a_peer_that_holds_most_is_closed_with_a_reason() {
 /// Pings of a peer that reads no pong: what waits for it stays within a write of ours, and when it reads, the last of them has been answered.
 #[test]
 fn pings_whose_pongs_are_not_read_cost_next_to_nothing() {
-    run(async {
+    in_virtual_time(async {
         let memory = Memory::default();
         let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
         let mut stream = open(&gateway, 64 * 1024).await.into_stream();
@@ -577,7 +578,7 @@ fn pings_whose_pongs_are_not_read_cost_next_to_nothing() {
 
 #[test]
 fn at_the_runtimes_end_the_client_gets_what_it_is_owed_and_a_close_frame() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut socket = open(&gateway, WIDE).await;
         let unknown = json!({"op": "call_service", "service": "/nobody", "id": 1});
@@ -600,7 +601,7 @@ fn at_the_runtimes_end_the_client_gets_what_it_is_owed_and_a_close_frame() {
 
 #[test]
 fn a_client_that_does_not_answer_the_close_frame_is_waited_for_no_longer_than_five_seconds() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let socket = open(&gateway, WIDE).await;
         settle().await;
@@ -615,7 +616,7 @@ fn a_client_that_does_not_answer_the_close_frame_is_waited_for_no_longer_than_fi
 
 #[test]
 fn a_message_comes_as_cbor_or_as_cdr_in_cbor_as_each_subscriber_wants_it() {
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut talker, mut plain) = (gateway.connect(WIDE), open(&gateway, WIDE).await);
         let mut raw = open(&gateway, WIDE).await;

@@ -18,5 +18,7 @@
 )]
 
 mod panics;
+#[path = "../support/system.rs"]
+mod system;
 #[path = "../support/virtual_time.rs"]
 mod virtual_time;

@@ -2,13 +2,13 @@
 //!
 //! **Invariant:** the hook is the process's own, so these tests share one that notes what it is told and ends nothing.
 
+use crate::system::{in_real_time, in_virtual_time};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::task::{self, Poll};
 use std::time::Duration;
 
-use crate::virtual_time::{Gateway, Node, WIDE, run, settle};
-use actix::prelude::*;
+use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use bytes::Bytes;
 use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};
 use pendularm::actors::gateway::connection::Connection;
@@ -85,7 +85,7 @@ impl AsyncWrite for Trap {
 #[test]
 fn a_panic_in_what_reads_or_writes_for_a_client_ends_that_client_alone() {
     ends();
-    run(async {
+    in_virtual_time(async {
         for in_reading in [true, false] {
             let gateway = Gateway::bare().await;
             let mut other = gateway.connect(WIDE);
@@ -132,7 +132,7 @@ impl Drop for Explosive {
 #[test]
 fn a_panic_in_the_actor_of_a_client_ends_that_client_alone() {
     ends();
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let (mut deaf, mut other) = (gateway.connect(1024), gateway.connect(WIDE));
         deaf.subscribe("/joint_states").await;
@@ -176,7 +176,7 @@ impl Computation for Panicking {
 #[test]
 fn a_panic_in_a_computation_is_answered_and_its_worker_works_on() {
     ends();
-    System::new().block_on(async {
+    in_real_time(async {
         let workers = WorkerPool::start(1).unwrap();
         let pool = workers.clone();
         let mut nodes = Nodes::default();
@@ -212,7 +212,7 @@ fn a_panic_in_a_computation_is_answered_and_its_worker_works_on() {
 #[test]
 fn a_panic_in_a_node_ends_the_process_with_one_line_that_says_where() {
     ends();
-    run(async {
+    in_virtual_time(async {
         let mut nodes = Nodes::default();
         let node = Node {
             on_call: Box::new(|_| panic!("in a node\nforged line")),
@@ -232,7 +232,7 @@ fn a_panic_in_a_node_ends_the_process_with_one_line_that_says_where() {
 #[test]
 fn a_panic_in_the_registry_ends_the_process() {
     ends();
-    run(async {
+    in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut client = gateway.connect(WIDE);
         client.subscribe("/joint_states").await;
@@ -256,7 +256,7 @@ fn what_contains_a_panic_says_where_it_was() {
         7
     });
     assert_eq!(outer.unwrap(), 7);
-    run(async {
+    in_virtual_time(async {
         let task = contained(async {
             settle().await;
             panic!("in a task");

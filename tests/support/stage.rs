@@ -3,10 +3,8 @@
 //!
 //! A test asks a node as another node does ([`asked`]), and hears what a subscriber hears. A second passes in no time and always in the same way, so that steps, messages and their order can be counted.
 
-use std::future::Future;
 use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use actix::prelude::*;
@@ -39,28 +37,6 @@ use tokio::time::{sleep, timeout};
 
 /// Virtual time that anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(600);
-
-/// Runs a test on one thread in virtual time.
-pub fn in_virtual_time<T>(test: impl Future<Output = T>) -> T {
-    counting_wake_ups(|_| test)
-}
-
-/// The same; the test is told how often the thread has gone to sleep, and so how often something woke it.
-pub fn counting_wake_ups<T, F: Future<Output = T>>(test: impl FnOnce(Arc<AtomicU64>) -> F) -> T {
-    let sleeps = Arc::new(AtomicU64::new(0));
-    let counter = Arc::clone(&sleeps);
-    let system = System::with_tokio_rt(move || {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .start_paused(true)
-            .on_thread_park(move || {
-                counter.fetch_add(1, Ordering::Relaxed);
-            })
-            .build()
-            .unwrap()
-    });
-    system.block_on(test(sleeps))
-}
 
 pub fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)

@@ -4,7 +4,6 @@
 //! The clock moves only when everything waits for it, so a time that a test reads is exact to the timers' millisecond.
 
 use std::cell::RefCell;
-use std::future::Future;
 use std::ops::{Deref, DerefMut};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -29,18 +28,6 @@ const LONG: Duration = Duration::from_secs(7 * 24 * 3600);
 pub const GRAIN: Duration = Duration::from_millis(2);
 /// The pipe to a client that takes everything at once.
 pub const WIDE: usize = 1 << 26;
-
-/// Runs a test on one thread, in virtual time.
-pub fn run(test: impl Future<Output = ()>) {
-    System::with_tokio_rt(|| {
-        tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .start_paused(true)
-            .build()
-            .expect("a runtime")
-    })
-    .block_on(test);
-}
 
 /// Registry and gauges, with the nodes of a test.
 pub struct Gateway {

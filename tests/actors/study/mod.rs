@@ -8,13 +8,14 @@ mod predictions;
 mod rollouts;
 mod turns;
 
+use crate::system::in_virtual_time;
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use crate::stage::{in_virtual_time, ms, pass};
+use crate::stage::{ms, pass};
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::sim::{

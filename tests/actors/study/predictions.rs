@@ -1,6 +1,7 @@
 //! Limits, advice and plans: the study's own, with what is left out taken from the arm; and the refusal of fields.
 
 use super::*;
+use crate::system::in_real_time;
 
 /// The values that the service gives of these limits and this motion.
 fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Value {
@@ -47,7 +48,7 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
 
 #[test]
 fn the_predictions_are_the_studys_and_what_is_left_out_is_the_arms_own() {
-    System::new().block_on(async {
+    in_real_time(async {
         assert_predictions_are_the_studys::<2>().await;
         assert_predictions_are_the_studys::<3>().await;
     });
@@ -55,7 +56,7 @@ fn the_predictions_are_the_studys_and_what_is_left_out_is_the_arms_own() {
 
 #[test]
 fn members_that_are_left_out_of_an_object_are_the_arms_own() {
-    System::new().block_on(async {
+    in_real_time(async {
         let bench = Bench::<2>::new();
         let predicted = bench
             .ask(PredictStability {
@@ -79,7 +80,7 @@ fn members_that_are_left_out_of_an_object_are_the_arms_own() {
 /// Without gravity and control nothing limits; Euler on a free swing is stable at no timestep.
 #[test]
 fn no_limit_is_null_and_no_stable_timestep_is_zero() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         let none = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
         let args = json!({"gains": none, "params": {"gravity": 0}});
@@ -110,7 +111,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
 /// The search for gains and for a plan are the library's; what is left out is the arm's own.
 #[test]
 fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         let Present { control, state } = settings::<2>();
         let wish = Wish {
@@ -189,22 +190,51 @@ fn plan_with(error: f64) -> PlanRun<2> {
 
 #[test]
 fn every_field_that_is_wrong_is_named_members_with_their_object() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         let common = [
-            (json!({"gains": {"kp": [1, -2]}}), "gains.kp[1] must be at least 0, got -2"),
-            (json!({"gains": {"ki": [1]}}), "gains.ki must have 2 entries, got 1"),
-            (json!({"gains": {"kd": 3}}), "gains.kd must be an array of 2 numbers, got 3"),
-            (json!({"gains": [1, 2, 3]}), "gains must be an object, got an array"),
+            (
+                json!({"gains": {"kp": [1, -2]}}),
+                "gains.kp[1] must be at least 0, got -2",
+            ),
+            (
+                json!({"gains": {"ki": [1]}}),
+                "gains.ki must have 2 entries, got 1",
+            ),
+            (
+                json!({"gains": {"kd": 3}}),
+                "gains.kd must be an array of 2 numbers, got 3",
+            ),
+            (
+                json!({"gains": [1, 2, 3]}),
+                "gains must be an object, got an array",
+            ),
             (json!({"gains": true}), "gains must be an object, got true"),
-            (json!({"params": {"masses": [0, 1]}}), "params.masses[0] must be greater than 0, got 0"),
-            (json!({"params": {"lengths": ["a", 1]}}), "params.lengths[0] must be a number, got \"a\""),
-            (json!({"params": {"gravity": -1}}), "params.gravity must be at least 0, got -1"),
-            (json!({"setpoint": [1, 2, 3]}), "setpoint must have 2 entries, got 3"),
-            (json!({"integrator": "heun"}), "integrator must be one of euler, midpoint, verlet, rk4, got \"heun\""),
-            (json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),
-             "integrator must be one of euler, midpoint, verlet, rk4, got 1; gains.kp must be an array of 2 numbers, got 1; \
-              params.gravity must be a number, got \"g\"; setpoint must be an array of 2 numbers, got 0"),
+            (
+                json!({"params": {"masses": [0, 1]}}),
+                "params.masses[0] must be greater than 0, got 0",
+            ),
+            (
+                json!({"params": {"lengths": ["a", 1]}}),
+                "params.lengths[0] must be a number, got \"a\"",
+            ),
+            (
+                json!({"params": {"gravity": -1}}),
+                "params.gravity must be at least 0, got -1",
+            ),
+            (
+                json!({"setpoint": [1, 2, 3]}),
+                "setpoint must have 2 entries, got 3",
+            ),
+            (
+                json!({"integrator": "heun"}),
+                "integrator must be one of euler, midpoint, verlet, rk4, got \"heun\"",
+            ),
+            (
+                json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),
+                "integrator must be one of euler, midpoint, verlet, rk4, got 1; gains.kp must be an array of 2 numbers, got 1; \
+              params.gravity must be a number, got \"g\"; setpoint must be an array of 2 numbers, got 0",
+            ),
         ];
         for (args, why) in &common {
             assert_eq!(bench.refusal(Service::Stability, args).await, *why);
@@ -214,20 +244,54 @@ fn every_field_that_is_wrong_is_named_members_with_their_object() {
         }
         for (args, why) in [
             (json!({"q0": [1]}), "q0 must have 2 entries, got 1"),
-            (json!({"qdot0": [1, true]}), "qdot0[1] must be a number, got true"),
-            (json!({"duration": 0}), "duration must be greater than 0, got 0"),
-            (json!({"timestep": -1}), "timestep must be greater than 0, got -1"),
-            (json!({"samples": 0}), "samples must be an integer, at least 1, got 0"),
-            (json!({"samples": 1}), "samples must be between 2 and 100000, got 1"),
-            (json!({"samples": 100_001}), "samples must be at most 100000, got 100001"),
-            (json!({"samples": 2.5}), "samples must be an integer, at least 1, got 2.5"),
-            (json!({"reference": 1}), "reference must be true or false, got 1"),
-            (json!({"duration": 1, "timestep": 2}), "duration must be at least the timestep 2, got 1"),
-            (json!({"duration": 20, "timestep": 1e-6}), "duration / timestep must be at most 10000000 steps, got 20000000"),
+            (
+                json!({"qdot0": [1, true]}),
+                "qdot0[1] must be a number, got true",
+            ),
+            (
+                json!({"duration": 0}),
+                "duration must be greater than 0, got 0",
+            ),
+            (
+                json!({"timestep": -1}),
+                "timestep must be greater than 0, got -1",
+            ),
+            (
+                json!({"samples": 0}),
+                "samples must be an integer, at least 1, got 0",
+            ),
+            (
+                json!({"samples": 1}),
+                "samples must be between 2 and 100000, got 1",
+            ),
+            (
+                json!({"samples": 100_001}),
+                "samples must be at most 100000, got 100001",
+            ),
+            (
+                json!({"samples": 2.5}),
+                "samples must be an integer, at least 1, got 2.5",
+            ),
+            (
+                json!({"reference": 1}),
+                "reference must be true or false, got 1",
+            ),
+            (
+                json!({"duration": 1, "timestep": 2}),
+                "duration must be at least the timestep 2, got 1",
+            ),
+            (
+                json!({"duration": 20, "timestep": 1e-6}),
+                "duration / timestep must be at most 10000000 steps, got 20000000",
+            ),
         ] {
             assert_eq!(bench.refusal(Service::Rollout, &args).await, why);
         }
-        let too_long = RunOffline { duration: Some(20.0), timestep: Some(1e-6), ..RunOffline::default() };
+        let too_long = RunOffline {
+            duration: Some(20.0),
+            timestep: Some(1e-6),
+            ..RunOffline::default()
+        };
         assert!(matches!(bench.ask(too_long).await, Err(NotRun::Plan(_))));
     });
 }

@@ -1,6 +1,7 @@
 //! Runs computed beside the live arm.
 
 use super::*;
+use crate::system::in_real_time;
 
 fn joints(values: &Value) -> Vec<[f64; 2]> {
     serde_json::from_value(values.clone()).unwrap()
@@ -9,7 +10,7 @@ fn joints(values: &Value) -> Vec<[f64; 2]> {
 /// Against the live arm's stepper, asked for every sample; the numbers as written read back as the same bits.
 #[test]
 fn a_rollout_is_the_live_simulation_bit_for_bit() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         for method in Method::ALL {
             for controlled in [false, true] {
@@ -18,7 +19,11 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                     "params": {"gravity": 9.81, "masses": [1, 2], "lengths": [1, 0.5]}});
                 let mut live = Simulation::new(
                     Arm::new([1.0, 0.5], [1.0, 2.0], 9.81).unwrap(),
-                    Gains { kp: [200.0, 100.0], ki: [20.0, 0.0], kd: [30.0, 12.0] },
+                    Gains {
+                        kp: [200.0, 100.0],
+                        ki: [20.0, 0.0],
+                        kd: [30.0, 12.0],
+                    },
                 );
                 if controlled {
                     args["gains"] = json!({"kp": [200, 100], "ki": [20, 0], "kd": [30, 12]});
@@ -26,12 +31,19 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                 }
                 live.set_method(method);
                 live.set_timestep(0.005);
-                live.set_state(State { position: [0.4, -0.3], velocity: [0.5, 1.0] });
-                live.set_setpoint(Setpoint { position: [1.0, -0.5], velocity: [0.0; 2] });
+                live.set_state(State {
+                    position: [0.4, -0.3],
+                    velocity: [0.5, 1.0],
+                });
+                live.set_setpoint(Setpoint {
+                    position: [1.0, -0.5],
+                    velocity: [0.0; 2],
+                });
                 let values = bench.values(Service::Rollout, &args).await;
                 let times: Vec<f64> = serde_json::from_value(values["times"].clone()).unwrap();
                 assert_eq!(times.len(), 51);
-                let (positions, velocities) = (joints(&values["positions"]), joints(&values["velocities"]));
+                let (positions, velocities) =
+                    (joints(&values["positions"]), joints(&values["velocities"]));
                 let efforts = joints(&values["efforts"]);
                 assert_eq!(efforts[0], [0.0; 2]);
                 for k in 0..51 {
@@ -54,7 +66,7 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
 
 #[test]
 fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
-    System::new().block_on(async {
+    in_real_time(async {
         let bench = Bench::<3>::new();
         let run = bench.ask(RunOffline::default()).await.unwrap().run;
         let mut live = Simulation::new(settings::<3>().control.arm, no_control());
@@ -72,7 +84,7 @@ fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
 /// At the same timestep the order tells; the reference changes neither the samples nor what counts as evaluations.
 #[test]
 fn methods_can_be_compared_by_their_errors() {
-    System::new().block_on(async {
+    in_real_time(async {
         let bench = Bench::<2>::new();
         let control = SetGains {
             kp: Some([200.0, 100.0]),
@@ -119,7 +131,7 @@ fn methods_can_be_compared_by_their_errors() {
 
 #[test]
 fn a_rollout_that_diverges_ends_with_its_last_finite_sample() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         let args = json!({"integrator": "euler", "timestep": 1, "duration": 1000, "q0": [1, 1], "reference": true,
             "gains": {"kp": [1e9, 1e9], "ki": [0, 0], "kd": [1e9, 1e9]}});

@@ -1,6 +1,7 @@
 //! Light requests beside heavy ones, on the pool.
 
 use super::*;
+use crate::system::in_real_time;
 
 /// Minutes of work in an unoptimised build; no test waits for its end.
 fn heavy() -> RunOffline<2> {
@@ -27,7 +28,7 @@ fn short<const N: usize>() -> RunOffline<N> {
 
 #[test]
 fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         let heavy = bench.call(1, heavy());
         bench.call(2, short());
@@ -103,7 +104,7 @@ fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
 
 #[test]
 fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
-    System::new().block_on(async {
+    in_real_time(async {
         let mut bench = Bench::<2>::new();
         let (first, third) = (bench.call(1, heavy()), bench.call(3, heavy()));
         bench.call(2, PredictStability::default());
@@ -129,7 +130,7 @@ fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
 
 #[test]
 fn the_arms_own_question_is_answered_by_the_pool() {
-    System::new().block_on(async {
+    in_real_time(async {
         let bench = Bench::<2>::new();
         let control = settings::<2>().control;
         let limit = bench.study.send(HeldLimit(control)).await.unwrap();

@@ -1,0 +1,44 @@
+//! The actors' system that a test runs in. Nothing that depends on the test's type does more than box it: there are some
+//! 250 of them, and for each the compiler would go through the runtime's loop again.
+
+use std::future::Future;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use actix::prelude::*;
+use tokio::runtime::Builder;
+
+/// Runs a test on one thread, in real time.
+pub fn in_real_time(test: impl Future<Output = ()>) {
+    to_the_end(&System::new(), test);
+}
+
+/// Runs a test on one thread, in virtual time: the clock stands still until nobody has anything to do.
+pub fn in_virtual_time<T>(test: impl Future<Output = T>) -> T {
+    counting_wake_ups(|_| test)
+}
+
+/// The same; the test is told how often the thread has gone to sleep, and so how often something woke it.
+pub fn counting_wake_ups<T, F: Future<Output = T>>(test: impl FnOnce(Arc<AtomicU64>) -> F) -> T {
+    let sleeps = Arc::default();
+    to_the_end(&with_paused_clock(Arc::clone(&sleeps)), test(sleeps))
+}
+
+fn with_paused_clock(sleeps: Arc<AtomicU64>) -> SystemRunner {
+    System::with_tokio_rt(move || {
+        Builder::new_current_thread()
+            .enable_all()
+            .start_paused(true)
+            .on_thread_park(move || {
+                sleeps.fetch_add(1, Ordering::Relaxed);
+            })
+            .build()
+            .expect("a runtime")
+    })
+}
+
+fn to_the_end<'a, T>(system: &SystemRunner, test: impl Future<Output = T> + 'a) -> T {
+    let test: Pin<Box<dyn Future<Output = T> + 'a>> = Box::pin(test);
+    system.block_on(test)
+}
