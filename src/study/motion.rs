@@ -17,7 +17,7 @@
 //! these angles, and half of them bore two and a half times as much. On moves of up to 25 rad a joint with gains of all
 //! dampings the speed assumed was 0.5 to 2.9 times the true one.
 //!
-//! **Invariant:** pure and cheap, some 3 µs: it is asked for at every tick.
+//! **Invariant:** pure and cheap, some 3 µs: it is asked for at every tick that somebody hears of.
 //!
 //! [`turn_per_step`]: crate::math::integrator::Method::turn_per_step
 

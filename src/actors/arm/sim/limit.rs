@@ -53,8 +53,11 @@ impl<const N: usize> ArmSim<N> {
     pub(super) fn watch_limit(&mut self, ctx: &mut Context<Self>) {
         self.ask_limit(ctx);
         let limit = self.timestep_limit();
+        if !self.wants_limit() || limit.is_nan() {
+            return;
+        }
         let exceeded = self.simulation.timestep() > limit.min(self.motion().timestep);
-        if self.wants_limit() && !limit.is_nan() && exceeded != self.limit.warned {
+        if exceeded != self.limit.warned {
             self.limit.warned = exceeded;
             self.publish_diagnostics();
         }
