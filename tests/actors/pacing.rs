@@ -13,15 +13,17 @@ use std::sync::Arc;
 
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
-use pendularm::protocol::catalog::Service;
+use pendularm::protocol::catalog::{Service, Topic};
+use pendularm::protocol::messages;
 use serde_json::json;
 
 /// Subscribers: many more than are written to where the message is heard, and than have their turn at once.
 const SUBSCRIBERS: usize = 100;
 
 /// Subscribes over a socket; gives the client's end.
-async fn subscriber(gateway: &Gateway, listener: &TcpListener) -> TcpStream {
+async fn subscriber(gateway: &Gateway, listener: &TcpListener, topic: &str) -> TcpStream {
     let mut client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
     let (stream, _) = listener.accept().unwrap();
     stream.set_nonblocking(true).unwrap();
@@ -31,8 +33,9 @@ async fn subscriber(gateway: &Gateway, listener: &TcpListener) -> TcpStream {
         gateway.registry.clone(),
         Arc::clone(&gateway.gauges),
     );
+    let subscribe = json!({"op": "subscribe", "topic": topic});
     client
-        .write_all(b"{\"op\":\"subscribe\",\"topic\":\"/t\"}\n")
+        .write_all(format!("{subscribe}\n").as_bytes())
         .unwrap();
     client.set_nonblocking(true).unwrap();
     while client.peek(&mut [0]).is_err() {
@@ -71,7 +74,7 @@ fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
             let gateway = Gateway::with(nodes).await;
             let listener = TcpListener::bind("127.0.0.1:0").unwrap();
             for _ in 0..SUBSCRIBERS {
-                let one = subscriber(&gateway, &listener).await;
+                let one = subscriber(&gateway, &listener, "/t").await;
                 subscribers.borrow_mut().push(one);
             }
             let mut publisher = gateway.connect(WIDE);
@@ -83,4 +86,37 @@ fn a_publisher_goes_on_when_all_its_subscribers_have_been_written_to() {
             assert_eq!(arrived.get(), SUBSCRIBERS);
         });
     }
+}
+
+#[test]
+fn a_message_of_the_arm_does_not_wait_behind_what_others_publish() {
+    in_real_time(async {
+        let gateway = Gateway::bare().await;
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let mut crowd = Vec::new();
+        for _ in 0..SUBSCRIBERS {
+            crowd.push(subscriber(&gateway, &listener, "/t").await);
+        }
+        let watcher = subscriber(&gateway, &listener, "/joint_states").await;
+        let mut publisher = gateway.connect(WIDE);
+        publisher.advertise("/t").await;
+        settle().await;
+        let has_come = |client: &TcpStream| client.peek(&mut [0]).is_ok();
+        let msg = json!({"data": "x".repeat(40_000)});
+        publisher
+            .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+            .await;
+        while !crowd.iter().any(has_come) {
+            tokio::task::yield_now().await;
+        }
+        gateway.registry.do_send(Publish {
+            topic: Topic::JointStates,
+            frame: messages::publish("/joint_states", &json!({})).into(),
+        });
+        while !has_come(&watcher) {
+            tokio::task::yield_now().await;
+        }
+        let before = crowd.iter().filter(|client| has_come(client)).count();
+        assert!(before < SUBSCRIBERS, "all of them came first");
+    });
 }

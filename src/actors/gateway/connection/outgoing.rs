@@ -21,7 +21,7 @@ use tokio::time::Instant;
 use super::unencoded::Unencoded;
 use crate::actors::gateway::limits::{BATCH_BYTES, BATCH_FRAMES, LINGER, STALL_LIMIT};
 use crate::actors::gateway::messages::{Throttle, Underway};
-use crate::actors::gateway::turns::{self, WritesInTurn};
+use crate::actors::gateway::turns::{WritersLine, WritesInTurn};
 use crate::actors::panics::contain;
 use crate::actors::resources::budget::{Account, MESSAGES_LEFT, free_elsewhere};
 use crate::actors::resources::gauges::Gauges;
@@ -244,11 +244,20 @@ impl Outgoing {
         self.go_on(cx);
     }
 
-    /// Stands in line, in which so many bytes are to be written, while no response waits. Publishers wait as well.
-    pub(super) async fn wait_for_turn(self: &Rc<Self>, bytes: usize) {
+    /// The line in which the writer waits, where it has to.
+    pub(super) fn line(&self) -> WritersLine {
+        if self.underway.borrow().is_empty() {
+            WritersLine::Unpaced
+        } else {
+            WritersLine::Paced
+        }
+    }
+
+    /// Stands in a line, in which so many bytes are to be written, while no response waits. Publishers wait as well.
+    pub(super) async fn wait_for_turn(self: &Rc<Self>, line: WritersLine, bytes: usize) {
         if !self.in_line.replace(true) {
             let this: Weak<Self> = Rc::downgrade(self);
-            turns::stand_in_line(bytes, this);
+            line.stand(bytes, this);
         }
         // It is polled in its turn, and behind the handler of a response.
         let may_go_on = || !self.in_line.get() || self.has_responses();

@@ -3,7 +3,8 @@
 //!
 //! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
 //! put into the outbox is offered to the socket in the same turn. Where it stands in line
-//! ([`turns`]), it is polled in its turn. A client that takes nothing wakes it when it does.
+//! ([`turns`](crate::actors::gateway::turns)), it is polled in its turn. A client that takes nothing wakes it when it
+//! does.
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 
@@ -13,7 +14,6 @@ use tokio::time::{Instant, sleep_until, timeout, timeout_at};
 use super::shared::Shared;
 use super::transport::Outbound;
 use crate::actors::gateway::limits::{BATCH_BYTES, LINGER};
-use crate::actors::gateway::turns;
 
 /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
 /// Returns whether all that was queued has been written.
@@ -39,10 +39,11 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
 /// Waits where many are written to. Responses wait for no turn.
 async fn wait_for_turn(shared: &Shared) {
     let outgoing = &shared.outgoing;
+    let line = outgoing.line();
     if let Some(bytes) = outgoing.topics_alone()
-        && !turns::may_write(bytes)
+        && !line.may_write(bytes)
     {
-        outgoing.wait_for_turn(bytes).await;
+        outgoing.wait_for_turn(line, bytes).await;
     }
 }
 
