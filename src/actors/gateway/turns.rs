@@ -34,7 +34,7 @@ const WRITERS_AT_A_TIME: usize = 16;
 const FREE_WRITES: usize = 128;
 /// Bytes of a message that count as another write.
 const LONG: usize = 4096;
-/// Twice what [`WRITERS_AT_A_TIME`] take, each some 10 µs. Where the system has to find memory for what clients do not
+/// Three times what [`WRITERS_AT_A_TIME`] take as a rule. Where the system has to find memory for what clients do not
 /// read, a write of fifty bytes was seen to take 340 µs.
 const WRITING_TIME: Duration = Duration::from_micros(300);
 
