@@ -188,103 +188,113 @@ fn plan_with(error: f64) -> PlanRun<2> {
     }
 }
 
+/// Arguments of whatever asks about a control loop, and why they are refused.
+fn wrong_loops() -> [(Value, &'static str); 11] {
+    [
+        (
+            json!({"gains": {"kp": [1, -2]}}),
+            "gains.kp[1] must be at least 0, got -2",
+        ),
+        (
+            json!({"gains": {"ki": [1]}}),
+            "gains.ki must have 2 entries, got 1",
+        ),
+        (
+            json!({"gains": {"kd": 3}}),
+            "gains.kd must be an array of 2 numbers, got 3",
+        ),
+        (
+            json!({"gains": [1, 2, 3]}),
+            "gains must be an object, got an array",
+        ),
+        (json!({"gains": true}), "gains must be an object, got true"),
+        (
+            json!({"params": {"masses": [0, 1]}}),
+            "params.masses[0] must be greater than 0, got 0",
+        ),
+        (
+            json!({"params": {"lengths": ["a", 1]}}),
+            "params.lengths[0] must be a number, got \"a\"",
+        ),
+        (
+            json!({"params": {"gravity": -1}}),
+            "params.gravity must be at least 0, got -1",
+        ),
+        (
+            json!({"setpoint": [1, 2, 3]}),
+            "setpoint must have 2 entries, got 3",
+        ),
+        (
+            json!({"integrator": "heun"}),
+            "integrator must be one of euler, midpoint, verlet, rk4, got \"heun\"",
+        ),
+        (
+            json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),
+            "integrator must be one of euler, midpoint, verlet, rk4, got 1; gains.kp must be an array of 2 numbers, got 1; \
+              params.gravity must be a number, got \"g\"; setpoint must be an array of 2 numbers, got 0",
+        ),
+    ]
+}
+
+/// Arguments of a run, and why they are refused.
+fn wrong_runs() -> [(Value, &'static str); 11] {
+    [
+        (json!({"q0": [1]}), "q0 must have 2 entries, got 1"),
+        (
+            json!({"qdot0": [1, true]}),
+            "qdot0[1] must be a number, got true",
+        ),
+        (
+            json!({"duration": 0}),
+            "duration must be greater than 0, got 0",
+        ),
+        (
+            json!({"timestep": -1}),
+            "timestep must be greater than 0, got -1",
+        ),
+        (
+            json!({"samples": 0}),
+            "samples must be an integer, at least 1, got 0",
+        ),
+        (
+            json!({"samples": 1}),
+            "samples must be between 2 and 100000, got 1",
+        ),
+        (
+            json!({"samples": 100_001}),
+            "samples must be at most 100000, got 100001",
+        ),
+        (
+            json!({"samples": 2.5}),
+            "samples must be an integer, at least 1, got 2.5",
+        ),
+        (
+            json!({"reference": 1}),
+            "reference must be true or false, got 1",
+        ),
+        (
+            json!({"duration": 1, "timestep": 2}),
+            "duration must be at least the timestep 2, got 1",
+        ),
+        (
+            json!({"duration": 20, "timestep": 1e-6}),
+            "duration / timestep must be at most 10000000 steps, got 20000000",
+        ),
+    ]
+}
+
 #[test]
 fn every_field_that_is_wrong_is_named_members_with_their_object() {
     in_real_time(async {
         let mut bench = Bench::<2>::new();
-        let common = [
-            (
-                json!({"gains": {"kp": [1, -2]}}),
-                "gains.kp[1] must be at least 0, got -2",
-            ),
-            (
-                json!({"gains": {"ki": [1]}}),
-                "gains.ki must have 2 entries, got 1",
-            ),
-            (
-                json!({"gains": {"kd": 3}}),
-                "gains.kd must be an array of 2 numbers, got 3",
-            ),
-            (
-                json!({"gains": [1, 2, 3]}),
-                "gains must be an object, got an array",
-            ),
-            (json!({"gains": true}), "gains must be an object, got true"),
-            (
-                json!({"params": {"masses": [0, 1]}}),
-                "params.masses[0] must be greater than 0, got 0",
-            ),
-            (
-                json!({"params": {"lengths": ["a", 1]}}),
-                "params.lengths[0] must be a number, got \"a\"",
-            ),
-            (
-                json!({"params": {"gravity": -1}}),
-                "params.gravity must be at least 0, got -1",
-            ),
-            (
-                json!({"setpoint": [1, 2, 3]}),
-                "setpoint must have 2 entries, got 3",
-            ),
-            (
-                json!({"integrator": "heun"}),
-                "integrator must be one of euler, midpoint, verlet, rk4, got \"heun\"",
-            ),
-            (
-                json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),
-                "integrator must be one of euler, midpoint, verlet, rk4, got 1; gains.kp must be an array of 2 numbers, got 1; \
-              params.gravity must be a number, got \"g\"; setpoint must be an array of 2 numbers, got 0",
-            ),
-        ];
+        let common = wrong_loops();
         for (args, why) in &common {
             assert_eq!(bench.refusal(Service::Stability, args).await, *why);
         }
         for (args, why) in &common[..10] {
             assert_eq!(bench.refusal(Service::Rollout, args).await, *why);
         }
-        for (args, why) in [
-            (json!({"q0": [1]}), "q0 must have 2 entries, got 1"),
-            (
-                json!({"qdot0": [1, true]}),
-                "qdot0[1] must be a number, got true",
-            ),
-            (
-                json!({"duration": 0}),
-                "duration must be greater than 0, got 0",
-            ),
-            (
-                json!({"timestep": -1}),
-                "timestep must be greater than 0, got -1",
-            ),
-            (
-                json!({"samples": 0}),
-                "samples must be an integer, at least 1, got 0",
-            ),
-            (
-                json!({"samples": 1}),
-                "samples must be between 2 and 100000, got 1",
-            ),
-            (
-                json!({"samples": 100_001}),
-                "samples must be at most 100000, got 100001",
-            ),
-            (
-                json!({"samples": 2.5}),
-                "samples must be an integer, at least 1, got 2.5",
-            ),
-            (
-                json!({"reference": 1}),
-                "reference must be true or false, got 1",
-            ),
-            (
-                json!({"duration": 1, "timestep": 2}),
-                "duration must be at least the timestep 2, got 1",
-            ),
-            (
-                json!({"duration": 20, "timestep": 1e-6}),
-                "duration / timestep must be at most 10000000 steps, got 20000000",
-            ),
-        ] {
+        for (args, why) in wrong_runs() {
             assert_eq!(bench.refusal(Service::Rollout, &args).await, why);
         }
         let too_long = RunOffline {
