@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** virtual time and in-memory pipes only; whoever has the token gets in at once, whatever the others do.
 
-use crate::system::in_virtual_time;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::gate::{
     FREE_GUESSES, GUESS_INTERVAL, Gate, MAX_UNAUTHENTICATED,

@@ -1,11 +1,11 @@
 //! The arm's actor in virtual time: exact step counts, what it says and when, and that it is the offline simulation.
 
-use crate::system::in_virtual_time;
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use actix::prelude::*;
 use bytes::Bytes;
 use pendularm::actors::ConnectionId;

@@ -3,12 +3,12 @@
 //! **Invariant:** work is counted in messages and steps, never timed: the clock moves by a millisecond whenever the arm lets
 //! anybody else have a turn.
 
-use crate::system::in_virtual_time;
 use std::any::Any;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
     ArmPose, ArmSettings, ArmSim, Disturb, Enable, EndGoal, MAX_STEPS, Pause, RefuseSteps, Reset,

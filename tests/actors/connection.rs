@@ -2,7 +2,6 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
-use crate::system::in_virtual_time;
 use std::cell::RefCell;
 use std::io::IoSlice;
 use std::pin::Pin;
@@ -11,6 +10,7 @@ use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::limits::{

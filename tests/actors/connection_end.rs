@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
-use crate::system::in_virtual_time;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
 use actix::prelude::*;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};

@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** what is made elsewhere comes in its place: order is checked with every message.
 
-use crate::system::in_virtual_time;
 use std::fmt::Write as _;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE};
 use pendularm::actors::gateway::limits::{MAX_FRAGMENT_SIZES, READ_HERE};
 use pendularm::actors::gateway::registry::Nodes;

@@ -2,9 +2,9 @@
 //!
 //! **Invariant:** what still waits is told by the memory that is counted for it.
 
-use crate::system::in_virtual_time;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 use pendularm::actors::gateway::limits::{CALL_BYTES, MAX_WAITING_CALLS, MAX_WAITING_GOALS};
 use serde_json::{Value, json};

@@ -1,12 +1,12 @@
 //! `/ik/solve` as its node does it, before an arm that stands wherever a test puts it.
 
-use crate::system::in_virtual_time;
 use std::cell::Cell;
 use std::f64::consts::PI;
 use std::rc::Rc;
 use std::sync::Arc;
 
 use crate::stage::numbers;
+use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::ik::{Ik, Solve, SolveError};

@@ -1,10 +1,10 @@
 //! `/arm_sim/integration_step` on the worker pool: turns, ends, and one answer each.
 
-use crate::system::in_real_time;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
+use crate::system::in_real_time;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::compute::integration::{Integration, IntegrationStep, NotIntegrated};

@@ -2,9 +2,9 @@
 //!
 //! **Invariant:** who has been accepted stays connected when the listening ends; who comes later is not accepted.
 
-use crate::system::in_real_time;
 use std::sync::Arc;
 
+use crate::system::in_real_time;
 use actix::prelude::*;
 #[cfg(target_os = "linux")]
 use pendularm::actors::gateway::listener::{KEEPALIVE_IDLE, KEEPALIVE_INTERVAL, KEEPALIVE_PROBES};

@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** a client that asks for little and reads what it gets is served whatever the others do.
 
-use crate::system::{in_real_time, in_virtual_time};
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::system::{in_real_time, in_virtual_time};
 use crate::virtual_time::{Gateway, Node, Peer, WIDE, settle};
 use actix::prelude::*;
 use bytes::Bytes;

@@ -2,10 +2,10 @@
 //!
 //! **Invariant:** what is counted is at least what is allocated; the test says how much that is.
 
-use crate::system::in_virtual_time;
 use std::sync::Mutex;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, settle};
 use pendularm::actors::gateway::limits::{
     CALL_BYTES, MAX_RESPONSES_WAITING, REGISTRATION_BYTES, STALL_LIMIT,

@@ -4,13 +4,13 @@
 //!
 //! **Invariant:** what is counted is what had arrived when the publisher's next frame was handled.
 
-use crate::system::in_real_time;
 use std::cell::Cell;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::rc::Rc;
 use std::sync::Arc;
 
+use crate::system::in_real_time;
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::messages::Publish;

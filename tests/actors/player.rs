@@ -1,6 +1,5 @@
 //! A record in the arm's place: what clients hear of it, forward, back and from anywhere.
 
-use crate::system::in_virtual_time;
 use std::cell::Cell;
 use std::collections::BTreeMap;
 use std::fs;
@@ -23,6 +22,7 @@ use tokio::time::sleep;
 
 use crate::recorder::{Notes, file, passages, stop};
 use crate::stage::{self, Client, Stage, connect, ms, number, numbers};
+use crate::system::in_virtual_time;
 
 /// A run of four seconds: the controller on, a setpoint, and after two seconds longer links and less gravity.
 async fn run() -> Vec<RecordEntry> {

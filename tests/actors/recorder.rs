@@ -1,6 +1,5 @@
 //! Runs on record: what arm and registry tell, and that it is enough to take every step again.
 
-use crate::system::in_virtual_time;
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
@@ -18,6 +17,7 @@ use serde_json::{Value, json};
 use tokio::time::{Instant, sleep};
 
 use crate::stage::{Client, Stage, ms};
+use crate::system::in_virtual_time;
 
 /// Entries as they come, in the order in which they are told.
 #[derive(Clone, Default)]

@@ -2,11 +2,11 @@
 //!
 //! **Invariant:** nodes are closures that note what they are told; nothing else stands in for the runtime.
 
-use crate::system::in_virtual_time;
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::limits::{DEFAULT_TIMEOUT, MAX_CONNECTIONS};
 use pendularm::actors::gateway::messages::Publish;

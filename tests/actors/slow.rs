@@ -2,9 +2,9 @@
 //!
 //! **Invariant:** virtual time, so a minute here is exactly that.
 
-use crate::system::in_virtual_time;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE, assert_elapsed, settle};
 use pendularm::actors::gateway::limits::{FRAME_TIME, MAX_CONNECTIONS};
 use pendularm::actors::gateway::registry::Nodes;

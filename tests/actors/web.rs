@@ -3,11 +3,11 @@
 //! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
 
 #![cfg(feature = "web")]
-use crate::system::in_virtual_time;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
 use bytes::Bytes;
 use pendularm::actors::gateway::connection::Connection;

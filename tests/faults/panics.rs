@@ -2,12 +2,12 @@
 //!
 //! **Invariant:** the hook is the process's own, so these tests share one that notes what it is told and ends nothing.
 
-use crate::system::{in_real_time, in_virtual_time};
 use std::pin::Pin;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::task::{self, Poll};
 use std::time::Duration;
 
+use crate::system::{in_real_time, in_virtual_time};
 use crate::virtual_time::{Gateway, Node, WIDE, settle};
 use bytes::Bytes;
 use pendularm::actors::compute::workers::{Computation, Progress, WorkerPool};

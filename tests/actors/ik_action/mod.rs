@@ -12,10 +12,10 @@ mod ending;
 mod feedback;
 mod reaching;
 mod reset;
-use crate::system::in_virtual_time;
 use std::time::Duration;
 
 use crate::stage::{Published, SilentArm, Stage, asked, ms, number, numbers, pass};
+use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{

@@ -13,10 +13,10 @@ mod starting;
 mod status;
 mod whole;
 
-use crate::system::{counting_wake_ups, in_virtual_time};
 use std::sync::atomic::Ordering;
 
 use crate::stage::{Client, Published, SilentArm, Stage, asked, connect, ms, number, pass};
+use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
 use pendularm::actors::arm::ik_action::{CancelGoal, IkAction, SendGoal};

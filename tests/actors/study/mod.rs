@@ -8,7 +8,6 @@ mod predictions;
 mod rollouts;
 mod turns;
 
-use crate::system::in_virtual_time;
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 use std::sync::Arc;
@@ -16,6 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use crate::stage::{ms, pass};
+use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::sim::{
