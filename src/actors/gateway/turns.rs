@@ -121,7 +121,7 @@ impl WritersLine {
     }
 
     /// Puts a writer, which has so many bytes to write, at the end of the line.
-    pub(super) fn stand(self, bytes: usize, writer: Weak<dyn WritesInTurn>) {
+    pub(super) fn stand(self, bytes: usize, writer: StandingWriter) {
         self.line().with(|line| line.stand(bytes, writer));
     }
 

@@ -253,11 +253,11 @@ impl Outgoing {
         }
     }
 
-    /// Stands in a line, in which so many bytes are to be written, while no response waits. Publishers wait as well.
-    pub(super) async fn wait_for_turn(self: &Rc<Self>, line: WritersLine, bytes: usize) {
+    /// Stands in its line, in which so many bytes are to be written, while no response waits. Publishers wait as well.
+    pub(super) async fn wait_for_turn(self: &Rc<Self>, bytes: usize) {
         if !self.in_line.replace(true) {
             let this: Weak<Self> = Rc::downgrade(self);
-            line.stand(bytes, this);
+            self.line().stand(bytes, this);
         }
         // It is polled in its turn, and behind the handler of a response.
         let may_go_on = || !self.in_line.get() || self.has_responses();

@@ -39,11 +39,10 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
 /// Waits where many are written to. Responses wait for no turn.
 async fn wait_for_turn(shared: &Shared) {
     let outgoing = &shared.outgoing;
-    let line = outgoing.line();
     if let Some(bytes) = outgoing.topics_alone()
-        && !line.may_write(bytes)
+        && !outgoing.line().may_write(bytes)
     {
-        outgoing.wait_for_turn(line, bytes).await;
+        outgoing.wait_for_turn(bytes).await;
     }
 }
 
