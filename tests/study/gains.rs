@@ -1,9 +1,8 @@
-//! Gains that are found: their margin and their settling, tried again by other means and on other moves.
+//! Gains that are found, for arms that the default gains fail, and why some are not. Random arms are in `properties`.
 
 use std::f64::consts::TAU;
 
 use pendularm::math::arm::{Arm, State};
-use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::gains::{GainsError, GainsSearch, SETTLED, SuggestedGains, Wish};
@@ -41,52 +40,6 @@ fn settles_after<const N: usize>(
         }
     }
     off_at
-}
-
-fn size(rng: &mut fastrand::Rng, decades: f64) -> f64 {
-    10_f64.powf(decades * (2.0 * rng.f64() - 1.0))
-}
-
-/// Arms of 10 cm to 10 m and of 10 g to 100 kg a link. Nearly all have gains, and moves that the search has not made
-/// settle too, in at most a half more than the time.
-fn check_random<const N: usize>(seed: u64, cases: usize, refused_at_most: usize) {
-    let wish = Wish {
-        settling_time: 4.0,
-        margin: 1.25,
-    };
-    let mut rng = fastrand::Rng::with_seed(seed);
-    let mut refused = 0;
-    for case in 0..cases {
-        let (length, mass) = (size(&mut rng, 1.0), size(&mut rng, 1.7));
-        let lengths = std::array::from_fn(|_| length * size(&mut rng, 0.2));
-        let masses = std::array::from_fn(|_| mass * size(&mut rng, 0.3));
-        let arm = Arm::<N>::new(lengths, masses, 9.81).unwrap();
-        let free = ControlLoop::free(arm).with_method(Method::ALL[case % 4]);
-        let told = format!("seed {seed} case {case}: {free:?}");
-        let Ok(found) = find(&free, wish) else {
-            println!("none: {told}");
-            refused += 1;
-            continue;
-        };
-        let control = ControlLoop {
-            gains: found.gains,
-            ..free
-        };
-        let least = limits(&control).minimum_held.unwrap();
-        assert!(least >= 1.24 * free.timestep, "{told}: {least}");
-        assert!(found.settled_after <= 4.0, "{told}");
-        for _ in 0..3 {
-            let after = settles_after(&control, &mut rng, 4.0);
-            assert!(after <= 6.0, "{told} {found:?}: {after} s");
-        }
-    }
-    assert!(refused <= refused_at_most, "{refused} of {cases} have none");
-}
-
-#[test]
-fn gains_of_random_arms_have_their_margin_and_settle() {
-    check_random::<2>(41, 16, 0);
-    check_random::<3>(42, 6, 1);
 }
 
 /// The default gains never settle a heavy arm, and are unstable on a light one.

@@ -203,6 +203,11 @@ fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally)
         },
         "{told}: {found:?}"
     );
+    // A limit counts growth of 1e-11, which may be a hair before the bound or behind it.
+    assert!(
+        found.bound.is_none_or(|bound| bound <= 1.0001 * least),
+        "{told}: {found:?}"
+    );
     if let Some(critical) = found.critical {
         assert!(
             critical.growth_per_step > 1.0
@@ -243,7 +248,7 @@ fn runs_away<const N: usize>(control: &ControlLoop<N>) -> bool {
     modes.iter().any(|mode| mode.re > 1e-9 * fastest)
 }
 
-/// Gains that are suggested leave the margin and settle on moves that the search has not made.
+/// Arms of 10 cm to 10 m and of 10 g to 100 kg a link: gains that are suggested leave the margin and settle on moves that the search has not made.
 fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     let mut dice = Dice::of(case);
     let (length, mass) = (dice.size(1.0), dice.size(1.7));
@@ -413,7 +418,7 @@ fn limits_divide_decay_from_growth_on_random_loops() {
 
 #[test]
 fn no_pose_of_a_random_loop_is_worse_than_the_worst() {
-    tells(property!(no_pose_is_worse_than_the_worst, 40, 20_000));
+    tells(property!(no_pose_is_worse_than_the_worst, 80, 20_000));
 }
 
 /// Its gains run away where nothing weighs, in a pose that gravity steadies: what grows there grows without gravity.
@@ -424,7 +429,7 @@ fn what_is_critical_grows_also_where_only_the_arm_without_weight_runs_away() {
 
 #[test]
 fn gains_for_random_arms_hold_on_other_moves() {
-    tells(property!(suggested_gains_hold, 8, 2_000));
+    tells(property!(suggested_gains_hold, 12, 2_000));
 }
 
 #[test]
