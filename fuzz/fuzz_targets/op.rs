@@ -78,6 +78,7 @@ fn judge(frame: &str) {
                 OpError::Call { service, .. } => {
                     messages::failure(service, id, &why, ErrorForm::Object)
                 }
+                OpError::Goal { action, .. } => messages::action_result(action, id, &why, 0, false),
             };
             let line = check_line(&line);
             assert_eq!(line.get("id").is_some(), id.is_some(), "{frame:?}");

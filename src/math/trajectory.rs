@@ -41,6 +41,12 @@ pub enum PathError {
         /// The point.
         usize,
     ),
+    /// On the way there from the point before, a position or a velocity would be no finite number.
+    #[error("points[{0}] must be reached from the point before by finite positions and velocities")]
+    NotFinite(
+        /// The point.
+        usize,
+    ),
 }
 
 /// A path through points.
@@ -53,7 +59,7 @@ impl<const N: usize> JointPath<N> {
     /// The path through `points`, which begins at time 0 where the joints are: at `start`.
     ///
     /// # Errors
-    /// If there is no point, or the times do not increase.
+    /// If there is no point, the times do not increase, or the numbers between two points overflow.
     pub fn new(start: Waypoint<N>, mut points: Vec<Waypoint<N>>) -> Result<Self, PathError> {
         let first = points.first().ok_or(PathError::NoPoints)?;
         if first.time < 0.0 {
@@ -66,9 +72,17 @@ impl<const N: usize> JointPath<N> {
         {
             return Err(PathError::Order(at + 1));
         }
-        if first.time > 0.0 {
+        let begins_before = first.time > 0.0;
+        if begins_before {
             let start = Waypoint { time: 0.0, ..start };
             points.insert(0, start);
+        }
+        let pairs = points.iter().zip(points.iter().skip(1));
+        if let Some(at) = pairs
+            .into_iter()
+            .position(|(one, next)| !is_finite(one, next))
+        {
+            return Err(PathError::NotFinite(at + usize::from(!begins_before)));
         }
         Ok(Self { points })
     }
@@ -100,6 +114,17 @@ fn at_rest<const N: usize>(position: [f64; N]) -> Setpoint<N> {
         position,
         velocity: [0.0; N],
     }
+}
+
+/// Whether no term of [`between`] overflows: each is at most one of these, some times over.
+fn is_finite<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>) -> bool {
+    let h = next.time - before.time;
+    let (v0, v1) = (before.velocity, next.velocity);
+    (0..N).all(|i| {
+        let way = before.position[i].abs() + next.position[i].abs();
+        let speed = v0.map_or(0.0, |v| v[i].abs()) + v1.map_or(0.0, |v| v[i].abs());
+        (12.0 * (way + speed * h.max(1.0)) + 6.0 * way / h).is_finite()
+    })
 }
 
 fn between<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>, time: f64) -> Setpoint<N> {

@@ -195,6 +195,44 @@ fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_str
 }
 
 #[test]
+fn at_the_end_of_the_runtime_forwarded_goals_have_their_results() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut pursuer, mut client) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        pursuer
+            .send(json!({"op": "advertise_action", "action": "/a", "type": "t/A"}))
+            .await;
+        pursuer.receive().await;
+        for n in 0..3 {
+            let goal = json!({"op": "send_action_goal", "action": "/a", "id": n, "args": {}});
+            client.send(goal).await;
+            pursuer.receive().await;
+        }
+        let refuse = RefuseCalls("shutting down");
+        gateway.registry.send(refuse).await.unwrap();
+        gateway.registry.send(FinishAll).await.unwrap();
+        let frames = client.rest().await;
+        assert_eq!(frames.len(), 3);
+        for (n, frame) in frames.iter().enumerate() {
+            assert_eq!(
+                (
+                    &frame["op"],
+                    &frame["id"],
+                    &frame["status"],
+                    &frame["values"]
+                ),
+                (
+                    &json!("action_result"),
+                    &json!(n),
+                    &json!(6),
+                    &json!("shutting down")
+                )
+            );
+        }
+    });
+}
+
+#[test]
 fn at_the_end_of_the_runtime_forwarded_calls_are_refused_and_streams_end() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;

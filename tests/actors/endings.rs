@@ -1,4 +1,4 @@
-//! Calls and goals that end by thousands at one instant: everybody else has a turn meanwhile.
+//! Calls, goals and registrations that end by thousands at one instant: everybody else has a turn meanwhile.
 //!
 //! **Invariant:** what still waits is told by the memory that is counted for it.
 
@@ -6,7 +6,10 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Peer, WIDE};
-use pendularm::actors::gateway::limits::{CALL_BYTES, MAX_WAITING_CALLS, MAX_WAITING_GOALS};
+use pendularm::actors::gateway::limits::{
+    CALL_BYTES, MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
+    MAX_WAITING_GOALS, REGISTRATION_BYTES,
+};
 use serde_json::{Value, json};
 
 const CLIENTS: usize = 8;
@@ -93,4 +96,105 @@ fn goals_whose_pursuer_goes() {
         async |provider| drop(provider),
         aborted,
     );
+}
+
+/// Eight clients that have registered all they may leave together: who calls then is answered while most of that still
+/// stands, nobody is sent what only they would take, and in the end all of it is given back.
+#[test]
+fn registrations_of_those_who_leave() {
+    let services = MAX_PROVIDED / 2;
+    let registrations = |n: usize| {
+        let topics =
+            (0..MAX_SUBSCRIPTIONS).map(|i| json!({"op": "subscribe", "topic": format!("/t{i}")}));
+        let advertised = (0..MAX_ADVERTISED)
+            .map(move |i| json!({"op": "advertise", "topic": format!("/c{n}/{i}"), "type": "t/A"}));
+        let provided = (0..services)
+            .map(move |i| json!({"op": "advertise_service", "service": format!("/c{n}/{i}"), "type": "t/A"}));
+        let pursued = (0..services)
+            .map(move |i| json!({"op": "advertise_action", "action": format!("/c{n}/{i}"), "type": "t/A"}));
+        topics.chain(advertised).chain(provided).chain(pursued)
+    };
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut observer = gateway.connect(WIDE);
+        let memory = gateway.gauges.memory();
+        let at_first = memory.held();
+        let mut clients: Vec<Peer> = (0..CLIENTS).map(|_| gateway.connect(WIDE)).collect();
+        for (n, client) in clients.iter_mut().enumerate() {
+            client
+                .send(json!({"op": "set_level", "level": "none"}))
+                .await;
+            for frame in registrations(n) {
+                client.send(frame).await;
+            }
+            client
+                .send(json!({"op": "call_service", "service": "/none"}))
+                .await;
+            while client.receive().await["op"] != "service_response" {}
+        }
+        let all = memory.held();
+        let each = MAX_SUBSCRIPTIONS + MAX_ADVERTISED + 2 * services;
+        assert!(all > CLIENTS * each * REGISTRATION_BYTES, "{all}");
+        drop(clients);
+        // Its way through the gateway is some eight turns long.
+        observer
+            .send(json!({"op": "call_service", "service": "/c0/0"}))
+            .await;
+        let response = observer.receive().await;
+        assert!(failed(&response, "/c0/0"), "{response}");
+        let left = memory.held();
+        assert!(
+            left > all / 2,
+            "{left} of {all} when one call has been answered"
+        );
+        tokio::time::advance(Duration::from_secs(1)).await;
+        for n in 0..each {
+            observer
+                .send(json!({"op": "call_service", "service": "/none", "id": n}))
+                .await;
+            observer.receive().await;
+        }
+        let after = memory.held();
+        assert!(
+            after < at_first + 100_000,
+            "{after} held, {at_first} at first"
+        );
+    });
+}
+
+/// Who has stopped sending is still spoken with, and can answer nothing: what it provided is unknown at once.
+#[test]
+fn services_and_actions_of_who_has_stopped_sending() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut caller = gateway.connect(WIDE);
+        let mut provider = gateway.connect(WIDE);
+        provider
+            .send(json!({"op": "set_level", "level": "none"}))
+            .await;
+        for n in 0..MAX_SUBSCRIPTIONS {
+            provider
+                .send(json!({"op": "subscribe", "topic": format!("/t{n}")}))
+                .await;
+        }
+        provider
+            .send(json!({"op": "advertise_service", "service": "/s", "type": "t/S"}))
+            .await;
+        provider
+            .send(json!({"op": "advertise_action", "action": "/a", "type": "t/A"}))
+            .await;
+        provider.half_close().await;
+        caller.send(call(1)).await;
+        let response = caller.receive().await;
+        assert!(failed(&response, "/s"), "{response}");
+        caller
+            .send(json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": 2}))
+            .await;
+        let result = caller.receive().await;
+        assert_eq!(
+            (&result["id"], &result["status"]),
+            (&json!(2), &json!(0)),
+            "{result}"
+        );
+    });
 }

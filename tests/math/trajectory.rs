@@ -96,6 +96,38 @@ fn points_without_order_are_no_path() {
     assert_eq!(path(&[0.0]), Ok(0.0));
 }
 
+/// Finite numbers whose way from one to the next has infinite velocities, or positions that are no numbers.
+#[test]
+fn ways_that_overflow_are_no_path() {
+    let moving = |time: f64, position: f64, velocity: f64| Waypoint {
+        time,
+        position: [position, 0.0],
+        velocity: Some([velocity, 0.0]),
+    };
+    for (at, points) in [
+        (0, vec![straight(1.0, [1.7e308, 0.0])]),
+        (
+            1,
+            vec![straight(1.0, [0.0; 2]), straight(2.0, [-1.7e308, 0.0])],
+        ),
+        (0, vec![straight(5e-324, [1.0, 0.0])]),
+        (1, vec![moving(0.0, 0.0, 0.0), moving(1e308, 1.0, 1e10)]),
+        (0, vec![moving(f64::INFINITY, 1.0, 0.0)]),
+    ] {
+        assert_eq!(
+            JointPath::new(START, points.clone()),
+            Err(PathError::NotFinite(at)),
+            "{points:?}"
+        );
+    }
+    let far = JointPath::new(START, vec![moving(1e290, 1e300, 1e9)]).unwrap();
+    for part in 0..=1000 {
+        let setpoint = far.at(1e287 * f64::from(part));
+        let all = setpoint.position.iter().chain(&setpoint.velocity);
+        assert!(all.into_iter().all(|one| one.is_finite()), "{setpoint:?}");
+    }
+}
+
 #[test]
 fn who_follows_is_judged_by_the_way_until_the_end_and_then_by_the_end() {
     let course = Course {

@@ -27,7 +27,7 @@ fn op(frame: &str) -> Op {
 #[track_caller]
 fn problem(frame: &str) -> String {
     match read(frame).op {
-        Err(OpError::Status(problem)) => problem.to_string(),
+        Err(OpError::Status(problem) | OpError::Goal { problem, .. }) => problem.to_string(),
         other => panic!("{frame}: {other:?}"),
     }
 }

@@ -100,12 +100,29 @@ fn a_goal_that_is_refused_has_one_result_that_says_why() {
         assert_eq!((&end["status"], &end["result"]), (&json!(0), &json!(false)));
         assert!(end["values"].as_str().unwrap().contains(word), "{end}");
     }
-    for frame in [
-        json!({"op": "send_action_goal"}),
-        json!({"op": "send_action_goal", "action": "/ik_action", "feedback": 1}),
+    client.send(&json!({"op": "send_action_goal"}));
+    assert_eq!(client.receive()["level"], "error");
+    for (member, value) in [
+        ("feedback", json!(1)),
+        ("action_type", json!(5)),
+        ("args", json!({"x": "x".repeat(20_000)})),
+        ("id", json!("x".repeat(2000))),
     ] {
+        let mut frame = json!({"op": "send_action_goal", "id": "a", "action": "/ik_action"});
+        frame[member] = value;
         client.send(&frame);
-        assert_eq!(client.receive()["level"], "error");
+        let (status, end) = (client.receive(), client.receive());
+        assert_eq!(status["level"], "error", "{status}");
+        assert_eq!(
+            (&end["op"], &end["id"], &end["status"], &end["result"]),
+            (
+                &json!("action_result"),
+                &frame["id"],
+                &json!(0),
+                &json!(false)
+            )
+        );
+        assert!(end["values"].as_str().unwrap().contains(member), "{end}");
     }
 }
 

@@ -219,6 +219,17 @@ fn unfit_goals() -> Vec<(Value, &'static str)> {
             "trajectory.points[0].time_from_start.sec must be at least 0",
         ),
         (
+            with(
+                "time_from_start",
+                json!({"sec": f64::MAX, "nanosec": f64::MAX}),
+            ),
+            "trajectory.points[0].time_from_start must be a finite number of seconds",
+        ),
+        (
+            with("positions", json!([f64::MAX, 0])),
+            "trajectory.points[0] must be reached from the point before by finite",
+        ),
+        (
             tolerance(json!({"name": "joint3"})),
             "goal_tolerance[0].name must be that of a joint",
         ),

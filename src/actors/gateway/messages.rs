@@ -213,7 +213,8 @@ pub type Eavesdropper = Box<dyn FnMut(Overheard<'_>) + Send>;
 #[rtype(result = "()")]
 pub struct Overhear(pub Option<Eavesdropper>);
 
-/// No call is taken any more and waiting calls are refused, for the reason given. From the runtime, when it ends.
+/// No call is taken any more, and waiting calls and goals for clients are refused, for the reason given. From the
+/// runtime, when it ends.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct RefuseCalls(pub &'static str);

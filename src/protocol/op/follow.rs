@@ -203,7 +203,11 @@ pub fn seconds(raw: &RawValue, field: &str) -> Result<f64, RejectedField> {
         Some(raw) => finite(raw, &format!("{field}.{name}"), Bound::NonNegative),
         None => Ok(0.0),
     };
-    Ok(part(sec.or(secs), "sec")? + 1e-9 * part(nanosec.or(nsecs), "nanosec")?)
+    let sum = part(sec.or(secs), "sec")? + 1e-9 * part(nanosec.or(nsecs), "nanosec")?;
+    if !sum.is_finite() {
+        return Err(refused(field, "must be a finite number of seconds"));
+    }
+    Ok(sum)
 }
 
 fn tolerance(

@@ -326,6 +326,14 @@ pub enum OpError {
         /// The fault.
         problem: Problem,
     },
+    /// A goal of a named action: answered by an error `status`, and by `action_result` with `result: false`.
+    #[error("{problem}")]
+    Goal {
+        /// The action that it is for.
+        action: String,
+        /// The fault.
+        problem: Problem,
+    },
 }
 
 /// A fault of an operation.

@@ -12,6 +12,7 @@ use crate::actors::gateway::turns;
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::budget::Share;
+use crate::actors::wire::follower::GoalStatus;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
@@ -71,6 +72,13 @@ impl Reader {
                 let form = form_of(&self.shared.wants_text);
                 self.say(messages::failure(&service, id.as_ref(), &why, form), None)
                     .await;
+            }
+            Err(OpError::Goal { action, problem }) => {
+                let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
+                // Over WebSocket nobody is told statuses who has not asked for them.
+                self.complain(&why, id).await;
+                let result = messages::action_result(&action, id, &why, status as u8, false);
+                self.say(result, None).await;
             }
             Err(OpError::Status(problem)) => {
                 self.complain(&problem.to_string(), id.as_ref()).await;

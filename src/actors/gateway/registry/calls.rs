@@ -81,11 +81,15 @@ impl Registry {
         ctx: &mut Context<Self>,
     ) -> Result<(), Refusal> {
         let service = call.service.as_str();
-        let provider = self
-            .services
-            .provider(&names::absolute(service))
-            .cloned()
-            .and_then(|provider| Some((self.clients.get(&provider.connection)?, provider)));
+        let name = &*names::absolute(service);
+        // One that has stopped sending provides nothing any more, though its services may not be withdrawn yet.
+        let provider = self.services.provider(name).cloned().and_then(|provider| {
+            let client = self.clients.get(&provider.connection)?;
+            client
+                .provided
+                .contains_key(name)
+                .then_some((client, provider))
+        });
         let Some((client, provider)) = provider else {
             return Err(Refusal::NoProvider(service.to_owned()));
         };

@@ -1,4 +1,5 @@
-//! Ends of calls and goals that nobody will answer: their time is over, or their provider has gone.
+//! Ends of calls and goals that nobody will answer, their time being over or their provider gone, and of what those who
+//! have gone had registered.
 //!
 //! **Invariant:** however many end at one instant, everybody else has a turn after every few of them.
 
@@ -8,7 +9,7 @@ use tokio::time::{Instant, sleep_until};
 use super::refusal::Refusal;
 use super::state::Registry;
 
-/// Calls and goals that are ended in a row: a third of a millisecond's.
+/// Calls, goals and registrations that are ended in a row: a third of a millisecond's.
 const ENDED_IN_A_ROW: usize = 128;
 
 impl Registry {
@@ -47,6 +48,8 @@ impl Registry {
                 self.end_goal(number);
             } else if let Some(number) = self.left.next_call() {
                 self.end_call(number);
+            } else if let Some((client, registration)) = self.left.next_registration() {
+                self.withdraw_one(client, registration);
             } else {
                 return;
             }

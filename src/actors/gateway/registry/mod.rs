@@ -9,6 +9,7 @@ mod census;
 mod ear;
 mod endings;
 mod fan_out;
+mod left;
 mod nodes;
 mod numbers;
 mod ops;
@@ -211,6 +212,9 @@ impl Handler<RefuseCalls> for Registry {
         self.closed = Some(why);
         for call in self.services.take_all() {
             self.answer_forwarded(&call, &Refusal::Closed(why));
+        }
+        for goal in self.pursuers.take_all() {
+            self.abort(&goal, &Refusal::Closed(why));
         }
     }
 }

@@ -1,8 +1,8 @@
-//! Numbers of what is on its way, by the client whom it concerns, and of what nobody will answer.
+//! Numbers of what is on its way, by the client whom it concerns.
 //!
 //! **Invariant:** who goes costs no search through what concerns the others.
 
-use std::collections::{BTreeSet, HashMap, VecDeque};
+use std::collections::{BTreeSet, HashMap};
 
 use crate::actors::ConnectionId;
 
@@ -37,43 +37,4 @@ impl Numbers {
     pub(super) fn take(&mut self, client: ConnectionId) -> BTreeSet<u64> {
         self.0.remove(&client).unwrap_or_default()
     }
-}
-
-/// Numbers of the goals and calls that those who have gone have left unanswered, together as they were left.
-#[derive(Default)]
-pub(super) struct Left {
-    goals: VecDeque<BTreeSet<u64>>,
-    calls: VecDeque<BTreeSet<u64>>,
-}
-
-impl Left {
-    pub(super) fn add(&mut self, goals: BTreeSet<u64>, calls: BTreeSet<u64>) {
-        for (left, numbers) in [(&mut self.goals, goals), (&mut self.calls, calls)] {
-            if !numbers.is_empty() {
-                left.push_back(numbers);
-            }
-        }
-    }
-
-    pub(super) fn is_empty(&self) -> bool {
-        self.goals.is_empty() && self.calls.is_empty()
-    }
-
-    pub(super) fn next_goal(&mut self) -> Option<u64> {
-        next(&mut self.goals)
-    }
-
-    pub(super) fn next_call(&mut self) -> Option<u64> {
-        next(&mut self.calls)
-    }
-}
-
-fn next(left: &mut VecDeque<BTreeSet<u64>>) -> Option<u64> {
-    while let Some(numbers) = left.front_mut() {
-        if let Some(number) = numbers.pop_first() {
-            return Some(number);
-        }
-        left.pop_front();
-    }
-    None
 }

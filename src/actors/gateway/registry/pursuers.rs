@@ -116,6 +116,13 @@ impl Pursuers {
         Some(goal)
     }
 
+    /// Takes every goal that has not ended, oldest first.
+    pub(super) fn take_all(&mut self) -> Vec<ForwardedGoal> {
+        let numbers: BTreeSet<u64> = self.goals.keys().copied().collect();
+        let goals = numbers.into_iter().map(|number| self.take(number));
+        goals.flatten().collect()
+    }
+
     /// Takes the numbers of the goals that `pursuer` has not ended, and will not end.
     pub(super) fn take_numbers(&mut self, pursuer: ConnectionId) -> BTreeSet<u64> {
         self.by_pursuer.take(pursuer)

@@ -110,11 +110,8 @@ impl Registry {
             return Err(Refusal::Closed(why));
         }
         let unknown = || Refusal::NoAction(action.to_owned());
-        let pursuer = self
-            .pursuers
-            .pursuer(&names::absolute(action))
-            .ok_or_else(unknown)?
-            .clone();
+        let name = &*names::absolute(action);
+        let pursuer = self.pursuers.pursuer(name).ok_or_else(unknown)?.clone();
         if matches!(goal.args, Arguments::Neither(_)) {
             return Err(Refusal::BadArguments);
         }
@@ -127,6 +124,9 @@ impl Registry {
         ) else {
             return Err(unknown());
         };
+        if !client.pursued.contains_key(name) {
+            return Err(unknown());
+        }
         if client.backlog() > MAX_BACKLOG {
             return Err(Refusal::ProviderBusy(action.to_owned()));
         }

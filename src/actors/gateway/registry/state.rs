@@ -1,6 +1,6 @@
 //! The registry's state: its clients, topics, services and nodes, and what several of its rooms do with them.
 //!
-//! **Invariant:** what a client has registered stands here as long as the client, and no longer.
+//! **Invariant:** what a client has registered stands here as long as the client, and is withdrawn in turns when it goes.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -13,8 +13,8 @@ use tokio::time::Instant;
 
 use super::census::{Tally, Use};
 use super::ear::Ear;
+use super::left::{Left, Registration};
 use super::nodes::Nodes;
-use super::numbers::Left;
 use super::pursuers::Pursuers;
 use super::refusal::Refusal;
 use super::services::{Forwarded, Services};
@@ -37,7 +37,7 @@ pub struct Registry {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) pursuers: Pursuers,
-    /// Calls and goals of those who have gone, which will be ended.
+    /// What those who have gone have left, which will be ended.
     pub(super) left: Left,
     /// When the registry looks next at what is to be ended, and the task that waits for that.
     pub(super) look: Option<(Instant, SpawnHandle)>,
@@ -162,31 +162,39 @@ impl Client {
 }
 
 impl Registry {
-    /// Withdraws all that a client has registered; the calls that wait for it as provider, and the goals that it
-    /// pursues, will be ended.
+    /// Hands over all that a client has registered, to be withdrawn; the calls that wait for it as provider, and the
+    /// goals that it pursues, will be ended.
     pub(super) fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
         };
-        let advertised = std::mem::take(&mut client.advertised);
-        let subscriptions = std::mem::take(&mut client.subscriptions);
-        let provided = std::mem::take(&mut client.provided);
-        let pursued = std::mem::take(&mut client.pursued);
-        for topic in advertised.keys() {
-            self.tally.remove(topic, Use::Advertised);
-        }
-        for topic in subscriptions.keys() {
-            self.drop_subscriber(topic, id);
-        }
-        for service in provided.keys() {
-            self.withdraw_service(service, id);
-        }
-        for action in pursued.keys() {
-            self.withdraw_action(action, id);
-        }
+        let advertised = std::mem::take(&mut client.advertised).into_iter();
+        let subscriptions = std::mem::take(&mut client.subscriptions).into_iter();
+        let provided = std::mem::take(&mut client.provided).into_iter();
+        let pursued = std::mem::take(&mut client.pursued).into_iter();
+        let registrations = advertised
+            .map(|(topic, share)| Registration::Advertised(topic, share))
+            .chain(subscriptions.map(|(topic, all)| Registration::Subscribed(topic, all)))
+            .chain(provided.map(|(service, share)| Registration::Provided(service, share)))
+            .chain(pursued.map(|(action, share)| Registration::Pursued(action, share)));
+        self.left.add_registrations(id, Box::new(registrations));
         let goals = self.pursuers.take_numbers(id);
         let calls = self.services.take_numbers(id);
         self.left.add(goals, calls);
+    }
+
+    /// Withdraws one thing that a client had registered.
+    pub(super) fn withdraw_one(&mut self, id: ConnectionId, registration: Registration) {
+        match registration {
+            Registration::Advertised(topic, _share) => self.tally.remove(&topic, Use::Advertised),
+            Registration::Subscribed(topic, _shares) => self.drop_subscriber(&topic, id),
+            Registration::Provided(service, _share) => {
+                self.withdraw_service(&service, id);
+            }
+            Registration::Pursued(action, _share) => {
+                self.withdraw_action(&action, id);
+            }
+        }
     }
 
     /// Forgets a client and all that there was for it.

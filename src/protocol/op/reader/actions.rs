@@ -6,7 +6,7 @@ use serde_json::value::RawValue;
 
 use super::OpReader;
 use crate::protocol::catalog::Action;
-use crate::protocol::op::{ActionGoal, Op, Problem, PursuerOp};
+use crate::protocol::op::{ActionGoal, Op, OpError, Problem, PursuerOp};
 use crate::protocol::wire::json;
 use crate::protocol::wire::payload::Payload;
 
@@ -16,12 +16,20 @@ const ABORTED: u8 = 6;
 const SUCCEEDED: u8 = 4;
 
 impl OpReader<'_> {
-    pub(super) fn goal(&self) -> Result<ActionGoal, Problem> {
+    /// A goal. As soon as its action is known it can be answered as a goal, whatever else is wrong.
+    pub(super) fn goal(&self) -> Result<Op, OpError> {
+        let action = self.name("action").map_err(OpError::Status)?;
+        match self.goal_for(&action) {
+            Ok(goal) => Ok(Op::SendActionGoal(goal)),
+            Err(problem) => Err(OpError::Goal { action, problem }),
+        }
+    }
+
+    fn goal_for(&self, action: &str) -> Result<ActionGoal, Problem> {
         if let Some(id) = self.get("id") {
             self.short("id", id.get())?;
         }
-        let action = self.name("action")?;
-        let fields = Action::from_name(&action)
+        let fields = Action::from_name(action)
             .filter(|action| !action.takes_long_goals())
             .map(Action::goal_fields);
         Ok(ActionGoal {
@@ -31,7 +39,7 @@ impl OpReader<'_> {
                 Some(_) => self.boolean("feedback")?,
                 None => false,
             },
-            action,
+            action: action.to_owned(),
         })
     }
 

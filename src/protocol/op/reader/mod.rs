@@ -91,6 +91,7 @@ pub fn read(frame: &str) -> Incoming {
     let id = reader.get("id").map(Payload::from);
     let op = match reader.known_op() {
         Ok(op @ "call_service") => OpReader { op, ..reader }.call(),
+        Ok(op @ "send_action_goal") => OpReader { op, ..reader }.goal(),
         Ok(op) => OpReader { op, ..reader }.other().map_err(OpError::Status),
         Err(problem) => Err(OpError::Status(problem)),
     };
@@ -157,7 +158,6 @@ impl<'a> OpReader<'a> {
             "unadvertise_service" => Op::UnadvertiseService {
                 service: self.name("service")?,
             },
-            "send_action_goal" => Op::SendActionGoal(self.goal()?),
             "cancel_action_goal" => Op::CancelActionGoal {
                 action: self.name("action")?,
             },
