@@ -1,4 +1,4 @@
-//! What clients have left behind: goals and calls that they will not answer, and what they had registered.
+//! Goals and calls that clients have left unanswered, and what they had registered.
 //!
 //! **Invariant:** taking it in costs the same however much it is.
 

@@ -1,6 +1,6 @@
 //! The registry's state: its clients, topics, services and nodes, and what several of its rooms do with them.
 //!
-//! **Invariant:** what a client has registered stands here as long as the client, and is withdrawn in turns when it goes.
+//! **Invariant:** what a client has registered stands here as long as the client, and then until its turn to go.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
