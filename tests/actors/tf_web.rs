@@ -160,3 +160,19 @@ fn published_wishes_have_three_hundred_messages_a_second_together_and_each_its_p
         }
     });
 }
+
+#[test]
+fn a_goal_that_is_published_while_nobody_hears_of_it_is_not_kept() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (goal, feedback) = (format!("{ACTION}/goal"), format!("{ACTION}/feedback"));
+        let msg = json!({"goal_id": {"id": "early"}, "goal": wish("world", &["link2"], 10.0)});
+        let publish = json!({"op": "publish", "topic": goal, "msg": msg});
+        client.send(&publish).await;
+        client.settle().await;
+        client.subscribe(&feedback).await;
+        assert_eq!(client.messages_for(ms(1000), &feedback).await.len(), 0);
+        client.send(&publish).await;
+        assert!(client.messages_for(ms(1000), &feedback).await.len() >= 8);
+    });
+}

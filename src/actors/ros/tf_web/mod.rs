@@ -90,6 +90,8 @@ pub struct TfRepublisher<const N: usize> {
     wishes: VecDeque<(WishFrames, Instant)>,
     /// When the topic is due next, while somebody subscribes to it.
     topic: Option<Instant>,
+    /// Whether anybody would hear of published goals.
+    feedback_is_wanted: bool,
     timer: Option<SpawnHandle>,
 }
 
@@ -107,6 +109,7 @@ impl<const N: usize> TfRepublisher<N> {
             publish,
             wishes: VecDeque::new(),
             topic: None,
+            feedback_is_wanted: false,
             timer: None,
         }
     }
@@ -132,6 +135,10 @@ impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, wish: WishFrames, ctx: &mut Context<Self>) {
+        // It would be there after the last who could hear of it had gone.
+        if matches!(wish.by, Wisher::Topic(_)) && !self.feedback_is_wanted {
+            return;
+        }
         if self.wishes.len() >= MAX_WISHES
             && let Some((oldest, _)) = self.wishes.pop_front()
         {
@@ -170,9 +177,12 @@ impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         match (interest.topic, interest.wanted) {
             (Topic::TfWeb, wanted) => self.topic = wanted.then(Instant::now),
-            // Nobody hears of published goals any more.
-            (_, false) => self.forget_published(None),
-            (_, true) => {}
+            (_, wanted) => {
+                self.feedback_is_wanted = wanted;
+                if !wanted {
+                    self.forget_published(None);
+                }
+            }
         }
         self.keep_timer(ctx);
     }
