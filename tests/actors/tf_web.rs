@@ -230,3 +230,26 @@ fn what_is_published_and_cannot_be_meant_is_refused_by_field_and_ends_nothing() 
         }
     });
 }
+
+#[test]
+fn goals_of_the_action_have_a_bounded_number_of_messages_together_and_each_its_part() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        for n in 0..MAX_WISHES {
+            let everything = wish("world", &["hand"; 32], 1e6);
+            send_goal(&mut client, &n.to_string(), everything).await;
+        }
+        client.settle().await;
+        client.heard.clear();
+        client.messages_for(ms(4000), "").await;
+        // 240 looks of sixteen each, and one more or less at either end.
+        let told = client.heard.len();
+        assert!((16 * 239..=16 * 241).contains(&told), "{told}");
+        for n in 0..MAX_WISHES {
+            let id = n.to_string();
+            let of_it = |frame: &&Value| frame["id"] == id.as_str();
+            let part = client.heard.iter().filter(of_it).count();
+            assert!((59..=61).contains(&part), "{part} of {id}");
+        }
+    });
+}
