@@ -57,6 +57,8 @@ impl Callable for RepublishTfs {
             let why = format!("must be {WORLD}, got {target}: others are for the action");
             fields.refuse("target_frame", &why);
         }
+        // The topic has a rate of its own.
+        let _ = fields.number("rate", Bound::NonNegative);
         if fields.accepted() {
             Ok(Self)
         } else {
