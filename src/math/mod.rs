@@ -13,6 +13,7 @@ pub mod number;
 pub mod pacer;
 pub mod particle;
 pub mod pid;
+pub(crate) mod shown;
 pub mod simulation;
 pub mod trajectory;
 pub mod trial;

@@ -5,7 +5,7 @@
 //!
 //! **Invariant:** one chunk of the file is in memory at a time.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::io::{self, Read, Seek, SeekFrom};
 
 use bytes::Bytes;
@@ -69,6 +69,8 @@ pub struct Reel<R> {
     /// Log time of the first message.
     began: u64,
     duration: u64,
+    /// Topics that have messages.
+    topics: HashSet<Topic>,
     /// Where the messages of latched topics are, and when.
     latched: HashMap<Topic, Vec<(u64, ReelPlace)>>,
     /// The chunk that was read last.
@@ -112,6 +114,7 @@ impl<R: Read + Seek> Reel<R> {
             channels: Channels::default(),
             began: 0,
             duration: 0,
+            topics: HashSet::new(),
             latched: HashMap::new(),
             loaded: None,
             next: (0, 0),
@@ -167,6 +170,7 @@ impl<R: Read + Seek> Reel<R> {
                     Err(why) => fault = Some(why),
                 }
             } else if let Some((topic, _)) = self.channels.topics.get(&header.channel_id) {
+                self.topics.insert(*topic);
                 if topic.is_latched() {
                     let places = self.latched.entry(*topic).or_default();
                     places.push((self.duration, (number, messages)));
@@ -193,6 +197,12 @@ impl<R: Read + Seek> Reel<R> {
     #[must_use]
     pub fn duration(&self) -> u64 {
         self.duration
+    }
+
+    /// Whether there is a message on that topic anywhere.
+    #[must_use]
+    pub fn holds(&self, topic: Topic) -> bool {
+        self.topics.contains(&topic)
     }
 
     /// Goes behind the last message that is not later than `time`.

@@ -24,6 +24,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::dynamics::{forward_dynamics, gravity_load, mass_matrix};
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
+use crate::math::shown::Shown;
 use crate::math::simulation::Simulation;
 
 /// How near each joint has to come, and stay, to be settled \[rad\].
@@ -100,8 +101,9 @@ pub enum GainsError {
     },
     /// Slow enough for the timestep, no loop settles in time; fast enough to settle, none has the margin.
     #[error(
-        "no gains found that settle within {settling_time} s and leave a margin of {margin} at the timestep \
-         {timestep} s; ask for more time or set a shorter timestep"
+        "settling_time: no gains found that settle within {} s and leave a margin of {} at the timestep {} s; ask for \
+         more time or set a shorter timestep",
+        Shown(*.settling_time), Shown(*.margin), Shown(*.timestep)
     )]
     NotFound {
         /// The time that was asked for \[s\].

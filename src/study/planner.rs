@@ -28,6 +28,7 @@ use super::track::{Followed, FreeMotion, apart};
 use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
+use crate::math::shown::Shown;
 use crate::math::simulation::Simulation;
 
 /// Longest time between two looks at the end effector \[s\]; also the longest timestep that is planned.
@@ -98,19 +99,19 @@ impl Planned {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PlanError {
     /// A duration that is too long.
-    #[error("duration must be at most {MAX_DURATION} s, got {duration}")]
+    #[error("duration must be at most {MAX_DURATION} s, got {}", Shown(*.duration))]
     TooLong {
         /// The given duration \[s\].
         duration: f64,
     },
     /// The motion amplifies rounding beyond the allowed error, or is too wild to be followed.
-    #[error("the motion itself can only be known to {uncertainty:.1e} m for so long")]
+    #[error("error must be larger or duration shorter: {}", known(*.uncertainty))]
     Unknown {
-        /// By how much two of the truths differ \[m\].
+        /// By how much two of the truths differ \[m\]; infinite where there are no two.
         uncertainty: f64,
     },
     /// No method stays within the error.
-    #[error("no method stays within {error:e} m in {MAX_STEPS} steps")]
+    #[error("error must be larger: no method stays within {error:e} m in {MAX_STEPS} steps")]
     NotFound {
         /// The given error \[m\].
         error: f64,
@@ -363,6 +364,15 @@ impl<const N: usize> Planning<N> {
         } else {
             self.run(bracket, next);
         }
+    }
+}
+
+/// How well a motion is known of which two truths differ by so much.
+fn known(uncertainty: f64) -> String {
+    if uncertainty.is_finite() {
+        format!("the motion itself can only be known to {uncertainty:.1e} m for so long")
+    } else {
+        "the motion itself can not be known so well for so long".to_owned()
     }
 }
 

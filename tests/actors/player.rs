@@ -458,11 +458,12 @@ fn many_messages_at_one_time_come_in_several_turns() {
     });
 }
 
-/// A gateway whose subscribers take nothing yet: keeps the ends of what has come.
+/// A gateway whose subscribers take nothing yet: keeps the ends of what has come. Or they take all at once.
 #[derive(Default)]
 struct Deaf {
     come: Rc<Cell<usize>>,
     underway: Vec<oneshot::Sender<()>>,
+    takes: bool,
 }
 
 impl Actor for Deaf {
@@ -475,7 +476,9 @@ impl Handler<PublishInTurn> for Deaf {
     fn handle(&mut self, PublishInTurn(messages): PublishInTurn, _: &mut Context<Self>) -> Handled {
         self.come.set(self.come.get() + messages.len());
         let (underway, end) = oneshot::channel();
-        self.underway.push(underway);
+        if !self.takes {
+            self.underway.push(underway);
+        }
         Handled::by_node(end)
     }
 }
@@ -507,6 +510,40 @@ fn a_record_waits_for_its_subscribers() {
             sleep(ms(10)).await;
         }
         assert_eq!(come.get(), underway);
+    });
+}
+
+/// However often somebody comes and goes: the present messages are looked for once from one tick to the next.
+#[test]
+fn who_subscribes_over_and_over_has_the_record_searched_once_a_tick() {
+    let entries = in_virtual_time(run());
+    in_virtual_time(async {
+        let come = Rc::new(Cell::new(0));
+        let taking = Deaf {
+            come: Rc::clone(&come),
+            takes: true,
+            ..Deaf::default()
+        };
+        let path = on_disk("over-and-over", &file(&entries));
+        let record = PlayedRecord::<2>::open(fs::File::open(path).unwrap()).unwrap();
+        let player = Player::new(record, taking.start().recipient()).start();
+        stage::asked(&player, DriveRecord::Pause(true)).await;
+        let interest = async |topic, wanted| {
+            player.send(Interest { topic, wanted }).await.unwrap();
+            tokio::task::yield_now().await;
+        };
+        for _ in 0..200 {
+            for wanted in [true, false] {
+                interest(Topic::JointStates, wanted).await;
+            }
+        }
+        assert!((1..=2).contains(&come.get()), "{}", come.get());
+        // Who stays has its message at the next tick, and who leaves before has none.
+        interest(Topic::Clock, true).await;
+        interest(Topic::RobotDescription, true).await;
+        let before = come.get();
+        sleep(ms(20)).await;
+        assert_eq!(come.get(), before + 2);
     });
 }
 

@@ -389,6 +389,8 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
     use pendularm::actors::ConnectionId;
     use pendularm::actors::gateway::messages::Overheard;
     use pendularm::protocol::catalog::Service;
+    use pendularm::protocol::wire::payload::Payload;
+    use serde_json::value::RawValue;
 
     let counts = Arc::new(Mutex::new((0, 0)));
     let counted = Arc::clone(&counts);
@@ -407,6 +409,19 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
         });
     }
     assert_eq!(*counts.lock().unwrap(), (1, 1));
+    // The name that a call goes by is copied too.
+    let payload = |text: String| Payload::from(RawValue::from_string(text).unwrap());
+    let args = payload("{}".to_owned());
+    for length in [MAX_RECORDED_FRAME - 2, MAX_RECORDED_FRAME - 1] {
+        let id = payload(format!("\"{}\"", "x".repeat(length - 2)));
+        eavesdropper(Overheard::Called {
+            from: ConnectionId(1),
+            service: Service::Rollout,
+            id: Some(&id),
+            args: &args,
+        });
+    }
+    assert_eq!(*counts.lock().unwrap(), (2, 2));
 }
 
 #[test]

@@ -5,6 +5,8 @@
 use crate::stage::{Client, Stage, ms, number};
 use crate::system::in_virtual_time;
 use pendularm::actors::ros::tf_web::MAX_WISHES;
+use pendularm::protocol::limits::MAX_NAME;
+use pendularm::protocol::op::MAX_ARGS;
 use serde_json::{Value, json};
 
 const ACTION: &str = "/tf2_web_republisher";
@@ -157,6 +159,97 @@ fn published_wishes_have_three_hundred_messages_a_second_together_and_each_its_p
             let of_it = |one: &&Value| one["status"]["goal_id"]["id"] == name.as_str();
             let part = told.iter().filter(of_it).count();
             assert!((13..=15).contains(&part), "{part} of {id}");
+        }
+    });
+}
+
+#[test]
+fn a_goal_that_is_published_while_nobody_hears_of_it_is_not_kept() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let (goal, feedback) = (format!("{ACTION}/goal"), format!("{ACTION}/feedback"));
+        let msg = json!({"goal_id": {"id": "early"}, "goal": wish("world", &["link2"], 10.0)});
+        let publish = json!({"op": "publish", "topic": goal, "msg": msg});
+        client.send(&publish).await;
+        client.settle().await;
+        client.subscribe(&feedback).await;
+        assert_eq!(client.messages_for(ms(1000), &feedback).await.len(), 0);
+        client.send(&publish).await;
+        assert!(client.messages_for(ms(1000), &feedback).await.len() >= 8);
+    });
+}
+
+#[test]
+fn what_is_published_and_cannot_be_meant_is_refused_by_field_and_ends_nothing() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        let feedback = format!("{ACTION}/feedback");
+        client.subscribe(&feedback).await;
+        let goal =
+            |id: &str| json!({"goal_id": {"id": id}, "goal": wish("world", &["link2"], 10.0)});
+        let publish = |to: &str, msg: Value| {
+            let topic = format!("{ACTION}/{to}");
+            json!({"op": "publish", "topic": topic, "msg": msg})
+        };
+        let longest = "x".repeat(MAX_NAME);
+        client.send(&publish("goal", goal(&longest))).await;
+        for (to, msg, why) in [
+            (
+                "goal",
+                goal(&format!("{longest}x")),
+                "goal: goal_id.id must be at most 1024 bytes long",
+            ),
+            (
+                "cancel",
+                json!({"id": 5}),
+                "cancel: id must be a string, got 5",
+            ),
+            (
+                "cancel",
+                json!({"id": null}),
+                "cancel: id must be a string, got null",
+            ),
+            (
+                "cancel",
+                json!({"id": "x".repeat(MAX_ARGS)}),
+                "cancel: msg must be at most 16384 bytes long",
+            ),
+        ] {
+            client.send(&publish(to, msg)).await;
+            let status = client.next_where(|frame| frame["level"] == "error").await;
+            assert_eq!(status["msg"], format!("{ACTION}/{why}"));
+        }
+        let told = client.messages_for(ms(1000), &feedback).await;
+        assert!(told.len() >= 8, "it goes on: {}", told.len());
+        for msg in [json!({}), json!({"id": ""})] {
+            client.send(&publish("goal", goal("x"))).await;
+            client.send(&publish("cancel", msg)).await;
+            client.settle().await;
+            let told = client.messages_for(ms(1000), &feedback).await;
+            assert!(told.is_empty(), "without an id all of them end: {told:?}");
+        }
+    });
+}
+
+#[test]
+fn goals_of_the_action_have_a_bounded_number_of_messages_together_and_each_its_part() {
+    in_virtual_time(async {
+        let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        for n in 0..MAX_WISHES {
+            let everything = wish("world", &["hand"; 32], 1e6);
+            send_goal(&mut client, &n.to_string(), everything).await;
+        }
+        client.settle().await;
+        client.heard.clear();
+        client.messages_for(ms(4000), "").await;
+        // 240 looks of sixteen each, and one more or less at either end.
+        let told = client.heard.len();
+        assert!((16 * 239..=16 * 241).contains(&told), "{told}");
+        for n in 0..MAX_WISHES {
+            let id = n.to_string();
+            let of_it = |frame: &&Value| frame["id"] == id.as_str();
+            let part = client.heard.iter().filter(of_it).count();
+            assert!((59..=61).contains(&part), "{part} of {id}");
         }
     });
 }

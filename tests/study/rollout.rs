@@ -272,7 +272,7 @@ fn what_can_not_be_run_is_refused_by_name() {
             duration: 2e5,
             ..swing()
         }),
-        "duration / timestep must be at most 10000000 steps, got 20000000"
+        "duration / timestep must be at most 1e7 steps, got 2e7"
     );
     assert_eq!(
         refusal(Plan {

@@ -94,5 +94,8 @@ fn the_command_plans_and_refuses_like_the_service() {
     );
     let (status, _, complaint) = run(&["--error", "1e-3", "--duration", "200"]);
     assert_eq!(status, Some(1));
-    assert!(complaint.contains("can only be known to"), "{complaint}");
+    assert!(
+        complaint.contains("error must be larger or duration shorter"),
+        "{complaint}"
+    );
 }

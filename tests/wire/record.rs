@@ -287,3 +287,20 @@ fn without_a_folder_clients_neither_begin_nor_end_a_record() {
     end(runtime);
     assert_eq!(passages(&file).1, RecordEnding::Whole);
 }
+
+#[test]
+fn the_operators_record_is_not_ended_by_a_client() {
+    let folder = folder("operators-and-clients");
+    let file = folder.join("operators.mcap");
+    let runtime = Runtime::with(&["--record", text(&file), "--record-dir", text(&folder)]);
+    let mut client = runtime.connect();
+    let refused = client.call("/recorder/stop", json!({}));
+    assert_eq!(
+        refused["status"],
+        "operators.mcap was begun by the operator with --record, and ends with the program"
+    );
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    end(runtime);
+    assert_eq!(passages(&file).1, RecordEnding::Whole);
+    assert!(holds_call(&file, "{\"data\":true}"));
+}

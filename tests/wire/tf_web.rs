@@ -57,6 +57,19 @@ fn the_service_names_a_topic_with_every_frame() {
     );
     let why = client.refusal("/republish_tfs", wish("link1", &["hand"]));
     assert!(why.starts_with("target_frame must be world"), "{why}");
+    for (rate, why) in [
+        ("\"x\"", "rate must be a number, got \"x\""),
+        ("1e400", "rate must be a finite number"),
+        ("-1", "rate must be at least 0, got -1"),
+    ] {
+        let call = r#"{"op":"call_service","service":"/republish_tfs","id":1,"args":{"rate":"#;
+        client.send_bytes(format!("{call}{rate}}}}}\n").as_bytes());
+        let refused = with_op(&mut client, "service_response");
+        assert_eq!(
+            (&refused["result"], &refused["status"]),
+            (&json!(false), &json!(why))
+        );
+    }
 }
 
 #[test]

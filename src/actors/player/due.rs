@@ -108,10 +108,25 @@ impl<const N: usize> Player<N> {
             };
             self.position = moment.time;
             if !moment.topic.is_latched() && self.wanted.contains(&moment.topic) {
+                self.fresh.remove(&moment.topic);
                 return Ok(Some(moment));
             }
         }
         Ok(None)
+    }
+
+    /// Owes what is present of the topics that somebody has come to: one look back costs as much for all of them as for
+    /// one, and there is one from tick to tick, so that nobody holds the record up by coming and going.
+    pub(super) fn owe_fresh(&mut self) {
+        if self.has_looked || self.fresh.is_empty() {
+            return;
+        }
+        self.has_looked = true;
+        let fresh = std::mem::take(&mut self.fresh);
+        self.attempt(|player| {
+            player.owe_latched()?;
+            player.owe_present(&fresh)
+        });
     }
 
     /// Owes the messages that are present, and nothing else.
@@ -121,6 +136,7 @@ impl<const N: usize> Player<N> {
             self.latched.remove(&moment.topic);
         }
         self.owe_latched()?;
+        self.fresh.clear();
         let wanted = self.wanted.clone();
         self.owe_present(&wanted)
     }
@@ -137,7 +153,7 @@ impl<const N: usize> Player<N> {
         let mut missing: BTreeSet<Topic> = topics
             .iter()
             .copied()
-            .filter(|topic| !topic.is_latched())
+            .filter(|topic| !topic.is_latched() && self.tape.reel.holds(*topic))
             .collect();
         let place = self.tape.reel.place();
         let past = u64::try_from(PRESENT.as_nanos()).unwrap_or(u64::MAX);

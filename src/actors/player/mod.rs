@@ -71,6 +71,10 @@ pub struct Player<const N: usize> {
     publish: Recipient<PublishInTurn>,
     /// Topics that somebody subscribes to.
     wanted: BTreeSet<Topic>,
+    /// Topics among them that somebody has come to, and whose present messages have not been looked for since.
+    fresh: BTreeSet<Topic>,
+    /// Whether that has been done since the last tick.
+    has_looked: bool,
     /// Messages that are published before the record goes on: what is present, for who has come.
     owed: VecDeque<Moment>,
     /// Where the record is to be by now, in nanoseconds since its beginning, if it is not there yet.
@@ -121,6 +125,8 @@ impl<const N: usize> Player<N> {
             tape,
             publish,
             wanted: BTreeSet::new(),
+            fresh: BTreeSet::new(),
+            has_looked: false,
             owed: VecDeque::new(),
             target: None,
             left: MAX_AT_ONCE,
@@ -145,6 +151,8 @@ impl<const N: usize> Actor for Player<N> {
         self.ticked = Instant::now();
         ctx.run_interval(TICK, |player, ctx| {
             player.left = MAX_AT_ONCE;
+            player.has_looked = false;
+            player.owe_fresh();
             player.tick();
             player.go_on(ctx);
         });
@@ -175,13 +183,12 @@ impl<const N: usize> Handler<Interest> for Player<N> {
         self.owed.retain(|moment| moment.topic != topic);
         if interest.wanted {
             self.wanted.insert(topic);
-            self.attempt(|player| {
-                player.owe_latched()?;
-                player.owe_present(&BTreeSet::from([topic]))
-            });
+            self.fresh.insert(topic);
+            self.owe_fresh();
             self.go_on(ctx);
         } else {
             self.wanted.remove(&topic);
+            self.fresh.remove(&topic);
         }
     }
 }

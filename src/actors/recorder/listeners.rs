@@ -40,7 +40,9 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesd
         let length = match &what {
             Overheard::Published(_, frame) | Overheard::Answered { frame, .. } => frame.len(),
             Overheard::Heard(_, msg) => msg.line().len(),
-            Overheard::Called { args, .. } => args.line().len(),
+            Overheard::Called { id, args, .. } => {
+                args.line().len() + id.map_or(0, |id| id.line().len())
+            }
         };
         if length > MAX_RECORDED_FRAME {
             return put(None);

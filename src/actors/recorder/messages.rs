@@ -69,6 +69,12 @@ pub enum NotRecorded {
         /// The file's name.
         String,
     ),
+    /// It is not a client's to end.
+    #[error("{0} was begun by the operator with --record, and ends with the program")]
+    Operators(
+        /// The file's name.
+        String,
+    ),
     /// There is no record.
     #[error("nothing is being recorded")]
     Nothing,

@@ -43,6 +43,8 @@ pub struct Recorder<const N: usize> {
 struct Current {
     file: String,
     number: u64,
+    /// Whether a client has begun it: only then may a client end it.
+    by_client: bool,
     end: oneshot::Receiver<Recorded>,
 }
 
@@ -106,6 +108,9 @@ impl<const N: usize> Handler<Call<StopRecording>> for Recorder<N> {
         if self.folder.is_none() {
             return reply.answer(Err(NotRecorded::NoFolder));
         }
+        if let Some(current) = self.current.as_ref().filter(|one| !one.by_client) {
+            return reply.answer(Err(NotRecorded::Operators(current.file.clone())));
+        }
         let ended = self.end();
         ctx.wait(ended.map(move |ended, _, _| reply.answer(ended.ok_or(NotRecorded::Nothing))));
     }
@@ -154,6 +159,7 @@ impl<const N: usize> Recorder<N> {
         self.begun += 1;
         let number = self.begun;
         let file = tape::file_name(&target.path);
+        let by_client = target.limit.is_some();
         let already = self.current.as_ref().map(|current| current.file.clone());
         let begun = already.is_none().then(|| {
             let address = ctx.address();
@@ -185,7 +191,12 @@ impl<const N: usize> Recorder<N> {
         begins.into_actor(self).map(move |begun, recorder, _| {
             let end = begun?;
             tracing::info!(file, "recording");
-            recorder.current = Some(Current { file, number, end });
+            recorder.current = Some(Current {
+                file,
+                number,
+                by_client,
+                end,
+            });
             Ok(())
         })
     }

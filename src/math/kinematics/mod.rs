@@ -16,9 +16,9 @@ mod angle;
 mod forward;
 mod inverse;
 
-use std::fmt;
-
 use glam::DVec2;
+
+use super::shown::Shown;
 
 pub use angle::{nearest_turn, turn, wrap};
 pub use forward::{EndEffector, forward, heading, joints};
@@ -134,18 +134,4 @@ pub enum Unreachable {
         /// Links asked for.
         usize,
     ),
-}
-
-/// A number as a person would write it: 1e300 is not spelled out in 301 digits.
-struct Shown(f64);
-
-impl fmt::Display for Shown {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self(number) = self;
-        if *number == 0.0 || (1e-4..1e7).contains(&number.abs()) || !number.is_finite() {
-            write!(f, "{number}")
-        } else {
-            write!(f, "{number:e}")
-        }
-    }
 }

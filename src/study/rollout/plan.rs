@@ -5,6 +5,7 @@
 use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::pid::Gains;
+use crate::math::shown::Shown;
 use crate::study::control_loop::ControlLoop;
 
 /// Most steps of one run: some seconds of one core, with a reference under control up to a minute.
@@ -32,7 +33,7 @@ pub struct Plan<const N: usize> {
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum RolloutError {
     /// A number that is NaN or infinite.
-    #[error("{field} must be finite, got {value}")]
+    #[error("{field} must be finite, got {}", Shown(*.value))]
     NotFinite {
         /// `q0`, `qdot0`, `duration`, `timestep`, `kp`, `ki`, `kd` or `setpoint`.
         field: &'static str,
@@ -40,7 +41,7 @@ pub enum RolloutError {
         value: f64,
     },
     /// A duration or a timestep that is zero or negative.
-    #[error("{field} must be greater than 0, got {value}")]
+    #[error("{field} must be greater than 0, got {}", Shown(*.value))]
     NotPositive {
         /// `duration` or `timestep`.
         field: &'static str,
@@ -48,7 +49,7 @@ pub enum RolloutError {
         value: f64,
     },
     /// A gain that is negative.
-    #[error("{field} must be at least 0, got {value}")]
+    #[error("{field} must be at least 0, got {}", Shown(*.value))]
     Negative {
         /// `kp`, `ki` or `kd`.
         field: &'static str,
@@ -56,7 +57,7 @@ pub enum RolloutError {
         value: f64,
     },
     /// Not one whole step.
-    #[error("duration must be at least the timestep {timestep}, got {duration}")]
+    #[error("duration must be at least the timestep {}, got {}", Shown(*.timestep), Shown(*.duration))]
     TooShort {
         /// The given time \[s\].
         duration: f64,
@@ -64,7 +65,7 @@ pub enum RolloutError {
         timestep: f64,
     },
     /// More steps than [`MAX_STEPS`].
-    #[error("duration / timestep must be at most {MAX_STEPS} steps, got {steps}")]
+    #[error("duration / timestep must be at most {MAX_STEPS:e} steps, got {}", Shown(*.steps))]
     TooManySteps {
         /// The given value.
         steps: f64,

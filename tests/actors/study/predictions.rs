@@ -174,6 +174,31 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
     });
 }
 
+#[test]
+fn refused_advice_names_a_field_and_spells_no_number_out() {
+    in_real_time(async {
+        let mut bench = Bench::<2>::new();
+        for (service, args, why) in [
+            (
+                Service::SuggestGains,
+                json!({"settling_time": 5e-324}),
+                "settling_time: no gains found that settle within 5e-324 s and leave a margin of ",
+            ),
+            (
+                Service::Plan,
+                json!({"error": 5e-324, "duration": 1}),
+                "error must be larger or duration shorter: the motion itself ",
+            ),
+        ] {
+            let refused = bench.refusal(service, &args).await;
+            assert!(
+                refused.starts_with(why) && !refused.contains("inf"),
+                "{refused}"
+            );
+        }
+    });
+}
+
 /// A servo's plan of which only the allowed error is said.
 fn plan_with(error: f64) -> PlanRun<2> {
     PlanRun {
@@ -237,7 +262,7 @@ fn wrong_loops() -> [(Value, &'static str); 11] {
 }
 
 /// Arguments of a run, and why they are refused.
-fn wrong_runs() -> [(Value, &'static str); 11] {
+fn wrong_runs() -> [(Value, &'static str); 12] {
     [
         (json!({"q0": [1]}), "q0 must have 2 entries, got 1"),
         (
@@ -277,8 +302,12 @@ fn wrong_runs() -> [(Value, &'static str); 11] {
             "duration must be at least the timestep 2, got 1",
         ),
         (
+            json!({"duration": 1e-320, "timestep": 2}),
+            "duration must be at least the timestep 2, got 1e-320",
+        ),
+        (
             json!({"duration": 20, "timestep": 1e-6}),
-            "duration / timestep must be at most 10000000 steps, got 20000000",
+            "duration / timestep must be at most 1e7 steps, got 2e7",
         ),
     ]
 }

@@ -31,7 +31,10 @@ pub const MAX_FRAMES: usize = 32;
 const PERIOD: Duration = Duration::from_micros(16_667);
 /// Time between two messages of the topic.
 const TOPIC_PERIOD: Duration = Duration::from_millis(33);
-/// Messages of published wishes in one look: each goes to all who subscribe, and looks come 60 times a second.
+/// Messages of all wishes in one look, of which 60 come in a second: each message takes up to 30 us of the gateway's
+/// thread.
+const AT_ONCE: usize = 16;
+/// Messages of published wishes among them: each goes to all who subscribe.
 const TOPIC_AT_ONCE: usize = 5;
 
 /// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
@@ -90,6 +93,8 @@ pub struct TfRepublisher<const N: usize> {
     wishes: VecDeque<(WishFrames, Instant)>,
     /// When the topic is due next, while somebody subscribes to it.
     topic: Option<Instant>,
+    /// Whether anybody would hear of published goals.
+    feedback_is_wanted: bool,
     timer: Option<SpawnHandle>,
 }
 
@@ -107,6 +112,7 @@ impl<const N: usize> TfRepublisher<N> {
             publish,
             wishes: VecDeque::new(),
             topic: None,
+            feedback_is_wanted: false,
             timer: None,
         }
     }
@@ -132,6 +138,10 @@ impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
     type Result = ();
 
     fn handle(&mut self, wish: WishFrames, ctx: &mut Context<Self>) {
+        // It would be there after the last who could hear of it had gone.
+        if matches!(wish.by, Wisher::Topic(_)) && !self.feedback_is_wanted {
+            return;
+        }
         if self.wishes.len() >= MAX_WISHES
             && let Some((oldest, _)) = self.wishes.pop_front()
         {
@@ -170,9 +180,12 @@ impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         match (interest.topic, interest.wanted) {
             (Topic::TfWeb, wanted) => self.topic = wanted.then(Instant::now),
-            // Nobody hears of published goals any more.
-            (_, false) => self.forget_published(None),
-            (_, true) => {}
+            (_, wanted) => {
+                self.feedback_is_wanted = wanted;
+                if !wanted {
+                    self.forget_published(None);
+                }
+            }
         }
         self.keep_timer(ctx);
     }
@@ -248,13 +261,12 @@ impl<const N: usize> TfRepublisher<N> {
         // The longest due come first.
         due.sort_by_key(|(_, due)| *due);
         let mut published = 0;
-        for (wish, due) in due {
-            if let Wisher::Topic(_) = wish.by {
-                if published == TOPIC_AT_ONCE {
-                    continue;
-                }
-                published += 1;
-            }
+        let within_limits = due.into_iter().filter(|(wish, _)| {
+            let is_published = matches!(wish.by, Wisher::Topic(_));
+            published += usize::from(is_published);
+            !is_published || published <= TOPIC_AT_ONCE
+        });
+        for (wish, due) in within_limits.take(AT_ONCE) {
             *due = now + wish.period;
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {

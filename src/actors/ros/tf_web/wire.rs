@@ -14,12 +14,13 @@ use crate::actors::node::Respond;
 use crate::actors::wire::follower::ActionRequest;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
+use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::republished::is_frame;
 use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::op::{Arguments, MAX_ARGS};
-use crate::protocol::wire::json;
+use crate::protocol::wire::{json, text};
 
 /// Messages a second where a wish does not say.
 const RATE: f64 = 10.0;
@@ -56,6 +57,8 @@ impl Callable for RepublishTfs {
             let why = format!("must be {WORLD}, got {target}: others are for the action");
             fields.refuse("target_frame", &why);
         }
+        // The topic has a rate of its own.
+        let _ = fields.number("rate", Bound::NonNegative);
         if fields.accepted() {
             Ok(Self)
         } else {
@@ -140,50 +143,71 @@ fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections
 fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
     Box::new(move |message| match read_goal(message.msg.raw(), N) {
         Ok(goal) => wish.do_send(goal),
-        Err(rejections) => {
-            let msg = format!("{}: {rejections}", Topic::TfWebGoal.name());
-            let frame = messages::status(Level::Error, &msg, message.id.as_ref());
-            message.respond.do_send(Respond {
-                connection: message.connection,
-                frame: frame.into(),
-                service: None,
-                status: Some(Level::Error),
-                done: Some(message.done),
-            });
-        }
+        Err(rejections) => refuse(message, Topic::TfWebGoal, &rejections),
     })
+}
+
+fn refuse(message: TopicMessage, topic: Topic, rejections: &Rejections) {
+    let msg = format!("{}: {rejections}", topic.name());
+    let frame = messages::status(Level::Error, &msg, message.id.as_ref());
+    message.respond.do_send(Respond {
+        connection: message.connection,
+        frame: frame.into(),
+        service: None,
+        status: Some(Level::Error),
+        done: Some(message.done),
+    });
 }
 
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
 fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
-    let refused = |field: &str, why: &str| Rejections::from(RejectedField::refused(field, &why));
-    if msg.get().len() > MAX_ARGS {
-        return Err(refused(
-            "msg",
-            &format!("must be at most {MAX_ARGS} bytes long"),
-        ));
+    let [id, goal] = members(msg, &["goal_id", "goal"])?;
+    let id = id.and_then(|id| json::members(id.get(), &["id"]).ok());
+    let id = id.and_then(|[id]| json::text(id?));
+    let id = id.ok_or_else(|| refused("goal_id.id", &"must be a string"))?;
+    if id.len() > MAX_NAME {
+        let why = format!("must be at most {MAX_NAME} bytes long");
+        return Err(refused("goal_id.id", &why));
     }
-    let members = json::members(msg.get(), &["goal_id", "goal"]);
-    let [id, goal] = members.map_err(|_| refused("msg", "must be an object"))?;
-    let id = id.and_then(|id| id_in(id.get()));
-    let id = id.ok_or_else(|| refused("goal_id.id", "must be a string"))?;
-    let goal = goal.ok_or_else(|| refused("goal", "is required"))?;
+    let id = id.into_owned();
+    let goal = goal.ok_or_else(|| refused("goal", &"is required"))?;
     let read = read_wish(&Arguments::Object(goal.into()), links)?;
     Ok(read.by(Wisher::Topic(id)))
 }
 
+/// Ends of such goals; an error status for what is none.
 fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
-    Box::new(move |message| {
-        let msg = message.msg.raw();
-        if msg.get().len() <= MAX_ARGS {
-            let id = id_in(msg.get()).filter(|id| !id.is_empty());
-            forget.do_send(ForgetFrames::Published(id));
-        }
+    Box::new(move |message| match read_cancel(message.msg.raw()) {
+        Ok(id) => forget.do_send(ForgetFrames::Published(id)),
+        Err(rejections) => refuse(message, Topic::TfWebCancel, &rejections),
     })
 }
 
-/// The id in an `actionlib_msgs/GoalID`.
-fn id_in(text: &str) -> Option<String> {
-    let [id] = json::members(text, &["id"]).ok()?;
-    Some(json::text(id?)?.into_owned())
+/// `actionlib_msgs/GoalID`: an id, or none for all goals.
+fn read_cancel(msg: &RawValue) -> Result<Option<String>, Rejections> {
+    let [id] = members(msg, &["id"])?;
+    let Some(id) = id else {
+        return Ok(None);
+    };
+    let text = json::text(id).ok_or_else(|| {
+        let found = text::found(id);
+        refused("id", &format!("must be a string, got {found}"))
+    })?;
+    Ok(Some(text.into_owned()).filter(|id| !id.is_empty()))
+}
+
+/// The members of these names in a message, which may be as long as arguments.
+fn members<'a, const M: usize>(
+    msg: &'a RawValue,
+    names: &[&str; M],
+) -> Result<[Option<&'a RawValue>; M], Rejections> {
+    if msg.get().len() > MAX_ARGS {
+        let why = format!("must be at most {MAX_ARGS} bytes long");
+        return Err(refused("msg", &why));
+    }
+    json::members(msg.get(), names).map_err(|_| refused("msg", &"must be an object"))
+}
+
+fn refused(field: &str, why: &impl std::fmt::Display) -> Rejections {
+    RejectedField::refused(field, why).into()
 }
