@@ -13,6 +13,11 @@ pub const ATTACKS: &[Attack] = &[
     ),
     Attack::new("registrations-200", "200 clients do so", registrations_many),
     Attack::new(
+        "leaving-together",
+        "330 clients with 1,024 subscriptions each leave at one instant",
+        leaving_together,
+    ),
+    Attack::new(
         "day-long-calls",
         "21 clients provide a service, call it with 4 MiB for a day and read nothing",
         day_long_calls,
@@ -114,6 +119,14 @@ fn registrations_many() -> Vec<Client> {
             subscribe(&format!("/{k}/{n}/{}", filler(1_000)), "")
         })
     })
+}
+
+fn leaving_together() -> Vec<Client> {
+    Client::tcp()
+        .says(r#"{"op":"set_level","level":"none"}"#)
+        .says_each(0..1_024, |n| subscribe(&format!("/{n}"), ""))
+        .leaves_after(5_000)
+        .times(330)
 }
 
 fn day_long(service: &str, args: &str) -> String {

@@ -276,7 +276,12 @@ impl Client {
                         bytes = &bytes[written..];
                     }
                     Err(error) if error.kind() == ErrorKind::WouldBlock => {}
-                    Err(error) => return Err(self.fault(format!("cannot send: {error}"))),
+                    Err(error) => {
+                        let why = self.why_it_ended();
+                        return Err(
+                            why.unwrap_or_else(|| self.fault(format!("cannot send: {error}")))
+                        );
+                    }
                 }
             }
         }
@@ -307,6 +312,27 @@ impl Client {
             Err(error) if error.kind() == ErrorKind::WouldBlock => {}
             Err(_) => self.ended = true,
         }
+    }
+
+    /// Why the program has ended the connection, if it gave way for memory: what had come before can still be read.
+    fn why_it_ended(&mut self) -> Option<Fault> {
+        while !self.ended {
+            let before = self.codec.pending().len();
+            self.take_in();
+            if self.codec.pending().len() == before {
+                break;
+            }
+        }
+        while let Ok(Some(event)) = self.codec.next_event() {
+            if let Event::Text(text) = event
+                && let Ok(frame) = serde_json::from_str::<Value>(&text)
+                && let Some(why) = frame["msg"].as_str()
+                && why.starts_with(HELD_MOST)
+            {
+                return Some(self.gives_way(why));
+            }
+        }
+        None
     }
 
     /// Waits for bytes; false if none came until `deadline`.
