@@ -93,6 +93,16 @@ def test_a_folder_holds_one_sweep(tmp_path):
         pendularm.sweep({"kp": [1, 3]}, "settling_time", folder=tmp_path, **small)
 
 
+def test_a_folder_knows_the_order_of_the_grid(tmp_path):
+    small = {**FIXED, "duration": 0.1}
+    grid = {"kp": [50.0, 500.0], "kd": [2.0, 20.0, 100.0]}
+    found = pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"]
+    assert found.shape == (2, 3)
+    with pytest.raises(ValueError, match="holds another sweep: it differs in grid"):
+        pendularm.sweep(dict(reversed(grid.items())), "final_error", folder=tmp_path, **small)
+    assert np.array_equal(pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"], found)
+
+
 def test_a_function_may_be_the_metric():
     def both(run):
         assert run.positions.shape == (51, run.diverged.size, 2)

@@ -216,7 +216,8 @@ class _Question:
         """The question as the folder keeps it."""
         metric = self.metric if isinstance(self.metric, str) else f"{self.metric.__module__}.{self.metric.__qualname__}"
         return {
-            "grid": {name: values.tolist() for name, values in self.axes.items()},
+            # In a list, whose order counts: the axes of the results are in that of the grid.
+            "grid": [[name, values.tolist()] for name, values in self.axes.items()],
             "settings": {name: values.tolist() for name, values in self.fixed.items()},
             "metric": metric,
             "links": self.links,
