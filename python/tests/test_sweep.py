@@ -1,6 +1,8 @@
 """Sweeps: the same bits from any number of workers, kept on disk and gone on with, also where a worker is lost."""
 
+import functools
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -101,6 +103,58 @@ def test_a_folder_knows_the_order_of_the_grid(tmp_path):
     with pytest.raises(ValueError, match="holds another sweep: it differs in grid"):
         pendularm.sweep(dict(reversed(grid.items())), "final_error", folder=tmp_path, **small)
     assert np.array_equal(pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"], found)
+
+
+def test_a_folder_knows_the_code_of_a_metric(tmp_path):
+    def last(factor, kind="position"):
+        return lambda run: [factor * run.positions[-1, :, joint] for joint in (0, 1) if kind in {"position", "first"}][0]
+
+    ask = {"grid": {"kp": [1.0, 2.0]}, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
+    found = pendularm.sweep(metric=last(1.0), **ask)["metric"]
+    assert np.array_equal(pendularm.sweep(metric=last(1.0), **ask)["metric"], found)
+    for other in [last(2.0), last(1.0, "first"), lambda run: run.positions[-1, :, 0], lambda run: run.positions[-1, :, 1]]:
+        with pytest.raises(ValueError, match="holds another sweep: it differs in metric"):
+            pendularm.sweep(metric=other, **ask)
+    kept = json.loads((tmp_path / "sweep.json").read_text())
+    assert kept["version"] == pendularm.__version__
+    (tmp_path / "sweep.json").write_text(json.dumps({**kept, "version": "0.0.1"}))
+    with pytest.raises(ValueError, match="holds another sweep: it differs in version"):
+        pendularm.sweep(metric=last(1.0), **ask)
+
+
+ELSEWHERE = """
+import sys, pendularm
+def metric(run):
+    inner = lambda: "energy" in {"energy", "effort", "time"} and 1.0
+    return inner() * run.energy[-1]
+pendularm.sweep({"kp": [1, 2]}, metric, duration=0.1, folder=sys.argv[1], progress=False)
+"""
+
+
+def test_a_folder_knows_a_metric_again_in_another_process(tmp_path):
+    for seed in ["1", "2", "3"]:
+        here = {**os.environ, "PYTHONHASHSEED": seed}
+        subprocess.run([sys.executable, "-c", ELSEWHERE, str(tmp_path)], env=here, check=True, timeout=60)
+
+
+def test_a_folder_refuses_a_metric_whose_code_it_cannot_know(tmp_path):
+    class Metric:
+        def __call__(self, run):
+            return run.energy[-1]
+
+        def method(self, run):
+            return run.energy[-1]
+
+    def of(run, held=None):
+        return run.energy[-1] if held else run.time[-1]
+
+    lock = threading.Lock()
+    ask = {"grid": {"kp": [1.0]}, "duration": 0.1}
+    for metric in [Metric(), Metric().method, functools.partial(of, held=1), lambda run: run.energy[-1] * bool(lock)]:
+        with pytest.raises(ValueError, match="^metric must be "):
+            pendularm.sweep(metric=metric, folder=tmp_path, **ask)
+        assert pendularm.sweep(metric=metric, **ask)["metric"].shape == (1,)
+    assert not (tmp_path / "sweep.json").exists()
 
 
 def test_a_function_may_be_the_metric():

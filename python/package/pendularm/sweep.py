@@ -10,6 +10,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 from zipfile import BadZipFile
@@ -17,6 +18,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import NDArray
 
+from ._code import fingerprint
 from ._native import Batch
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
@@ -143,7 +145,8 @@ def sweep(
 
     Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
     hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
-    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. Raises
+    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
+    function by its code, which has to be a plain one there; what that finds by global names is not looked at. Raises
     `ValueError` for a setting that cannot be, and where the folder holds another sweep.
     """
     axes = {name: list(values) for name, values in grid.items()}
@@ -214,8 +217,12 @@ class _Question:
 
     def told(self) -> dict[str, Any]:
         """The question as the folder keeps it."""
-        metric = self.metric if isinstance(self.metric, str) else f"{self.metric.__module__}.{self.metric.__qualname__}"
+        metric = self.metric
+        if not isinstance(metric, str):
+            code = fingerprint("metric", metric)
+            metric = f"{metric.__module__}.{metric.__qualname__} {code}"
         return {
+            "version": version("pendularm"),
             # In a list, whose order counts: the axes of the results are in that of the grid.
             "grid": [[name, values.tolist()] for name, values in self.axes.items()],
             "settings": {name: values.tolist() for name, values in self.fixed.items()},
