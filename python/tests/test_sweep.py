@@ -3,6 +3,7 @@
 import functools
 import json
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -191,6 +192,14 @@ def test_a_function_may_be_the_metric():
             "piece must be between 1 and 24937 with 401 samples, got 1000000",
         ),
         (
+            lambda: pendularm.sweep({"timestep": [1e-3, 1e-320]}, duration=1),
+            "duration / timestep must be at most 10000000 steps, got inf",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, duration=1e5),
+            "duration / timestep must be at most 10000000 steps, got 1e+08",
+        ),
+        (
             lambda: pendularm.sweep({"kp": range(4000), "kd": range(4000)}),
             "grid must have at most 10000000 combinations, got 16000000",
         ),
@@ -200,6 +209,31 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     with pytest.raises(ValueError) as refusal:
         wrong()
     assert str(refusal.value).startswith(said)
+
+
+FOREVER = """
+import pendularm, threading, time
+def metric(run):
+    raise AssertionError("no piece ends so soon")
+print("sweeping", flush=True)
+try:
+    pendularm.sweep({"kp": range(1024)}, metric, duration=1e4, samples=2, progress=False)
+except KeyboardInterrupt:
+    print("ended", threading.active_count())
+"""
+
+
+def test_ctrl_c_ends_a_sweep_amid_its_pieces():
+    with subprocess.Popen([sys.executable, "-c", FOREVER], stdout=subprocess.PIPE, text=True) as run:
+        try:
+            assert run.stdout is not None
+            assert run.stdout.readline() == "sweeping\n"
+            time.sleep(1)
+            run.send_signal(signal.SIGINT)
+            assert run.wait(60) == 0
+            assert run.stdout.read() == "ended 1\n"
+        finally:
+            run.kill()
 
 
 # A fork beside this process's threads is not asked for by these tests, but by older Pythons' default.

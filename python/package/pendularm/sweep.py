@@ -7,9 +7,11 @@ results.
 import json
 import math
 import os
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
@@ -25,6 +27,9 @@ __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
 Floats = NDArray[np.float64]
 
+TIMESTEP = 0.001
+"""[s], unless another is given."""
+
 SETTLED = 0.02
 """Largest distance of a joint from its setpoint at which an arm counts as settled [rad]."""
 
@@ -36,6 +41,12 @@ MOST_SETTINGS = 10_000_000
 
 MOST_SAMPLES = 100_000
 """Samples of a run, as many as a rollout has."""
+
+MOST_STEPS = 10_000_000
+"""Steps of a run, as many as a rollout has."""
+
+AT_ONCE = 1_000_000
+"""Steps of all arms together between two looks at whether the sweep was stopped: some tens of milliseconds."""
 
 MOST_ROWS = 10_000_000
 """Samples times settings of a piece: some 1 GB where it is done."""
@@ -146,8 +157,8 @@ def sweep(
     Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
     hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
     there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
-    function by its code, which has to be a plain one there; what that finds by global names is not looked at. Raises
-    `ValueError` for a setting that cannot be, and where the folder holds another sweep.
+    function by its code, which has to be a plain one there; what that finds by global names is not looked at. Ctrl-C
+    ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another sweep.
     """
     axes = {name: list(values) for name, values in grid.items()}
     for name, choices in axes.items():
@@ -183,13 +194,17 @@ def sweep(
     kept = None if folder is None else _Folder(Path(folder), question, piece)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
-    threads = ThreadPoolExecutor() if executor is None else None
-    try:
-        left = [start for start in starts if start not in done]
-        _run(question, left, piece, threads or executor, done, kept, progress)
-    finally:
-        if threads is not None:
-            threads.shutdown(cancel_futures=True)
+    left = [start for start in starts if start not in done]
+    if executor is not None:
+        _run(question, left, piece, executor, _solve, done, kept, progress)
+    else:
+        stopped = threading.Event()
+        with ThreadPoolExecutor() as threads:
+            try:
+                _run(question, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
+            finally:
+                # Who leaves early, by Ctrl-C say, does not wait for the pieces that are under way.
+                stopped.set()
     whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
     return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
 
@@ -212,8 +227,12 @@ class _Question:
 
     def check(self) -> None:
         """Tries every value once, so that a bad one is refused here and by its own name."""
-        for name, values in {**self.axes, **self.fixed}.items():
+        settings = {**self.axes, **self.fixed}
+        for name, values in settings.items():
             _begin({name: values}, len(values), self.links)
+        steps = self.duration / float(min(settings.get("timestep", [TIMESTEP])))
+        if steps > MOST_STEPS:
+            raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
     def told(self) -> dict[str, Any]:
         """The question as the folder keeps it."""
@@ -268,22 +287,36 @@ def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
     return batch
 
 
-def _solve(question: _Question, start: int, stop: int) -> dict[str, NDArray[Any]]:
-    """One piece, wherever it is done."""
+def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | None) -> None:
+    """Takes so many steps with each arm, in several goes if they are many."""
+    at_once = max(1, AT_ONCE // len(batch))
+    while True:
+        if stopped is not None and stopped.is_set():
+            raise CancelledError
+        batch.step(np.minimum(steps, at_once))
+        steps = np.maximum(steps - at_once, 0)
+        if not steps.any():
+            return
+
+
+def _solve(
+    question: _Question, start: int, stop: int, stopped: threading.Event | None = None
+) -> dict[str, NDArray[Any]]:
+    """One piece, wherever it is done; one that is done in this process is over soon after it was `stopped`."""
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start
     settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
     settings |= {name: np.repeat(values, arms, axis=0) for name, values in question.fixed.items()}
     batch = _begin(settings, arms, question.links)
     batch.enable(question.servo)
-    timestep = settings.get("timestep", np.full(arms, 0.001))
+    timestep = settings.get("timestep", np.full(arms, TIMESTEP))
     shape = (question.samples, arms, question.links)
     positions, velocities, efforts = np.empty(shape), np.empty(shape), np.empty(shape)
     times, energy = np.empty(shape[:2]), np.empty(shape[:2])
     taken = np.zeros(arms, np.int64)
     for sample, time in enumerate(np.linspace(0.0, question.duration, question.samples)):
         due = np.rint(time / timestep).astype(np.int64)
-        batch.step(due - taken)
+        _advance(batch, due - taken, stopped)
         taken = due
         positions[sample], velocities[sample], efforts[sample] = batch.position, batch.velocity, batch.effort
         times[sample], energy[sample] = taken * timestep, batch.energy
@@ -304,6 +337,7 @@ def _run(
     starts: Sequence[int],
     piece: int,
     executor: Any,
+    solve: Callable[..., dict[str, NDArray[Any]]],
     done: dict[int, dict[str, NDArray[Any]]],
     kept: "_Folder | None",
     progress: bool,
@@ -316,7 +350,7 @@ def _run(
         try:
             while True:
                 while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
-                    under_way[executor.submit(_solve, question, start, min(start + piece, total))] = start
+                    under_way[executor.submit(solve, question, start, min(start + piece, total))] = start
                 if not under_way:
                     return
                 ended = wait(under_way, return_when=FIRST_COMPLETED).done
