@@ -55,6 +55,20 @@ def test_neither_workers_nor_pieces_change_a_bit():
         assert np.array_equal(found["settling_time"], expected)
 
 
+def test_threads_are_as_many_as_cores():
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    before, most = threading.active_count(), 0
+
+    def count(run):
+        nonlocal most
+        most = max(most, threading.active_count())
+        time.sleep(0.02)
+        return run.energy[-1]
+
+    pendularm.sweep({"kp": range(8 * cores)}, count, duration=0.1, samples=2, piece=1, progress=False)
+    assert most - before == cores
+
+
 class Stopping(ThreadPoolExecutor):
     """One thread, which fails after so many pieces."""
 

@@ -199,7 +199,7 @@ def sweep(
         _run(question, left, piece, executor, _solve, done, kept, progress)
     else:
         stopped = threading.Event()
-        with ThreadPoolExecutor() as threads:
+        with ThreadPoolExecutor(_cores()) as threads:
             try:
                 _run(question, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
             finally:
@@ -207,6 +207,11 @@ def sweep(
                 stopped.set()
     whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
     return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
+
+
+def _cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
