@@ -109,3 +109,15 @@ def test_swinging_up_pays():
 def test_a_step_needs_a_reset():
     with pytest.raises(gymnasium.error.ResetNeeded):
         gymnasium.make_vec("Pendularm-v0", 2).step(np.zeros((2, 2), np.float32))
+
+
+@pytest.mark.parametrize(
+    ("kind", "steps"), [(pendularm.envs.PendularmVectorEnv, 200), (pendularm.envs.PendularmReachVectorEnv, 100)]
+)
+def test_a_vector_environment_by_itself_truncates_where_its_page_says(kind, steps):
+    assert f"truncated after {steps} steps" in kind.__doc__
+    env = kind(2)
+    env.reset(seed=0)
+    for _ in range(steps - 1):
+        assert not env.step(np.zeros((2, 2), np.float32))[3].any()
+    assert env.step(np.zeros((2, 2), np.float32))[3].all()

@@ -45,6 +45,8 @@ class _Task:
 
     strength: ClassVar[float]
     """Efforts that an action of 1 stands for, in parts of those that hold the stretched arm."""
+    most_steps: ClassVar[int]
+    """Steps after which an episode is truncated, unless told otherwise."""
 
     def __init__(self, arms: int, links: int, threads: int | None) -> None:
         self.batch = Batch(arms, links, threads=threads)
@@ -86,6 +88,7 @@ class _Task:
 
 class _SwingUp(_Task):
     strength = 0.5
+    most_steps = 200
 
     def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
         off = np.array([one.uniform(-0.1, 0.1, (2, self.links)) for one in random])
@@ -100,6 +103,7 @@ class _SwingUp(_Task):
 
 class _Reach(_Task):
     strength = 2.0
+    most_steps = 100
 
     def __init__(self, arms: int, links: int, threads: int | None) -> None:
         super().__init__(arms, links, threads)
@@ -162,10 +166,12 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self,
         num_envs: int = 1,
         links: int = 2,
-        max_episode_steps: int = 200,
+        max_episode_steps: int | None = None,
         threads: int | None = None,
         render_mode: str | None = None,
     ) -> None:
+        if max_episode_steps is None:
+            max_episode_steps = self.task_of.most_steps
         if max_episode_steps < 1:
             raise ValueError(f"max_episode_steps must be at least 1, got {max_episode_steps}")
         self._task = self.task_of(num_envs, links, threads)
@@ -309,10 +315,10 @@ class PendularmReachVectorEnv(_Vector):
     task_of = _Reach
 
 
-for _name, _steps in [("Pendularm", 200), ("PendularmReach", 100)]:
+for _name, _task in [("Pendularm", _SwingUp), ("PendularmReach", _Reach)]:
     gymnasium.register(
         f"{_name}-v0",
         entry_point=f"pendularm.envs:{_name}Env",
         vector_entry_point=f"pendularm.envs:{_name}VectorEnv",
-        max_episode_steps=_steps,
+        max_episode_steps=_task.most_steps,
     )
