@@ -117,6 +117,24 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     assert str(refusal.value) == said
 
 
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: pendularm.stability(),
+        lambda: pendularm.rollout(duration=0.1),
+        lambda: pendularm.plan(0.01, duration=0.1),
+        lambda: pendularm.suggest_gains(settling_time=10.0),
+        lambda: pendularm.sweep({"kp": [1.0]}, duration=0.1, progress=False),
+    ],
+)
+def test_an_answer_is_equal_to_itself_alone(make):
+    """Its arrays have no one answer to `==`."""
+    answer = make()
+    assert answer == answer
+    assert answer != make()
+    assert len({answer, answer}) == 1
+
+
 FOREVER = """
 import pendularm
 print("running", flush=True)

@@ -1,6 +1,7 @@
 """The effect of method and timestep on the arm, predicted and measured: the answers of the services ``/study/*``.
 
-Long computations release the interpreter's lock, and Ctrl-C ends them.
+Long computations release the interpreter's lock, and Ctrl-C ends them. An answer with arrays is equal to
+itself alone.
 """
 
 from collections.abc import Mapping
@@ -39,7 +40,7 @@ class Critical:
     """The joint that it moves furthest, from 0."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stability:
     """The largest stable timesteps of a control loop [s]. `None`: nothing limits; 0: unstable at every timestep."""
 
@@ -71,7 +72,7 @@ class Stability:
     """0.8 of the smaller of that and the minimum over poses."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rollout:
     """An offline run, sample by sample, with its cost and its error."""
 
@@ -97,7 +98,7 @@ class Rollout:
     """Step and time [s] at which the run left the finite numbers, if it did; the samples end before."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """The cheapest method and timestep within an allowed error, and what the other methods would cost."""
 
@@ -119,7 +120,7 @@ class Plan:
     errors: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SuggestedGains:
     """Gains that are stable in every pose and settle in time, and how they fared."""
 
