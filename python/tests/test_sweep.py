@@ -250,6 +250,30 @@ def test_ctrl_c_ends_a_sweep_amid_its_pieces():
             run.kill()
 
 
+NOTEBOOK = """
+import pendularm
+pendularm.sweep({"kp": range(64)}, duration=0.1, samples=2, progress=%s)["settling_time"].shape
+"""
+
+
+# Jupyter's own warnings are Jupyter's.
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_notebook_shows_the_progress(wanted):
+    import nbclient
+    import nbformat
+
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(NOTEBOOK % wanted)])
+    nbclient.NotebookClient(book, timeout=300).execute()
+    shown = [output for output in book.cells[0].outputs if "(64," not in str(output)]
+    assert ("/64 " in str(shown)) is wanted
+
+
+def test_nothing_is_shown_off_a_terminal(capfd):
+    pendularm.sweep({"kp": [1, 2]}, duration=0.1)
+    assert capfd.readouterr() == ("", "")
+
+
 # A fork beside this process's threads is not asked for by these tests, but by older Pythons' default.
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_processes_may_do_the_work():

@@ -7,6 +7,7 @@ results.
 import json
 import math
 import os
+import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
@@ -371,16 +372,23 @@ def _run(
                 future.cancel()
 
 
+def _in_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this, whose output is no terminal and is looked at all the same."""
+    interactive = sys.modules.get("IPython")
+    return interactive is not None and hasattr(interactive.get_ipython(), "kernel")
+
+
 class _Bar:
     """A progress bar where tqdm is installed and somebody is watching."""
 
     def __init__(self, total: int, already: int, wanted: bool) -> None:
         try:
-            from tqdm import tqdm
+            from tqdm.auto import tqdm
         except ImportError:
             wanted = False
         # `None`: only on a terminal.
-        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=None) if wanted else None
+        hidden = False if _in_notebook() else None
+        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=hidden) if wanted else None
 
     def __enter__(self) -> "_Bar":
         return self
