@@ -18,6 +18,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
+use rayon::ThreadPool;
 
 use crate::arm::for_either;
 use crate::fields::{self, Bound, Held, Numbers, Object, refused};
@@ -96,7 +97,8 @@ impl Batch {
 
     /// Takes `steps` steps (1 unless given) with every arm, or so many of each, (`n_arms`,), in whole numbers. An arm
     /// that has diverged takes no more. `effort` [N m] is added to the controller's for all these steps, as
-    /// `Simulation.disturb` does. The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
+    /// `Simulation.disturb` does. The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps,
+    /// the effort with it.
     #[pyo3(signature = (steps=None, effort=None))]
     fn step(
         &self,
@@ -120,28 +122,21 @@ impl Batch {
         let arms = u64::try_from(self.arms).unwrap_or(u64::MAX);
         let threads = u64::try_from(self.threads).unwrap_or(1);
         let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
-        let mut done = 0;
-        while done < steps.most() {
-            let piece = Piece {
+        let taken = self.take(
+            py,
+            pool.as_deref(),
+            Piece {
                 steps,
                 effort: effort.as_ref(),
-                done,
+                done: 0,
                 length,
                 is_shared: pool.is_some(),
-            };
-            for_either!(Either, &self.own, lanes => {
-                let mut lanes = hold(py, lanes);
-                let lanes = lanes.as_mut_slice();
-                self.windows.write(py, |shown| match &pool {
-                    None => lanes::advance(lanes, shown, piece),
-                    Some(pool) => pool.install(|| lanes::advance(lanes, shown, piece)),
-                })?;
-            });
-            done = done.saturating_add(length);
-            // No lock is held here: a signal's handler may want to look at the arms.
-            py.check_signals()?;
+            },
+        );
+        if taken.is_err() && effort.is_some() {
+            for_either!(Either, &self.own, lanes => lanes::end_effort(&mut hold(py, lanes), steps));
         }
-        Ok(())
+        taken
     }
 
     /// Back to the starting pose at rest, at time 0, as `Simulation.reset` does: all arms, those of a mask
@@ -151,13 +146,15 @@ impl Batch {
         let chosen = chosen(arms, self.arms)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
-            for &lane in &chosen {
-                if let Some(one) = lanes.get_mut(lane) {
-                    one.reset();
-                }
-            }
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| shown.show(lanes))
+            self.windows.write(py, |shown| {
+                for &lane in &chosen {
+                    if let Some(one) = lanes.get_mut(lane) {
+                        one.reset();
+                    }
+                }
+                shown.show(lanes);
+            })
         })
     }
 
@@ -184,16 +181,18 @@ impl Batch {
         let velocity = read("velocity", velocity)?.map(owned).transpose()?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
-            for (row, &lane) in chosen.iter().enumerate() {
-                if let Some(one) = lanes.get_mut(lane) {
-                    one.set_state(State {
-                        position: position.row(row),
-                        velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
-                    });
-                }
-            }
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| shown.show(lanes))
+            self.windows.write(py, |shown| {
+                for (row, &lane) in chosen.iter().enumerate() {
+                    if let Some(one) = lanes.get_mut(lane) {
+                        one.set_state(State {
+                            position: position.row(row),
+                            velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
+                        });
+                    }
+                }
+                shown.show(lanes);
+            })
         })
     }
 
@@ -311,9 +310,11 @@ impl Batch {
     fn enable(&self, py: Python<'_>, data: bool) -> PyResult<()> {
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
-            lanes.iter_mut().for_each(|one| one.enable(data));
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| shown.show(lanes))
+            self.windows.write(py, |shown| {
+                lanes.iter_mut().for_each(|one| one.enable(data));
+                shown.show(lanes);
+            })
         })
     }
 
@@ -392,5 +393,26 @@ impl Batch {
             self.links(),
             self.threads
         )
+    }
+}
+
+impl Batch {
+    /// Takes all steps, from those of this piece on, with a look for signals between two pieces.
+    fn take(&self, py: Python<'_>, pool: Option<&ThreadPool>, first: Piece<'_>) -> PyResult<()> {
+        let mut piece = first;
+        while piece.done < piece.steps.most() {
+            for_either!(Either, &self.own, lanes => {
+                let mut lanes = hold(py, lanes);
+                let lanes = lanes.as_mut_slice();
+                self.windows.write(py, |shown| match pool {
+                    None => lanes::advance(lanes, shown, piece),
+                    Some(pool) => pool.install(|| lanes::advance(lanes, shown, piece)),
+                })?;
+            });
+            piece.done = piece.done.saturating_add(piece.length);
+            // No lock is held here: a signal's handler may want to look at the arms.
+            py.check_signals()?;
+        }
+        Ok(())
     }
 }
