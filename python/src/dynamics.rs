@@ -32,7 +32,7 @@ fn each_row<'py, const N: usize, const K: usize>(
     py: Python<'py>,
     fields: [(&str, &Object<'py>); K],
     answer: Shape,
-    function: impl Fn([[f64; N]; K], &mut Vec<f64>),
+    function: impl Fn([[f64; N]; K], &mut Vec<f64>) + Sync,
 ) -> PyResult<Object<'py>> {
     all_rows(py, N, fields, answer, |rows, count, out| {
         for index in 0..count {
@@ -47,27 +47,40 @@ fn all_rows<'py, const K: usize>(
     links: usize,
     fields: [(&str, &Object<'py>); K],
     answer: Shape,
-    function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>),
+    function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>) + Send,
 ) -> PyResult<Object<'py>> {
     let mut given = Vec::with_capacity(K);
     for (field, value) in fields {
         given.push((field, Numbers::read(field, value)?));
     }
-    let count = given.iter().find_map(|(_, numbers)| match numbers.shape() {
-        [count, _] => Some(*count),
-        _ => None,
-    });
+    let counts = || {
+        given
+            .iter()
+            .filter_map(|(_, numbers)| match numbers.shape() {
+                [count, _] => Some(*count),
+                _ => None,
+            })
+    };
+    // A table of one row goes with those of more.
+    let count = counts().find(|&count| count != 1).or(counts().next());
     let mut rows: Vec<Rows<'_>> = Vec::with_capacity(K);
     for (_, numbers) in &given {
-        rows.push(numbers.rows(count.unwrap_or(1), links, None)?);
+        let each = match numbers.shape() {
+            [1, _] => 1,
+            _ => count.unwrap_or(1),
+        };
+        rows.push(numbers.rows(each, links, None)?.of_one_for_all());
     }
     let rows: [Rows<'_>; K] = rows
         .try_into()
         .map_err(|_| refused("as many rows as fields"))?;
-    let is_one = rows.iter().all(|row| row.count().is_none());
     let mut flat = Vec::new();
-    function(&rows, count.unwrap_or(1), &mut flat);
-    let mut shape: Vec<usize> = count.filter(|_| !is_one).into_iter().collect();
+    match count {
+        // Less work than to hand the interpreter's lock to another thread.
+        None => function(&rows, 1, &mut flat),
+        Some(count) => py.detach(|| function(&rows, count, &mut flat)),
+    }
+    let mut shape: Vec<usize> = count.into_iter().collect();
     match answer {
         Shape::One => {}
         Shape::Point => shape.push(2),

@@ -165,9 +165,12 @@ impl Rows<'_> {
         }
     }
 
-    /// How many rows there are, unless one stands for all.
-    pub(crate) fn count(&self) -> Option<usize> {
-        (!self.is_one).then(|| self.values.len() / self.width)
+    /// The same, where a single row goes with every row of others.
+    pub(crate) fn of_one_for_all(self) -> Self {
+        Self {
+            is_one: self.values.len() == self.width,
+            ..self
+        }
     }
 
     /// The row of an arm. `N` is the width that was asked for.
