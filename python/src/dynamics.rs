@@ -8,7 +8,7 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Arm, Chain, for_either};
-use crate::fields::{Bound, Held, Numbers, Object, Rows, joints_or, refused};
+use crate::fields::{Bound, Held, Numbers, Object, Real, Rows, joints_or, refused};
 
 /// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -267,14 +267,19 @@ pub(crate) fn end_effector<'py>(
 pub(crate) fn inverse_kinematics<'py>(
     py: Python<'py>,
     arm: Held<'py, Arm>,
-    x: f64,
-    y: f64,
-    phi: Option<f64>,
+    x: Real,
+    y: Real,
+    phi: Option<Real>,
     present: Option<Object<'py>>,
 ) -> PyResult<Held<'py, numpy::PyArray1<f64>>> {
+    if arm.get().links() == 2 && phi.is_some() {
+        return Err(refused(
+            "phi must be left out for an arm of 2 links: x and y decide its heading",
+        ));
+    }
     let target = kinematics::Target {
-        position: [x, y].into(),
-        orientation: phi,
+        position: [x.read("x")?, y.read("y")?].into(),
+        orientation: phi.map(|phi| phi.read("phi")).transpose()?,
     };
     for_either!(Chain, &arm.get().chain, arm => {
         let present = joints_or("present", present.as_ref(), Bound::Finite, [0.0; _])?;

@@ -155,7 +155,10 @@ def test_arrays_go_in_as_they_lie():
     [
         (lambda batch: pendularm.Batch(0), "n_arms must be between 1 and 1000000, got 0"),
         (lambda batch: pendularm.Batch(1_000_001), "n_arms must be between 1 and 1000000, got 1000001"),
+        (lambda batch: pendularm.Batch(-1), "n_arms must be between 1 and 1000000, got -1"),
         (lambda batch: pendularm.Batch(2, 5), "links must be 2 or 3, got 5"),
+        (lambda batch: pendularm.Batch(2, -2), "links must be 2 or 3, got -2"),
+        (lambda batch: pendularm.Batch(2, threads=-1), "threads must be between 1 and 1024, got -1"),
         (lambda batch: pendularm.Batch(2, threads=2000), "threads must be between 1 and 1024, got 2000"),
         (lambda batch: pendularm.Batch(2, threads=0), "threads must be between 1 and 1024, got 0"),
         (lambda batch: batch.step([1, 2]), "steps must be a whole number, or one for each of 3 arms"),

@@ -110,6 +110,15 @@ def test_a_folder_holds_one_sweep(tmp_path):
         pendularm.sweep({"kp": [1, 3]}, "settling_time", folder=tmp_path, **small)
 
 
+def test_numbers_of_numpy_are_numbers(tmp_path):
+    ask = {"grid": {"kp": [1.0, 2.0]}, "folder": tmp_path}
+    one = pendularm.sweep(
+        duration=np.float32(0.5), samples=np.int64(11), links=np.int8(2), servo=np.bool_(True), piece=np.int64(1), **ask
+    )
+    other = pendularm.sweep(duration=0.5, samples=11, links=2, servo=True, piece=1, **ask)
+    assert np.array_equal(one["settling_time"], other["settling_time"])
+
+
 def test_a_folder_knows_the_order_of_the_grid(tmp_path):
     small = {**FIXED, "duration": 0.1}
     grid = {"kp": [50.0, 500.0], "kd": [2.0, 20.0, 100.0]}
@@ -197,6 +206,41 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"timestep": ["x"]}), "every timestep must be a number, got ['x']"),
         (lambda: pendularm.sweep({"method": ["heun"]}), "method must be one of euler, midpoint, verlet, rk4"),
         (lambda: pendularm.sweep({"kp": [1]}, "speed"), "metric must be one of final_error, settling_time"),
+        (lambda: pendularm.sweep({"kp": [1]}, 5), "metric must be one of final_error, settling_time"),
+        (lambda: pendularm.sweep({"q0": [[0, 0], [np.nan, 0]]}), "q0[1][0] must be finite, got nan"),
+        (lambda: pendularm.sweep({"kp": [1]}, qdot0=np.inf), "qdot0[0][0] must be finite, got inf"),
+        (lambda: pendularm.sweep({"setpoint": [0, [1, np.nan]]}), "setpoint[1][1] must be finite, got nan"),
+        (lambda: pendularm.sweep({"masses": [1, np.array(1j)]}), "every masses must be a number or an array of 2, got"),
+        (lambda: pendularm.sweep({"gravity": ["9"]}), "every gravity must be a number, got ['9']"),
+        (lambda: pendularm.sweep({"kp": ["9"]}), "every kp must be a number or an array of 2, got ['9']"),
+        (lambda: pendularm.sweep([1]), "grid must be a mapping from settings to their values, got [1]"),
+        (lambda: pendularm.sweep({"kp": 5}), "grid['kp'] must be a sequence of values, got 5"),
+        (lambda: pendularm.sweep({"kp": [1]}, links=-1), "links must be 2 or 3, got -1"),
+        (lambda: pendularm.sweep({"kp": [1]}, links="2"), "links must be a whole number, got '2'"),
+        (lambda: pendularm.sweep({"kp": [1]}, samples=11.0), "samples must be a whole number, got 11.0"),
+        (lambda: pendularm.sweep({"kp": [1]}, piece="1"), "piece must be a whole number, got '1'"),
+        (lambda: pendularm.sweep({"kp": [1]}, duration="1"), "duration must be a number, got '1'"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: {1: run.energy[-1]}, duration=0.1),
+            "metric must name its numbers by text, other than 'file' and 'allow_pickle', got 1",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: {"file": run.energy[-1]}, duration=0.1),
+            "metric must name its numbers by text, other than 'file' and 'allow_pickle', got 'file'",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: [None], duration=0.1),
+            "metric must answer numbers or text, got metric of objects",
+        ),
+        (
+            lambda: pendularm.sweep(
+                {"kp": [1, 2]}, lambda run: {str(int(run.setpoint.any())): run.energy[-1]}, setpoint=[0, 0], duration=0.1
+            )
+            and pendularm.sweep(
+                {"setpoint": [0, 1]}, lambda run: {str(run.setpoint[0, 0]): run.energy[-1]}, duration=0.1, piece=1
+            ),
+            "metric must answer the same names for all arms, got 0.0 and 1.0",
+        ),
         (lambda: pendularm.sweep({"kp": [1]}, duration=-1), "duration must be finite and greater than 0, got -1"),
         (lambda: pendularm.sweep({"kp": [1]}, samples=1), "samples must be between 2 and 100000, got 1"),
         (lambda: pendularm.sweep({"kp": [1]}, samples=10**9), "samples must be between 2 and 100000, got 1000000000"),

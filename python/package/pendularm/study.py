@@ -175,9 +175,7 @@ def stability(
     an arm left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state
     from which the motion is ahead.
     """
-    found = _native.stability(
-        arm, integrator=integrator, gains=None if gains is None else dict(gains), setpoint=setpoint, q=q, qd=qd
-    )
+    found = _native.stability(arm, integrator=integrator, gains=gains, setpoint=setpoint, q=q, qd=qd)
     critical = found.pop("critical")
     return Stability(**found, critical=None if critical is None else Critical(**critical))
 
@@ -198,8 +196,8 @@ def rollout(
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
     It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start
-    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and a member that
-    is left out is zeros. With `reference` the run is compared with the true motion under the same held control law.
+    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and no `setpoint`
+    may be given; a member that is left out of them is zeros. With `reference` the run is compared with the true motion under the same held control law.
     """
     return Rollout(
         **_native.rollout(
@@ -209,7 +207,7 @@ def rollout(
             duration=duration,
             timestep=timestep,
             integrator=integrator,
-            gains=None if gains is None else dict(gains),
+            gains=gains,
             setpoint=setpoint,
             samples=samples,
             reference=reference,
@@ -241,7 +239,7 @@ def plan(
             duration=duration,
             q0=q0,
             qdot0=qdot0,
-            gains=None if gains is None else dict(gains),
+            gains=gains,
             setpoint=setpoint,
         )
     )

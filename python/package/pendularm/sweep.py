@@ -6,6 +6,7 @@ results.
 
 import json
 import math
+import operator
 import os
 import sys
 import threading
@@ -53,6 +54,7 @@ MOST_ROWS = 10_000_000
 """Samples times settings of a piece: some 1 GB where it is done."""
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
+STATES = ("setpoint", "q0", "qdot0")
 SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
 
 
@@ -161,7 +163,14 @@ def sweep(
     function by its code, which has to be a plain one there; what that finds by global names is not looked at. Ctrl-C
     ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another sweep.
     """
-    axes = {name: list(values) for name, values in grid.items()}
+    if not isinstance(grid, Mapping):
+        raise ValueError(f"grid must be a mapping from settings to their values, got {grid!r:.60}")
+    axes = {}
+    for name, values in grid.items():
+        try:
+            axes[name] = list(values)
+        except TypeError:
+            raise ValueError(f"grid[{name!r}] must be a sequence of values, got {values!r:.60}") from None
     for name, choices in axes.items():
         if name in settings:
             raise ValueError(f"{name} is both in the grid and fixed")
@@ -172,15 +181,19 @@ def sweep(
     total = math.prod(len(choices) for choices in axes.values())
     if total > MOST_SETTINGS:
         raise ValueError(f"grid must have at most {MOST_SETTINGS} combinations, got {total}")
+    links, samples, duration = _whole("links", links), _whole("samples", samples), _number("duration", duration)
+    if links not in (2, 3):
+        raise ValueError(f"links must be 2 or 3, got {links}")
     if not 2 <= samples <= MOST_SAMPLES:
         raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
     if piece is None:
         piece = max(1, min(1024, MOST_ROWS // 10 // samples))
+    piece = _whole("piece", piece)
     if not 1 <= piece <= MOST_ROWS // samples:
         raise ValueError(f"piece must be between 1 and {MOST_ROWS // samples} with {samples} samples, got {piece}")
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
-    if isinstance(metric, str) and metric not in METRICS:
+    if metric not in METRICS if isinstance(metric, str) else not callable(metric):
         raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
     question = _Question(
         axes={name: _column(name, values, links) for name, values in axes.items()},
@@ -189,7 +202,7 @@ def sweep(
         links=links,
         duration=duration,
         samples=samples,
-        servo=servo,
+        servo=bool(servo),
     )
     question.check()
     kept = None if folder is None else _Folder(Path(folder), question, piece)
@@ -206,6 +219,10 @@ def sweep(
             finally:
                 # Who leaves early, by Ctrl-C say, does not wait for the pieces that are under way.
                 stopped.set()
+    for start in starts:
+        if done[start].keys() != done[0].keys():
+            names = " and ".join(", ".join(one) for one in (done[0], done[start]))
+            raise ValueError(f"metric must answer the same names for all arms, got {names}")
     whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
     return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
 
@@ -259,6 +276,28 @@ class _Question:
         }
 
 
+def _whole(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(_numbers(value))
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
+
+
+def _numbers(value: Any) -> Floats:
+    """The value as doubles; text and complex numbers are none."""
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        return array.astype(np.float64)
+    return array.astype(np.float64, casting="same_kind")
+
+
 def _column(name: str, values: Sequence[Any], links: int) -> Any:
     """Values of a setting, a row for each."""
     if name not in SETTINGS:
@@ -267,11 +306,17 @@ def _column(name: str, values: Sequence[Any], links: int) -> Any:
         return np.array([str(value) for value in values])
     try:
         if name in PER_JOINT:
-            return np.array([np.broadcast_to(np.asarray(value, np.float64), (links,)) for value in values])
-        return np.array([float(value) for value in values])
+            column = np.array([np.broadcast_to(_numbers(value), (links,)) for value in values])
+        else:
+            column = np.array([float(_numbers(value)) for value in values])
     except (TypeError, ValueError):
         each = f" or an array of {links}" if name in PER_JOINT else ""
         raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
+    # The other ones are refused by these names where they are tried.
+    if name in STATES and not np.isfinite(column).all():
+        row, joint = np.argwhere(~np.isfinite(column))[0]
+        raise ValueError(f"{name}[{row}][{joint}] must be finite, got {column[row, joint]}")
+    return column
 
 
 def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
@@ -333,6 +378,11 @@ def _solve(
     found = metric(run)
     values = {key: np.asarray(one) for key, one in (found if isinstance(found, Mapping) else {name: found}).items()}
     for key, one in values.items():
+        if not isinstance(key, str) or key in ("file", "allow_pickle"):
+            # These two NumPy takes as its own where it keeps arrays by names.
+            raise ValueError(f"metric must name its numbers by text, other than 'file' and 'allow_pickle', got {key!r}")
+        if one.dtype.hasobject:
+            raise ValueError(f"metric must answer numbers or text, got {key} of objects")
         if one.shape != (arms,):
             raise ValueError(f"metric must answer one number for each of {arms} arms, got {key} of shape {one.shape}")
     return values

@@ -21,7 +21,7 @@ use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
 use rayon::ThreadPool;
 
 use crate::arm::for_either;
-use crate::fields::{self, Bound, Held, Numbers, Object, refused};
+use crate::fields::{self, Bound, Held, Numbers, Object, Whole, refused};
 use crate::patience::hold;
 use given::{chosen, read, read_methods, read_steps};
 use lanes::{Piece, Steps};
@@ -63,18 +63,15 @@ pub(crate) struct Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (n_arms, links=2, *, threads=None))]
-    fn new(py: Python<'_>, n_arms: usize, links: usize, threads: Option<usize>) -> PyResult<Self> {
-        if !(1..=MOST_ARMS).contains(&n_arms) {
-            return Err(refused(format_args!(
-                "n_arms must be between 1 and {MOST_ARMS}, got {n_arms}"
-            )));
-        }
-        if let Some(threads) = threads.filter(|threads| !(1..=MOST_THREADS).contains(threads)) {
-            return Err(refused(format_args!(
-                "threads must be between 1 and {MOST_THREADS}, got {threads}"
-            )));
-        }
+    #[pyo3(
+        signature = (n_arms, links=Whole::Is(2), *, threads=None),
+        text_signature = "(n_arms, links=2, *, threads=None)"
+    )]
+    fn new(py: Python<'_>, n_arms: Whole, links: Whole, threads: Option<Whole>) -> PyResult<Self> {
+        let n_arms = n_arms.up_to(MOST_ARMS, "n_arms")?;
+        let threads = threads
+            .map(|threads| threads.up_to(MOST_THREADS, "threads"))
+            .transpose()?;
         let links = fields::links(links)?;
         let own = match links {
             2 => Either::Two(Mutex::new(lanes::fresh(n_arms))),
