@@ -42,6 +42,11 @@ def test_the_readmes_policy_learns(tmp_path):
     assert float(said.strip().strip("[]")) > shown / 2
 
 
+def test_each_part_of_the_manual_runs_by_itself(tmp_path):
+    for part in blocks(MANUAL):
+        run(part, tmp_path)
+
+
 def test_the_manual_runs_from_top_to_bottom(tmp_path):
     parts = blocks(MANUAL)
     assert len(parts) >= 3
