@@ -63,6 +63,15 @@ def test_a_report_can_be_read(tmp_path):
     assert table["pose"][0] == "3 links, bent"
 
 
+def test_a_report_that_cannot_be_read_is_said_so(tmp_path):
+    (tmp_path / "error.csv").write_text("")
+    with pytest.raises(ValueError, match=r"error\.csv has no head"):
+        pendularm.read_report(tmp_path)
+    (tmp_path / "error.csv").write_text("a,b\n1,2\n3\n")
+    with pytest.raises(ValueError, match=r"error\.csv has 1 cells in row 2, and 2 in its head"):
+        pendularm.read_report(tmp_path)
+
+
 def test_no_report_is_said_so(tmp_path):
     with pytest.raises(FileNotFoundError, match="holds no report"):
         pendularm.read_report(tmp_path)

@@ -129,14 +129,69 @@ def test_a_folder_knows_the_order_of_the_grid(tmp_path):
     assert np.array_equal(pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"], found)
 
 
+def test_what_is_damaged_in_a_folder_is_done_again_or_said(tmp_path):
+    ask = {"grid": {"kp": [1.0, 2.0, 3.0]}, "duration": 0.1, "folder": tmp_path, "piece": 1}
+    expected = pendularm.sweep(**ask)["settling_time"]
+    assert not list(tmp_path.glob("part-*"))
+    file = tmp_path / "000000000001.npz"
+    whole = file.read_bytes()
+    np.save(tmp_path / "other.npy", expected)
+    flipped = [whole[:at] + bytes([whole[at] ^ 255]) + whole[at + 1 :] for at in range(len(whole))]
+    for damaged in [b"", b"x" * 500, whole[:-1], whole[:40], (tmp_path / "other.npy").read_bytes(), *flipped[::7]]:
+        file.write_bytes(damaged)
+        assert np.array_equal(pendularm.sweep(**ask)["settling_time"], expected)
+    for values in [{"settling_time": np.zeros(2)}, {"other": np.zeros(1)}, {}]:
+        np.savez(file, **values)
+        assert np.array_equal(pendularm.sweep(**ask)["settling_time"], expected)
+    question = tmp_path / "sweep.json"
+    for damaged in [b"", b"{", b"[1]", b"null", b"\xff"]:
+        question.write_bytes(damaged)
+        with pytest.raises(ValueError, match=r"holds a sweep\.json that cannot be read"):
+            pendularm.sweep(**ask)
+    question.unlink()
+    with pytest.raises(ValueError, match=r"holds pieces of a sweep without their sweep\.json"):
+        pendularm.sweep(**ask)
+    with pytest.raises(ValueError, match="folder .* must be a folder"):
+        pendularm.sweep(**{**ask, "folder": file})
+
+
+TOGETHER = """
+import sys, numpy as np, pendularm
+print("here", flush=True)
+sys.stdin.readline()
+grid = {"kp": np.geomspace(50, 2000, 300)}
+found = pendularm.sweep(grid, duration=0.1, samples=2, piece=1, folder=sys.argv[1], progress=False)
+print(hash(found["settling_time"].tobytes()))
+"""
+
+
+def test_two_processes_may_share_a_folder(tmp_path):
+    begin = lambda: subprocess.Popen(
+        [sys.executable, "-c", TOGETHER, str(tmp_path)],
+        env={**os.environ, "PYTHONHASHSEED": "0"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    both = [begin() for _ in range(2)]
+    assert [one.stdout.readline() for one in both] == ["here\n"] * 2
+    for one in both:
+        one.stdin.write("\n")
+        one.stdin.flush()
+    said = [one.communicate(timeout=60)[0] for one in both]
+    assert [one.returncode for one in both] == [0, 0]
+    assert said[0] == said[1]
+
+
 def test_a_folder_knows_the_code_of_a_metric(tmp_path):
     def last(factor, kind="position"):
-        return lambda run: [factor * run.positions[-1, :, joint] for joint in (0, 1) if kind in {"position", "first"}][0]
+        return lambda run: [factor * run.positions[-1, :, 0] for _ in (0, 1) if kind in {"position", "first"}][0]
 
     ask = {"grid": {"kp": [1.0, 2.0]}, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
     found = pendularm.sweep(metric=last(1.0), **ask)["metric"]
     assert np.array_equal(pendularm.sweep(metric=last(1.0), **ask)["metric"], found)
-    for other in [last(2.0), last(1.0, "first"), lambda run: run.positions[-1, :, 0], lambda run: run.positions[-1, :, 1]]:
+    first, second = (lambda run: run.positions[-1, :, 0]), (lambda run: run.positions[-1, :, 1])
+    for other in [last(2.0), last(1.0, "first"), first, second]:
         with pytest.raises(ValueError, match="holds another sweep: it differs in metric"):
             pendularm.sweep(metric=other, **ask)
     kept = json.loads((tmp_path / "sweep.json").read_text())
@@ -234,9 +289,6 @@ def test_a_function_may_be_the_metric():
         ),
         (
             lambda: pendularm.sweep(
-                {"kp": [1, 2]}, lambda run: {str(int(run.setpoint.any())): run.energy[-1]}, setpoint=[0, 0], duration=0.1
-            )
-            and pendularm.sweep(
                 {"setpoint": [0, 1]}, lambda run: {str(run.setpoint[0, 0]): run.energy[-1]}, duration=0.1, piece=1
             ),
             "metric must answer the same names for all arms, got 0.0 and 1.0",

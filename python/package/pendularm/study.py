@@ -197,7 +197,8 @@ def rollout(
 
     It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start
     and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and no `setpoint`
-    may be given; a member that is left out of them is zeros. With `reference` the run is compared with the true motion under the same held control law.
+    may be given; a member that is left out of them is zeros. With `reference` the run is compared with the true
+    motion under the same held control law.
     """
     return Rollout(
         **_native.rollout(

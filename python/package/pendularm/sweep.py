@@ -15,9 +15,9 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPo
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Protocol
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -161,7 +161,8 @@ def sweep(
     hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
     there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
     function by its code, which has to be a plain one there; what that finds by global names is not looked at. Ctrl-C
-    ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another sweep.
+    ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another
+    sweep.
     """
     if not isinstance(grid, Mapping):
         raise ValueError(f"grid must be a mapping from settings to their values, got {grid!r:.60}")
@@ -457,20 +458,32 @@ class _Folder:
 
     def __init__(self, path: Path, question: _Question, piece: int) -> None:
         self._path = path
-        path.mkdir(parents=True, exist_ok=True)
+        self._piece = piece
+        self._total = math.prod(question.shape)
+        self._name = question.metric if isinstance(question.metric, str) else None
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError):
+            raise ValueError(f"folder {path} must be a folder") from None
         # Through JSON, so that it can be compared with what is read.
         told = json.loads(json.dumps({**question.told(), "piece": piece}))
         file = path / "sweep.json"
         if not file.exists():
+            if any(path.glob("[0-9]*.npz")):
+                raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
             self._write("sweep.json", lambda part: part.write_text(json.dumps(told)))
             return
-        kept = json.loads(file.read_text())
+        try:
+            kept = dict(json.loads(file.read_bytes()))
+        except (TypeError, ValueError):
+            raise ValueError(f"folder {path} holds a sweep.json that cannot be read") from None
         other = [name for name, value in told.items() if kept.get(name) != value]
         if other:
             raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
 
     def _write(self, name: str, write: Callable[[Path], Any]) -> None:
-        part = self._path / f"part-{name}"
+        # Another process may be at the same sweep.
+        part = self._path / f"part-{os.getpid()}-{name}"
         write(part)
         part.replace(self._path / name)
 
@@ -481,9 +494,15 @@ class _Folder:
         found = {}
         for start in starts:
             try:
-                with np.load(self._path / f"{start:012}.npz", allow_pickle=False) as file:
-                    found[start] = dict(file)
-            except (FileNotFoundError, BadZipFile, ValueError, EOFError):
-                # Done again.
+                # In memory, since NumPy leaves a file open that it cannot read.
+                kept = BytesIO((self._path / f"{start:012}.npz").read_bytes())
+                with np.load(kept, allow_pickle=False) as file:
+                    values = dict(file)
+            except Exception:
+                # What is not there or damaged, in whatever way, is done again.
                 continue
+            arms = min(self._piece, self._total - start)
+            known = self._name is None or list(values) == [self._name]
+            if known and values and all(one.shape == (arms,) for one in values.values()):
+                found[start] = values
         return found
