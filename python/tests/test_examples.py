@@ -45,6 +45,15 @@ def test_a_policy_learns():
     assert after > max(before + 0.05, shown / 2)
 
 
+def test_the_live_client_knows_the_runtimes_port():
+    spec = importlib.util.spec_from_file_location("live_client", EXAMPLES / "live_client.py")
+    client = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(client)
+    assert client.address() == ("127.0.0.1", 9095)
+    assert client.address("arm.local") == ("arm.local", 9095)
+    assert client.address("arm.local:80") == ("arm.local", 80)
+
+
 def test_roslibpy_moves_the_live_arm(runtime):
     run = subprocess.run(
         [sys.executable, str(EXAMPLES / "live_client.py"), runtime.address], capture_output=True, text=True, timeout=120
