@@ -6,6 +6,7 @@ import sys
 import sysconfig
 import time
 import urllib.request
+from importlib.metadata import files
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,12 @@ def test_it_comes_with_completions_and_a_manual():
     share = Path(sysconfig.get_path("data")) / "share"
     assert "pendularm\\-topic(1)" in (share / "man/man1/pendularm.1").read_text()
     assert (share / "bash-completion/completions/pendularm").is_file()
+
+
+def test_the_licences_are_in_the_wheel():
+    found = {file.name: file.read_text() for file in files("pendularm") if file.name.startswith("LICENSE")}
+    assert found.keys() == {"LICENSE-MIT", "LICENSE-APACHE"}
+    assert "Permission is hereby granted" in found["LICENSE-MIT"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
