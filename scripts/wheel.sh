@@ -41,6 +41,8 @@ fi
 rm -rf target/wheel-data target/wheels
 bash ../scripts/install.sh "$program" target/wheel-data/data
 mv target/wheel-data/data/bin target/wheel-data/scripts
+# maturin takes licences from beside pyproject.toml.
+cp ../LICENSE-MIT ../LICENSE-APACHE .
 
 # On Linux the wheel says which C library it needs at least, and maturin looks at what it builds itself only.
 compatibility=()

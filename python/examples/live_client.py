@@ -1,4 +1,4 @@
-"""Moves the arm of a live runtime with roslibpy: live_client.py [HOST:PORT]. `pendularm` starts one; look at its page
+"""Moves the arm of a live runtime with roslibpy: live_client.py [HOST[:PORT]]. `pendularm` starts one; look at its page
 meanwhile.
 
 The library says where the joints have to be, the runtime takes them there, and its own topic says how it went.
@@ -15,9 +15,14 @@ TARGET = (0.9, 1.1)
 PATIENCE = 60
 
 
+def address(given: str = "127.0.0.1") -> tuple[str, int]:
+    """Host and port, which is the runtime's own unless given."""
+    host, _, port = given.partition(":")
+    return host, int(port or 9095)
+
+
 def main() -> None:
-    host, port = (sys.argv[1] if len(sys.argv) > 1 else "127.0.0.1:9095").rsplit(":", 1)
-    ros = roslibpy.Ros(host, int(port))
+    ros = roslibpy.Ros(*address(*sys.argv[1:2]))
     ros.run(timeout=PATIENCE)
 
     params = roslibpy.Service(ros, "/arm_sim/set_params", "").call(roslibpy.ServiceRequest(), timeout=PATIENCE)

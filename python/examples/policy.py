@@ -1,8 +1,9 @@
-"""A policy that swings the arm up, found in about a minute: policy.py [seconds].
+"""A policy that swings the arm up, found in about a minute: policy.py [generations].
 
-CMA-ES (the package `cma`) draws some dozens of small networks; a vector environment tries each of them on several arms
-at once, and the best half shapes the next draw. Needs `pip install "pendularm[gym]" cma`. Prints the reward of a
-random policy and what is found, on starts that were not trained on, and keeps the network in `policy.npz`.
+CMA-ES (the package `cma`) draws some dozens of small networks, 300 times unless told otherwise; a vector environment
+tries each of them on several arms at once, and the best half shapes the next draw. Needs `pip install "pendularm[gym]"
+cma`. Prints the reward of a random policy and what is found, 0.85, on starts that were not trained on, and keeps the
+network in `policy.npz`.
 """
 
 import sys
@@ -46,24 +47,23 @@ def rewards(weights: np.ndarray, seed: int, starts: int = STARTS) -> np.ndarray:
     return total.reshape(networks, starts).mean(axis=1) / STEPS
 
 
-def train(seconds: float = np.inf, generations: float = np.inf) -> np.ndarray:
-    """Searches for so long, or for so many draws, and answers the weights of the best network."""
+def train(generations: int) -> np.ndarray:
+    """Searches for so many draws, and answers the weights of the best network."""
     search = cma.CMAEvolutionStrategy(np.zeros(SIZE), 0.5, {"popsize": 48, "seed": 1, "verbose": -9})
-    began, steps, generation = time.monotonic(), 0, 0
-    while time.monotonic() - began < seconds and generation < generations:
+    began, steps = time.monotonic(), 0
+    for generation in range(generations):
         drawn = search.ask()
         # Starts that change with the draws: nothing is learned by heart.
         search.tell(drawn, list(-rewards(np.array(drawn), seed=1000 * generation)))
-        generation += 1
         steps += len(drawn) * STARTS * STEPS
-        if generation % 20 == 0:
+        if generation % 20 == 19:
             took = time.monotonic() - began
             print(f"{took:5.1f} s, {steps / 1e6:5.1f} million steps: best {-search.best.f:.3f}", flush=True)
     return search.result.xfavorite
 
 
 def main() -> None:
-    found = train(float(sys.argv[1]) if len(sys.argv) > 1 else 60.0)
+    found = train(int(sys.argv[1]) if len(sys.argv) > 1 else 300)
     np.savez("policy.npz", weights=found)
     random = np.random.default_rng(0).normal(size=SIZE)
     for name, weights in [("a random policy", random), ("the policy found", found)]:

@@ -8,7 +8,7 @@ use pendularm::math::pid::Gains;
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pyfunction, pymethods};
 use pyo3::types::PyDict;
 
-use crate::fields::{self, Bound, Held, Object, joints_or, refused};
+use crate::fields::{self, Bound, Held, Object, Real, Whole, joints_or, refused};
 
 /// Rods of 2 or 3 links.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,13 +42,17 @@ pub(crate) struct Arm {
 #[pymethods]
 impl Arm {
     #[new]
-    #[pyo3(signature = (links=2, *, lengths=None, masses=None, gravity=9.81))]
+    #[pyo3(
+        signature = (links=Whole::Is(2), *, lengths=None, masses=None, gravity=Real::Is(9.81)),
+        text_signature = "(links=2, *, lengths=None, masses=None, gravity=9.81)"
+    )]
     fn new(
-        links: usize,
+        links: Whole,
         lengths: Option<&Object<'_>>,
         masses: Option<&Object<'_>>,
-        gravity: f64,
+        gravity: Real,
     ) -> PyResult<Self> {
+        let gravity = gravity.read("gravity")?;
         let chain = match fields::links(links)? {
             2 => Chain::Two(read(lengths, masses, gravity)?),
             _ => Chain::Three(read(lengths, masses, gravity)?),
@@ -119,8 +123,8 @@ pub(crate) fn or_default(arm: Option<&Held<'_, Arm>>) -> Chain {
 
 /// The gains of a fresh runtime: `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each.
 #[pyfunction]
-#[pyo3(signature = (links=2))]
-pub(crate) fn default_gains(py: Python<'_>, links: usize) -> PyResult<Held<'_, PyDict>> {
+#[pyo3(signature = (links=Whole::Is(2)), text_signature = "(links=2)")]
+pub(crate) fn default_gains(py: Python<'_>, links: Whole) -> PyResult<Held<'_, PyDict>> {
     fn listed<const N: usize>(gains: Gains<N>) -> [(&'static str, Vec<f64>); 3] {
         [("kp", gains.kp), ("ki", gains.ki), ("kd", gains.kd)]
             .map(|(name, gain)| (name, gain.to_vec()))

@@ -8,7 +8,7 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Arm, Chain, for_either};
-use crate::fields::{Bound, Held, Numbers, Object, Rows, joints_or, refused};
+use crate::fields::{Bound, Held, Numbers, Object, Real, Rows, joints_or, refused};
 
 /// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,7 +32,7 @@ fn each_row<'py, const N: usize, const K: usize>(
     py: Python<'py>,
     fields: [(&str, &Object<'py>); K],
     answer: Shape,
-    function: impl Fn([[f64; N]; K], &mut Vec<f64>),
+    function: impl Fn([[f64; N]; K], &mut Vec<f64>) + Sync,
 ) -> PyResult<Object<'py>> {
     all_rows(py, N, fields, answer, |rows, count, out| {
         for index in 0..count {
@@ -47,27 +47,40 @@ fn all_rows<'py, const K: usize>(
     links: usize,
     fields: [(&str, &Object<'py>); K],
     answer: Shape,
-    function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>),
+    function: impl FnOnce(&[Rows<'_>; K], usize, &mut Vec<f64>) + Send,
 ) -> PyResult<Object<'py>> {
     let mut given = Vec::with_capacity(K);
     for (field, value) in fields {
         given.push((field, Numbers::read(field, value)?));
     }
-    let count = given.iter().find_map(|(_, numbers)| match numbers.shape() {
-        [count, _] => Some(*count),
-        _ => None,
-    });
+    let counts = || {
+        given
+            .iter()
+            .filter_map(|(_, numbers)| match numbers.shape() {
+                [count, _] => Some(*count),
+                _ => None,
+            })
+    };
+    // A table of one row goes with those of more.
+    let count = counts().find(|&count| count != 1).or(counts().next());
     let mut rows: Vec<Rows<'_>> = Vec::with_capacity(K);
     for (_, numbers) in &given {
-        rows.push(numbers.rows(count.unwrap_or(1), links, None)?);
+        let each = match numbers.shape() {
+            [1, _] => 1,
+            _ => count.unwrap_or(1),
+        };
+        rows.push(numbers.rows(each, links, None)?.of_one_for_all());
     }
     let rows: [Rows<'_>; K] = rows
         .try_into()
         .map_err(|_| refused("as many rows as fields"))?;
-    let is_one = rows.iter().all(|row| row.count().is_none());
     let mut flat = Vec::new();
-    function(&rows, count.unwrap_or(1), &mut flat);
-    let mut shape: Vec<usize> = count.filter(|_| !is_one).into_iter().collect();
+    match count {
+        // Less work than to hand the interpreter's lock to another thread.
+        None => function(&rows, 1, &mut flat),
+        Some(count) => py.detach(|| function(&rows, count, &mut flat)),
+    }
+    let mut shape: Vec<usize> = count.into_iter().collect();
     match answer {
         Shape::One => {}
         Shape::Point => shape.push(2),
@@ -254,14 +267,19 @@ pub(crate) fn end_effector<'py>(
 pub(crate) fn inverse_kinematics<'py>(
     py: Python<'py>,
     arm: Held<'py, Arm>,
-    x: f64,
-    y: f64,
-    phi: Option<f64>,
+    x: Real,
+    y: Real,
+    phi: Option<Real>,
     present: Option<Object<'py>>,
 ) -> PyResult<Held<'py, numpy::PyArray1<f64>>> {
+    if arm.get().links() == 2 && phi.is_some() {
+        return Err(refused(
+            "phi must be left out for an arm of 2 links: x and y decide its heading",
+        ));
+    }
     let target = kinematics::Target {
-        position: [x, y].into(),
-        orientation: phi,
+        position: [x.read("x")?, y.read("y")?].into(),
+        orientation: phi.map(|phi| phi.read("phi")).transpose()?,
     };
     for_either!(Chain, &arm.get().chain, arm => {
         let present = joints_or("present", present.as_ref(), Bound::Finite, [0.0; _])?;

@@ -3,14 +3,16 @@
 //! **Invariant:** a value that is refused is a `ValueError` that names its field, what it must be, and what it was.
 
 use std::borrow::Cow;
+use std::convert::Infallible;
 use std::fmt::Display;
 
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pyo3::exceptions::PyValueError;
-use pyo3::prelude::{PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
+use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
 use pyo3::types::PyDict;
+use pyo3::{Borrowed, PyTypeInfo};
 
 /// The numbers that a field may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -138,12 +140,19 @@ impl<'py> Numbers<'py> {
     }
 }
 
-/// Converts whatever NumPy can make doubles of.
+/// Converts whatever NumPy can make doubles of; complex numbers and text are none.
 fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
-    let array = py
-        .import("numpy")?
-        .call_method1("asarray", (value, "float64"))?;
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (value,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    let array = if kind == "O" {
+        numpy.call_method1("asarray", (array, "float64"))?
+    } else {
+        let how = PyDict::new(py);
+        how.set_item("casting", "same_kind")?;
+        array.call_method("astype", ("float64",), Some(&how))?
+    };
     Ok(array.cast_into()?)
 }
 
@@ -165,9 +174,12 @@ impl Rows<'_> {
         }
     }
 
-    /// How many rows there are, unless one stands for all.
-    pub(crate) fn count(&self) -> Option<usize> {
-        (!self.is_one).then(|| self.values.len() / self.width)
+    /// The same, where a single row goes with every row of others.
+    pub(crate) fn of_one_for_all(self) -> Self {
+        Self {
+            is_one: self.values.len() == self.width,
+            ..self
+        }
     }
 
     /// The row of an arm. `N` is the width that was asked for.
@@ -253,18 +265,94 @@ pub(crate) fn joints_or<const N: usize>(
     value.map_or(Ok(missing), |value| joints(field, value, bound))
 }
 
+/// What was handed in for a number; it is judged where its field's name is known.
+#[derive(Debug)]
+pub(crate) enum Real {
+    Is(f64),
+    Other(String),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Real {
+    type Error = Infallible;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> Result<Self, Infallible> {
+        Ok(value
+            .extract()
+            .map_or_else(|_| Self::Other(shown(&value)), Self::Is))
+    }
+}
+
+impl Real {
+    /// The number, whichever it is.
+    pub(crate) fn read(self, field: &str) -> PyResult<f64> {
+        match self {
+            Self::Is(value) => Ok(value),
+            Self::Other(value) => Err(refused(format_args!(
+                "{field} must be a number, got {value}"
+            ))),
+        }
+    }
+}
+
+/// What was handed in for a whole number that is not negative; it is judged where its field's name is known.
+#[derive(Debug)]
+pub(crate) enum Whole {
+    Is(u64),
+    Other(String),
+}
+
+impl<'py> FromPyObject<'_, 'py> for Whole {
+    type Error = Infallible;
+
+    fn extract(value: Borrowed<'_, 'py, PyAny>) -> Result<Self, Infallible> {
+        Ok(value
+            .extract()
+            .map_or_else(|_| Self::Other(shown(&value)), Self::Is))
+    }
+}
+
+impl Whole {
+    /// The number, whichever it is.
+    pub(crate) fn read(self, field: &str) -> PyResult<u64> {
+        match self {
+            Self::Is(value) => Ok(value),
+            Self::Other(value) => Err(refused(format_args!(
+                "{field} must be a whole number, at least 0 and less than 2^64, got {value}"
+            ))),
+        }
+    }
+
+    /// The number, from 1 to `most`.
+    pub(crate) fn up_to(self, most: usize, field: &str) -> PyResult<usize> {
+        let refusal = |value: &dyn Display| {
+            refused(format_args!(
+                "{field} must be between 1 and {most}, got {value}"
+            ))
+        };
+        match self {
+            Self::Is(value) => usize::try_from(value)
+                .ok()
+                .filter(|value| (1..=most).contains(value))
+                .ok_or_else(|| refusal(&value)),
+            Self::Other(value) => Err(refusal(&value)),
+        }
+    }
+}
+
 /// One number.
-pub(crate) fn number(field: &str, value: f64, bound: Bound) -> PyResult<f64> {
+pub(crate) fn number(field: &str, value: Real, bound: Bound) -> PyResult<f64> {
+    let value = value.read(field)?;
     held(field, &[value], bound, |_| String::new())?;
     Ok(value)
 }
 
 /// 2 or 3.
-pub(crate) fn links(value: usize) -> PyResult<usize> {
-    if (2..=3).contains(&value) {
-        Ok(value)
-    } else {
-        Err(refused(format_args!("links must be 2 or 3, got {value}")))
+pub(crate) fn links(value: Whole) -> PyResult<usize> {
+    match value {
+        Whole::Is(2) => Ok(2),
+        Whole::Is(3) => Ok(3),
+        Whole::Is(value) => Err(refused(format_args!("links must be 2 or 3, got {value}"))),
+        Whole::Other(value) => Err(refused(format_args!("links must be 2 or 3, got {value}"))),
     }
 }
 
@@ -276,12 +364,22 @@ pub(crate) fn method(field: &str, name: &str) -> PyResult<Method> {
 
 /// Gains by their names, `{"kp": …, "ki": …, "kd": …}`; one that is left out is that of `missing`.
 pub(crate) fn gains<const N: usize>(
-    value: Option<&Held<'_, PyDict>>,
+    value: Option<&Object<'_>>,
     missing: Gains<N>,
 ) -> PyResult<Gains<N>> {
-    let Some(gains) = value else {
+    let Some(value) = value else {
         return Ok(missing);
     };
+    let gains = PyDict::type_object(value.py())
+        .call1((value,))
+        .ok()
+        .and_then(|gains| gains.cast_into::<PyDict>().ok())
+        .ok_or_else(|| {
+            refused(format_args!(
+                "gains must be a mapping with kp, ki and kd, got {}",
+                shown(value)
+            ))
+        })?;
     for name in gains.keys() {
         if !["kp", "ki", "kd"].contains(&name.to_string().as_str()) {
             return Err(refused(format_args!(

@@ -15,7 +15,7 @@ use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::PyDict;
 
 use crate::arm::{Arm, Chain, for_either, or_default};
-use crate::fields::{self, Bound, Held, Object, joints, joints_or, refused};
+use crate::fields::{self, Bound, Held, Object, Real, Whole, joints, joints_or, refused};
 use crate::patience::{hold, until_done};
 
 /// Steps between two looks at the clock: some hundred microseconds.
@@ -64,7 +64,7 @@ fn begin<const N: usize>(
     arm: Rods<N>,
     method: Method,
     timestep: f64,
-    gains: Option<&Held<'_, PyDict>>,
+    gains: Option<&Object<'_>>,
 ) -> PyResult<Mutex<Loop<N>>>
 where
     Gains<N>: Default,
@@ -78,12 +78,15 @@ where
 #[pymethods]
 impl Simulation {
     #[new]
-    #[pyo3(signature = (arm=None, *, method="rk4", timestep=0.001, gains=None))]
+    #[pyo3(
+        signature = (arm=None, *, method="rk4", timestep=Real::Is(0.001), gains=None),
+        text_signature = "(arm=None, *, method=\"rk4\", timestep=0.001, gains=None)"
+    )]
     fn new(
         arm: Option<&Held<'_, Arm>>,
         method: &str,
-        timestep: f64,
-        gains: Option<&Held<'_, PyDict>>,
+        timestep: Real,
+        gains: Option<&Object<'_>>,
     ) -> PyResult<Self> {
         let method = fields::method("method", method)?;
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
@@ -96,9 +99,9 @@ impl Simulation {
 
     /// Takes up to `steps` steps and answers how many: all of them unless the simulation has diverged. The
     /// interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
-    #[pyo3(signature = (steps=1))]
-    fn step(&self, py: Python<'_>, steps: u64) -> PyResult<u64> {
-        let mut left = steps;
+    #[pyo3(signature = (steps=Whole::Is(1)), text_signature = "($self, steps=1)")]
+    fn step(&self, py: Python<'_>, steps: Whole) -> PyResult<u64> {
+        let mut left = steps.read("steps")?;
         let mut taken = 0;
         until_done(py, || {
             // Held for a piece only: a signal's handler may want to look at the arm.
@@ -183,7 +186,7 @@ impl Simulation {
 
     /// Adds `effort` [N m], (links,), to that of every step that begins within `duration` [s] from now, in place of
     /// what was added so far. With the controller off, this is all the effort there is.
-    fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: f64) -> PyResult<()> {
+    fn disturb(&self, py: Python<'_>, effort: &Object<'_>, duration: Real) -> PyResult<()> {
         let duration = fields::number("duration", duration, Bound::Positive)?;
         for_either!(Either, &self.own, one => {
             let effort = joints("effort", effort, Bound::Finite)?;
@@ -295,7 +298,7 @@ impl Simulation {
     }
 
     #[setter]
-    fn set_timestep(&self, py: Python<'_>, timestep: f64) -> PyResult<()> {
+    fn set_timestep(&self, py: Python<'_>, timestep: Real) -> PyResult<()> {
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
         for_either!(Either, &self.own, one => hold(py, one).set_timestep(timestep));
         Ok(())

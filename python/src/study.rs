@@ -17,7 +17,7 @@ use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::arm::{Arm, Chain, for_either, or_default};
-use crate::fields::{self, Bound, Held, Object, joints_or, refused};
+use crate::fields::{self, Bound, Held, Object, Real, Whole, joints_or, refused};
 use crate::patience::until_done;
 
 /// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
@@ -31,7 +31,7 @@ pub(crate) fn stability<'py>(
     py: Python<'py>,
     arm: Option<Held<'py, Arm>>,
     integrator: &str,
-    gains: Option<Held<'py, PyDict>>,
+    gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     q: Option<Object<'py>>,
     qd: Option<Object<'py>>,
@@ -102,10 +102,14 @@ fn read_state<const N: usize>(
 // ---- rollout --------------------------------------------------------------------------------------------------------
 
 #[pyfunction]
-#[pyo3(signature = (
-    arm=None, *, q0=None, qdot0=None, duration=10.0, timestep=0.001, integrator="rk4", gains=None, setpoint=None,
-    samples=1001, reference=false
-))]
+#[pyo3(
+    signature = (
+        arm=None, *, q0=None, qdot0=None, duration=Real::Is(10.0), timestep=Real::Is(0.001), integrator="rk4",
+        gains=None, setpoint=None, samples=Whole::Is(1001), reference=false
+    ),
+    text_signature = "(arm=None, *, q0=None, qdot0=None, duration=10.0, timestep=0.001, integrator=\"rk4\", \
+                      gains=None, setpoint=None, samples=1001, reference=False)"
+)]
 #[expect(
     clippy::too_many_arguments,
     reason = "they are the fields of the service, by name"
@@ -115,14 +119,16 @@ pub(crate) fn rollout<'py>(
     arm: Option<Held<'py, Arm>>,
     q0: Option<Object<'py>>,
     qdot0: Option<Object<'py>>,
-    duration: f64,
-    timestep: f64,
+    duration: Real,
+    timestep: Real,
     integrator: &str,
-    gains: Option<Held<'py, PyDict>>,
+    gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
-    samples: u64,
+    samples: Whole,
     reference: bool,
 ) -> PyResult<Held<'py, PyDict>> {
+    let (duration, timestep) = (duration.read("duration")?, timestep.read("timestep")?);
+    let samples = samples.read("samples")?;
     let method = fields::method("integrator", integrator)?;
     for_either!(Chain, or_default(arm.as_ref()), arm => {
         run(py, Plan {
@@ -195,22 +201,28 @@ fn listed_run<'py, const N: usize>(
 // ---- gains ----------------------------------------------------------------------------------------------------------
 
 #[pyfunction]
-#[pyo3(signature = (arm=None, *, settling_time=4.0, margin=1.25, timestep=0.001, integrator="rk4"))]
+#[pyo3(
+    signature = (
+        arm=None, *, settling_time=Real::Is(4.0), margin=Real::Is(1.25), timestep=Real::Is(0.001), integrator="rk4"
+    ),
+    text_signature = "(arm=None, *, settling_time=4.0, margin=1.25, timestep=0.001, integrator=\"rk4\")"
+)]
 pub(crate) fn suggest_gains<'py>(
     py: Python<'py>,
     arm: Option<Held<'py, Arm>>,
-    settling_time: f64,
-    margin: f64,
-    timestep: f64,
+    settling_time: Real,
+    margin: Real,
+    timestep: Real,
     integrator: &str,
 ) -> PyResult<Held<'py, PyDict>> {
     let wish = Wish {
         settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
         margin: fields::number("margin", margin, Bound::Positive)?,
     };
-    if margin < 1.0 {
+    if wish.margin < 1.0 {
         return Err(refused(format_args!(
-            "margin must be at least 1, got {margin}"
+            "margin must be at least 1, got {}",
+            wish.margin
         )));
     }
     let method = fields::method("integrator", integrator)?;
@@ -241,12 +253,12 @@ pub(crate) fn suggest_gains<'py>(
 )]
 pub(crate) fn plan<'py>(
     py: Python<'py>,
-    error: f64,
+    error: Real,
     arm: Option<Held<'py, Arm>>,
-    duration: Option<f64>,
+    duration: Option<Real>,
     q0: Option<Object<'py>>,
     qdot0: Option<Object<'py>>,
-    gains: Option<Held<'py, PyDict>>,
+    gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
 ) -> PyResult<Held<'py, PyDict>> {
     let error = fields::number("error", error, Bound::Positive)?;
@@ -256,7 +268,7 @@ pub(crate) fn plan<'py>(
         let mut planning = Planning::new(Task {
             control,
             start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
-            duration: fields::number("duration", duration.unwrap_or(usual), Bound::Positive)?,
+            duration: fields::number("duration", duration.unwrap_or(Real::Is(usual)), Bound::Positive)?,
             error,
         }).map_err(refused)?;
         let planned = until_done(py, || planning.advance())?.map_err(refused)?;
@@ -266,9 +278,14 @@ pub(crate) fn plan<'py>(
 
 fn read_loop<const N: usize>(
     arm: Rods<N>,
-    gains: Option<&Held<'_, PyDict>>,
+    gains: Option<&Object<'_>>,
     setpoint: Option<&Object<'_>>,
 ) -> PyResult<ControlLoop<N>> {
+    if gains.is_none() && setpoint.is_some() {
+        return Err(refused(
+            "setpoint must be left out without gains: nothing controls the arm",
+        ));
+    }
     let gains = fields::gains(gains, no_control())?;
     let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
     Ok(ControlLoop::new(arm, gains, setpoint))

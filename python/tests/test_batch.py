@@ -1,6 +1,7 @@
 """Many arms are as many single ones, to the bit, whatever shares the work."""
 
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -154,7 +155,10 @@ def test_arrays_go_in_as_they_lie():
     [
         (lambda batch: pendularm.Batch(0), "n_arms must be between 1 and 1000000, got 0"),
         (lambda batch: pendularm.Batch(1_000_001), "n_arms must be between 1 and 1000000, got 1000001"),
+        (lambda batch: pendularm.Batch(-1), "n_arms must be between 1 and 1000000, got -1"),
         (lambda batch: pendularm.Batch(2, 5), "links must be 2 or 3, got 5"),
+        (lambda batch: pendularm.Batch(2, -2), "links must be 2 or 3, got -2"),
+        (lambda batch: pendularm.Batch(2, threads=-1), "threads must be between 1 and 1024, got -1"),
         (lambda batch: pendularm.Batch(2, threads=2000), "threads must be between 1 and 1024, got 2000"),
         (lambda batch: pendularm.Batch(2, threads=0), "threads must be between 1 and 1024, got 0"),
         (lambda batch: batch.step([1, 2]), "steps must be a whole number, or one for each of 3 arms"),
@@ -186,6 +190,58 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     assert str(refusal.value) == said
     batch.step()
     assert batch.time.tolist() == [0.001] * 3
+
+
+class Interrupted(Exception):
+    pass
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers that send signals here")
+def test_an_interrupted_call_leaves_no_effort_on(links):
+    def interrupt(*_):
+        raise Interrupted
+
+    batch = pendularm.Batch(3, links, threads=1)
+    before = signal.signal(signal.SIGALRM, interrupt)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        with pytest.raises(Interrupted):
+            batch.step([10**12, 0, 10**12], np.ones(links))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+    assert batch.time[0] > 0
+    assert (batch.effort[0] == 1).all()
+    single = pendularm.Simulation(pendularm.Arm(links))
+    single.set_state(batch.position[0], batch.velocity[0])
+    batch.step(5)
+    single.step(5)
+    assert not batch.effort.any()
+    # But for what the steps before had carried of their rounding.
+    assert np.allclose(batch.position[0], single.position, rtol=1e-12)
+
+
+def test_what_is_refused_has_not_happened():
+    batch, other = pendularm.Batch(2), pendularm.Batch(1, threads=1)
+    batch.set_setpoint([1.0, 1.0])
+    batch.enable()
+    batch.step(100)
+    before = batch.energy.tolist()
+    pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position[:1]))
+    pushing.start()
+    try:
+        # From its first piece on; there are a dozen.
+        while other.time[0] == 0:
+            time.sleep(0.001)
+        for change in [batch.reset, lambda: batch.set_state([0.1, 0.1]), lambda: batch.enable(False)]:
+            with pytest.raises(ValueError, match="own arrays are in use elsewhere"):
+                change()
+            assert batch.energy.tolist() == before
+        assert pushing.is_alive()
+    finally:
+        pushing.join()
+    batch.step()
+    assert batch.effort.any()
 
 
 def test_the_interpreters_lock_is_released_while_it_steps():

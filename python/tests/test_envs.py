@@ -106,6 +106,38 @@ def test_swinging_up_pays():
     assert (env._task.efforts < load).all()
 
 
+@pytest.mark.parametrize("kind", [pendularm.envs.PendularmEnv, pendularm.envs.PendularmReachVectorEnv])
+def test_there_is_no_rendering(kind):
+    with pytest.raises(ValueError, match="render_mode must be None, got 'human'"):
+        kind(render_mode="human")
+
+
+@pytest.mark.parametrize(
+    "actions", [np.zeros((3, 1)), np.zeros((1, 2)), 0.0, np.zeros((2, 2)), np.zeros((3, 2), complex)]
+)
+def test_actions_have_a_row_for_each_arm(actions):
+    env = pendularm.envs.PendularmVectorEnv(3)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"actions must have the shape \(3, 2\)"):
+        env.step(actions)
+    one = pendularm.envs.PendularmEnv()
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match=r"action must have the shape \(2,\)"):
+        one.step(actions)
+
+
 def test_a_step_needs_a_reset():
     with pytest.raises(gymnasium.error.ResetNeeded):
         gymnasium.make_vec("Pendularm-v0", 2).step(np.zeros((2, 2), np.float32))
+
+
+@pytest.mark.parametrize(
+    ("kind", "steps"), [(pendularm.envs.PendularmVectorEnv, 200), (pendularm.envs.PendularmReachVectorEnv, 100)]
+)
+def test_a_vector_environment_by_itself_truncates_where_its_page_says(kind, steps):
+    assert f"truncated after {steps} steps" in kind.__doc__
+    env = kind(2)
+    env.reset(seed=0)
+    for _ in range(steps - 1):
+        assert not env.step(np.zeros((2, 2), np.float32))[3].any()
+    assert env.step(np.zeros((2, 2), np.float32))[3].all()

@@ -6,6 +6,7 @@ import sys
 import sysconfig
 import time
 import urllib.request
+from importlib.metadata import files
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,12 @@ def test_it_comes_with_completions_and_a_manual():
     assert (share / "bash-completion/completions/pendularm").is_file()
 
 
+def test_the_licences_are_in_the_wheel():
+    found = {file.name: file.read_text() for file in files("pendularm") if file.name.startswith("LICENSE")}
+    assert found.keys() == {"LICENSE-MIT", "LICENSE-APACHE"}
+    assert "Permission is hereby granted" in found["LICENSE-MIT"]
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
 @pytest.mark.parametrize("way", WAYS, ids=["on the path", "as a module"])
 def test_it_serves_the_page_until_a_signal(way, number):
@@ -61,6 +68,15 @@ def test_a_report_can_be_read(tmp_path):
     assert len(table["mass_ratio"]) == len(lines) - 1
     assert table["mass_ratio"][0] == 1e-9
     assert table["pose"][0] == "3 links, bent"
+
+
+def test_a_report_that_cannot_be_read_is_said_so(tmp_path):
+    (tmp_path / "error.csv").write_text("")
+    with pytest.raises(ValueError, match=r"error\.csv has no head"):
+        pendularm.read_report(tmp_path)
+    (tmp_path / "error.csv").write_text("a,b\n1,2\n3\n")
+    with pytest.raises(ValueError, match=r"error\.csv has 1 cells in row 2, and 2 in its head"):
+        pendularm.read_report(tmp_path)
 
 
 def test_no_report_is_said_so(tmp_path):

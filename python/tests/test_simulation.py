@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+import types
 
 import numpy as np
 import pytest
@@ -141,6 +142,26 @@ def test_arms_are_values():
         (lambda arm: setattr(arm, "arm", pendularm.Arm(3)), "arm must have as many links as the one before"),
         (lambda arm: pendularm.Simulation(gains={"kx": [1, 1]}), "gains has kp, ki and kd, got 'kx'"),
         (lambda arm: pendularm.Simulation(gains={"kp": [1]}), "gains.kp must be an array of 2 numbers, got [1]"),
+        (lambda arm: pendularm.Simulation(gains=5), "gains must be a mapping with kp, ki and kd, got 5"),
+        (lambda arm: pendularm.Arm(-1), "links must be 2 or 3, got -1"),
+        (lambda arm: pendularm.Arm(2.5), "links must be 2 or 3, got 2.5"),
+        (lambda arm: pendularm.default_gains(-1), "links must be 2 or 3, got -1"),
+        (lambda arm: pendularm.Arm(gravity="9"), "gravity must be a number, got '9'"),
+        (lambda arm: arm.step(-1), "steps must be a whole number, at least 0 and less than 2^64, got -1"),
+        (lambda arm: arm.step("3"), "steps must be a whole number, at least 0 and less than 2^64, got '3'"),
+        (lambda arm: arm.disturb([0, 0], "1"), "duration must be a number, got '1'"),
+        (lambda arm: pendularm.Simulation(timestep="1"), "timestep must be a number, got '1'"),
+        (lambda arm: setattr(arm, "timestep", "1"), "timestep must be a number, got '1'"),
+        (lambda arm: pendularm.inverse_kinematics(arm.arm, "1", 1), "x must be a number, got '1'"),
+        (
+            lambda arm: pendularm.inverse_kinematics(arm.arm, 1, 1, 0.5),
+            "phi must be left out for an arm of 2 links: x and y decide its heading",
+        ),
+        (
+            lambda arm: arm.set_state(np.array([1, 2 + 1j])),
+            "position must be an array of numbers, got array([1.+0.j, 2.+1.j])",
+        ),
+        (lambda arm: arm.set_state(["1", "2"]), "position must be an array of numbers, got ['1', '2']"),
     ],
 )
 def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
@@ -150,6 +171,13 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
         wrong(arm)
     assert str(refusal.value) == said
     assert (arm.position.tolist(), arm.gains["kd"].tolist(), arm.timestep, arm.method) == before
+
+
+def test_gains_may_be_any_mapping():
+    given = types.MappingProxyType({"kp": [1, 2], "kd": None})
+    found = pendularm.Simulation(gains=given).gains
+    assert found["kp"].tolist() == [1, 2]
+    assert found["kd"].tolist() == pendularm.default_gains()["kd"].tolist()
 
 
 def test_threads_share_one_arm():

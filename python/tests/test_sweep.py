@@ -1,6 +1,9 @@
 """Sweeps: the same bits from any number of workers, kept on disk and gone on with, also where a worker is lost."""
 
+import functools
 import json
+import os
+import signal
 import subprocess
 import sys
 import threading
@@ -52,6 +55,20 @@ def test_neither_workers_nor_pieces_change_a_bit():
         assert np.array_equal(found["settling_time"], expected)
 
 
+def test_threads_are_as_many_as_cores():
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    before, most = threading.active_count(), 0
+
+    def count(run):
+        nonlocal most
+        most = max(most, threading.active_count())
+        time.sleep(0.02)
+        return run.energy[-1]
+
+    pendularm.sweep({"kp": range(8 * cores)}, count, duration=0.1, samples=2, piece=1, progress=False)
+    assert most - before == cores
+
+
 class Stopping(ThreadPoolExecutor):
     """One thread, which fails after so many pieces."""
 
@@ -93,6 +110,132 @@ def test_a_folder_holds_one_sweep(tmp_path):
         pendularm.sweep({"kp": [1, 3]}, "settling_time", folder=tmp_path, **small)
 
 
+def test_numbers_of_numpy_are_numbers(tmp_path):
+    ask = {"grid": {"kp": [1.0, 2.0]}, "folder": tmp_path}
+    one = pendularm.sweep(
+        duration=np.float32(0.5), samples=np.int64(11), links=np.int8(2), servo=np.bool_(True), piece=np.int64(1), **ask
+    )
+    other = pendularm.sweep(duration=0.5, samples=11, links=2, servo=True, piece=1, **ask)
+    assert np.array_equal(one["settling_time"], other["settling_time"])
+
+
+def test_a_folder_knows_the_order_of_the_grid(tmp_path):
+    small = {**FIXED, "duration": 0.1}
+    grid = {"kp": [50.0, 500.0], "kd": [2.0, 20.0, 100.0]}
+    found = pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"]
+    assert found.shape == (2, 3)
+    with pytest.raises(ValueError, match="holds another sweep: it differs in grid"):
+        pendularm.sweep(dict(reversed(grid.items())), "final_error", folder=tmp_path, **small)
+    assert np.array_equal(pendularm.sweep(grid, "final_error", folder=tmp_path, **small)["final_error"], found)
+
+
+def test_what_is_damaged_in_a_folder_is_done_again_or_said(tmp_path):
+    ask = {"grid": {"kp": [1.0, 2.0, 3.0]}, "duration": 0.1, "folder": tmp_path, "piece": 1}
+    expected = pendularm.sweep(**ask)["settling_time"]
+    assert not list(tmp_path.glob("part-*"))
+    file = tmp_path / "000000000001.npz"
+    whole = file.read_bytes()
+    np.save(tmp_path / "other.npy", expected)
+    flipped = [whole[:at] + bytes([whole[at] ^ 255]) + whole[at + 1 :] for at in range(len(whole))]
+    for damaged in [b"", b"x" * 500, whole[:-1], whole[:40], (tmp_path / "other.npy").read_bytes(), *flipped[::7]]:
+        file.write_bytes(damaged)
+        assert np.array_equal(pendularm.sweep(**ask)["settling_time"], expected)
+    for values in [{"settling_time": np.zeros(2)}, {"other": np.zeros(1)}, {}]:
+        np.savez(file, **values)
+        assert np.array_equal(pendularm.sweep(**ask)["settling_time"], expected)
+    question = tmp_path / "sweep.json"
+    for damaged in [b"", b"{", b"[1]", b"null", b"\xff"]:
+        question.write_bytes(damaged)
+        with pytest.raises(ValueError, match=r"holds a sweep\.json that cannot be read"):
+            pendularm.sweep(**ask)
+    question.unlink()
+    with pytest.raises(ValueError, match=r"holds pieces of a sweep without their sweep\.json"):
+        pendularm.sweep(**ask)
+    with pytest.raises(ValueError, match="folder .* must be a folder"):
+        pendularm.sweep(**{**ask, "folder": file})
+
+
+TOGETHER = """
+import sys, numpy as np, pendularm
+print("here", flush=True)
+sys.stdin.readline()
+grid = {"kp": np.geomspace(50, 2000, 300)}
+found = pendularm.sweep(grid, duration=0.1, samples=2, piece=1, folder=sys.argv[1], progress=False)
+print(hash(found["settling_time"].tobytes()))
+"""
+
+
+def test_two_processes_may_share_a_folder(tmp_path):
+    begin = lambda: subprocess.Popen(
+        [sys.executable, "-c", TOGETHER, str(tmp_path)],
+        env={**os.environ, "PYTHONHASHSEED": "0"},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    both = [begin() for _ in range(2)]
+    assert [one.stdout.readline() for one in both] == ["here\n"] * 2
+    for one in both:
+        one.stdin.write("\n")
+        one.stdin.flush()
+    said = [one.communicate(timeout=60)[0] for one in both]
+    assert [one.returncode for one in both] == [0, 0]
+    assert said[0] == said[1]
+
+
+def test_a_folder_knows_the_code_of_a_metric(tmp_path):
+    def last(factor, kind="position"):
+        return lambda run: [factor * run.positions[-1, :, 0] for _ in (0, 1) if kind in {"position", "first"}][0]
+
+    ask = {"grid": {"kp": [1.0, 2.0]}, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
+    found = pendularm.sweep(metric=last(1.0), **ask)["metric"]
+    assert np.array_equal(pendularm.sweep(metric=last(1.0), **ask)["metric"], found)
+    first, second = (lambda run: run.positions[-1, :, 0]), (lambda run: run.positions[-1, :, 1])
+    for other in [last(2.0), last(1.0, "first"), first, second]:
+        with pytest.raises(ValueError, match="holds another sweep: it differs in metric"):
+            pendularm.sweep(metric=other, **ask)
+    kept = json.loads((tmp_path / "sweep.json").read_text())
+    assert kept["version"] == pendularm.__version__
+    (tmp_path / "sweep.json").write_text(json.dumps({**kept, "version": "0.0.1"}))
+    with pytest.raises(ValueError, match="holds another sweep: it differs in version"):
+        pendularm.sweep(metric=last(1.0), **ask)
+
+
+ELSEWHERE = """
+import sys, pendularm
+def metric(run):
+    inner = lambda: "energy" in {"energy", "effort", "time"} and 1.0
+    return inner() * run.energy[-1]
+pendularm.sweep({"kp": [1, 2]}, metric, duration=0.1, folder=sys.argv[1], progress=False)
+"""
+
+
+def test_a_folder_knows_a_metric_again_in_another_process(tmp_path):
+    for seed in ["1", "2", "3"]:
+        here = {**os.environ, "PYTHONHASHSEED": seed}
+        subprocess.run([sys.executable, "-c", ELSEWHERE, str(tmp_path)], env=here, check=True, timeout=60)
+
+
+def test_a_folder_refuses_a_metric_whose_code_it_cannot_know(tmp_path):
+    class Metric:
+        def __call__(self, run):
+            return run.energy[-1]
+
+        def method(self, run):
+            return run.energy[-1]
+
+    def of(run, held=None):
+        return run.energy[-1] if held else run.time[-1]
+
+    lock = threading.Lock()
+    ask = {"grid": {"kp": [1.0]}, "duration": 0.1}
+    for metric in [Metric(), Metric().method, functools.partial(of, held=1), lambda run: run.energy[-1] * bool(lock)]:
+        with pytest.raises(ValueError, match="^metric must be "):
+            pendularm.sweep(metric=metric, folder=tmp_path, **ask)
+        assert pendularm.sweep(metric=metric, **ask)["metric"].shape == (1,)
+    assert not (tmp_path / "sweep.json").exists()
+
+
 def test_a_function_may_be_the_metric():
     def both(run):
         assert run.positions.shape == (51, run.diverged.size, 2)
@@ -118,6 +261,38 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"timestep": ["x"]}), "every timestep must be a number, got ['x']"),
         (lambda: pendularm.sweep({"method": ["heun"]}), "method must be one of euler, midpoint, verlet, rk4"),
         (lambda: pendularm.sweep({"kp": [1]}, "speed"), "metric must be one of final_error, settling_time"),
+        (lambda: pendularm.sweep({"kp": [1]}, 5), "metric must be one of final_error, settling_time"),
+        (lambda: pendularm.sweep({"q0": [[0, 0], [np.nan, 0]]}), "q0[1][0] must be finite, got nan"),
+        (lambda: pendularm.sweep({"kp": [1]}, qdot0=np.inf), "qdot0[0][0] must be finite, got inf"),
+        (lambda: pendularm.sweep({"setpoint": [0, [1, np.nan]]}), "setpoint[1][1] must be finite, got nan"),
+        (lambda: pendularm.sweep({"masses": [1, np.array(1j)]}), "every masses must be a number or an array of 2, got"),
+        (lambda: pendularm.sweep({"gravity": ["9"]}), "every gravity must be a number, got ['9']"),
+        (lambda: pendularm.sweep({"kp": ["9"]}), "every kp must be a number or an array of 2, got ['9']"),
+        (lambda: pendularm.sweep([1]), "grid must be a mapping from settings to their values, got [1]"),
+        (lambda: pendularm.sweep({"kp": 5}), "grid['kp'] must be a sequence of values, got 5"),
+        (lambda: pendularm.sweep({"kp": [1]}, links=-1), "links must be 2 or 3, got -1"),
+        (lambda: pendularm.sweep({"kp": [1]}, links="2"), "links must be a whole number, got '2'"),
+        (lambda: pendularm.sweep({"kp": [1]}, samples=11.0), "samples must be a whole number, got 11.0"),
+        (lambda: pendularm.sweep({"kp": [1]}, piece="1"), "piece must be a whole number, got '1'"),
+        (lambda: pendularm.sweep({"kp": [1]}, duration="1"), "duration must be a number, got '1'"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: {1: run.energy[-1]}, duration=0.1),
+            "metric must name its numbers by text, other than 'file' and 'allow_pickle', got 1",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: {"file": run.energy[-1]}, duration=0.1),
+            "metric must name its numbers by text, other than 'file' and 'allow_pickle', got 'file'",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: [None], duration=0.1),
+            "metric must answer numbers or text, got metric of objects",
+        ),
+        (
+            lambda: pendularm.sweep(
+                {"setpoint": [0, 1]}, lambda run: {str(run.setpoint[0, 0]): run.energy[-1]}, duration=0.1, piece=1
+            ),
+            "metric must answer the same names for all arms, got 0.0 and 1.0",
+        ),
         (lambda: pendularm.sweep({"kp": [1]}, duration=-1), "duration must be finite and greater than 0, got -1"),
         (lambda: pendularm.sweep({"kp": [1]}, samples=1), "samples must be between 2 and 100000, got 1"),
         (lambda: pendularm.sweep({"kp": [1]}, samples=10**9), "samples must be between 2 and 100000, got 1000000000"),
@@ -125,6 +300,14 @@ def test_a_function_may_be_the_metric():
         (
             lambda: pendularm.sweep({"kp": [1]}, piece=10**6),
             "piece must be between 1 and 24937 with 401 samples, got 1000000",
+        ),
+        (
+            lambda: pendularm.sweep({"timestep": [1e-3, 1e-320]}, duration=1),
+            "duration / timestep must be at most 10000000 steps, got inf",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, duration=1e5),
+            "duration / timestep must be at most 10000000 steps, got 1e+08",
         ),
         (
             lambda: pendularm.sweep({"kp": range(4000), "kd": range(4000)}),
@@ -136,6 +319,55 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     with pytest.raises(ValueError) as refusal:
         wrong()
     assert str(refusal.value).startswith(said)
+
+
+FOREVER = """
+import pendularm, threading, time
+def metric(run):
+    raise AssertionError("no piece ends so soon")
+print("sweeping", flush=True)
+try:
+    pendularm.sweep({"kp": range(1024)}, metric, duration=1e4, samples=2, progress=False)
+except KeyboardInterrupt:
+    print("ended", threading.active_count())
+"""
+
+
+def test_ctrl_c_ends_a_sweep_amid_its_pieces():
+    with subprocess.Popen([sys.executable, "-c", FOREVER], stdout=subprocess.PIPE, text=True) as run:
+        try:
+            assert run.stdout is not None
+            assert run.stdout.readline() == "sweeping\n"
+            time.sleep(1)
+            run.send_signal(signal.SIGINT)
+            assert run.wait(60) == 0
+            assert run.stdout.read() == "ended 1\n"
+        finally:
+            run.kill()
+
+
+NOTEBOOK = """
+import pendularm
+pendularm.sweep({"kp": range(64)}, duration=0.1, samples=2, progress=%s)["settling_time"].shape
+"""
+
+
+# Jupyter's own warnings are Jupyter's.
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("wanted", [True, False])
+def test_a_notebook_shows_the_progress(wanted):
+    import nbclient
+    import nbformat
+
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(NOTEBOOK % wanted)])
+    nbclient.NotebookClient(book, timeout=300).execute()
+    shown = [output for output in book.cells[0].outputs if "(64," not in str(output)]
+    assert ("/64 " in str(shown)) is wanted
+
+
+def test_nothing_is_shown_off_a_terminal(capfd):
+    pendularm.sweep({"kp": [1, 2]}, duration=0.1)
+    assert capfd.readouterr() == ("", "")
 
 
 # A fork beside this process's threads is not asked for by these tests, but by older Pythons' default.

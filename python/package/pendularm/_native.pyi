@@ -1,6 +1,6 @@
 """Stubs of the compiled part; `python -m mypy.stubtest` holds them to it."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, final
 
 import numpy as np
@@ -70,7 +70,7 @@ class Simulation:
         *,
         method: str = "rk4",
         timestep: float = 0.001,
-        gains: dict[str, Any] | None = None,
+        gains: Mapping[str, ArrayLike | None] | None = None,
     ) -> Simulation: ...
     arm: Arm
     method: str
@@ -126,7 +126,9 @@ class Batch:
     def set_params(
         self, gravity: ArrayLike | None = None, masses: ArrayLike | None = None, lengths: ArrayLike | None = None
     ) -> None: ...
-    def set_integrator(self, method: str | Sequence[str] | None = None, timestep: ArrayLike | None = None) -> None: ...
+    def set_integrator(
+        self, method: str | Sequence[str] | NDArray[np.str_] | None = None, timestep: ArrayLike | None = None
+    ) -> None: ...
     def enable(self, data: bool = True) -> None: ...
     @property
     def n_arms(self) -> int: ...
@@ -166,7 +168,7 @@ def stability(
     arm: Arm | None = None,
     *,
     integrator: str = "rk4",
-    gains: dict[str, ArrayLike] | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
     q: ArrayLike | None = None,
     qd: ArrayLike | None = None,
@@ -179,7 +181,7 @@ def rollout(
     duration: float = 10.0,
     timestep: float = 0.001,
     integrator: str = "rk4",
-    gains: dict[str, ArrayLike] | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
     samples: int = 1001,
     reference: bool = False,
@@ -199,6 +201,6 @@ def plan(
     duration: float | None = None,
     q0: ArrayLike | None = None,
     qdot0: ArrayLike | None = None,
-    gains: dict[str, ArrayLike] | None = None,
+    gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
 ) -> dict[str, Any]: ...

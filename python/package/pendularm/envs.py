@@ -45,6 +45,8 @@ class _Task:
 
     strength: ClassVar[float]
     """Efforts that an action of 1 stands for, in parts of those that hold the stretched arm."""
+    most_steps: ClassVar[int]
+    """Steps after which an episode is truncated, unless told otherwise."""
 
     def __init__(self, arms: int, links: int, threads: int | None) -> None:
         self.batch = Batch(arms, links, threads=threads)
@@ -73,6 +75,7 @@ class _Task:
         raise NotImplementedError
 
     def go_on(self, actions: Action) -> None:
+        """Takes a step with every arm under its row of `actions`, (arms, links)."""
         self.batch.step(SUBSTEPS, np.clip(actions, -1.0, 1.0) * self.efforts)
 
     def observe(self) -> Observation:
@@ -86,6 +89,7 @@ class _Task:
 
 class _SwingUp(_Task):
     strength = 0.5
+    most_steps = 200
 
     def begin(self, arms: Sequence[int], random: Sequence[np.random.Generator]) -> None:
         off = np.array([one.uniform(-0.1, 0.1, (2, self.links)) for one in random])
@@ -100,6 +104,7 @@ class _SwingUp(_Task):
 
 class _Reach(_Task):
     strength = 2.0
+    most_steps = 100
 
     def __init__(self, arms: int, links: int, threads: int | None) -> None:
         super().__init__(arms, links, threads)
@@ -132,11 +137,25 @@ class _Reach(_Task):
         return 1.0 - np.hypot(self.away[:, 0], self.away[:, 1]) / (2 * self.reach)
 
 
+def _check_render_mode(render_mode: str | None) -> None:
+    if render_mode is not None:
+        raise ValueError(f"render_mode must be None, got {render_mode!r}")
+
+
+def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
+    """Actions of the space's shape; which numbers they are is left to who clips them."""
+    array = np.asarray(actions)
+    if array.shape != space.shape or array.dtype.kind not in "biuf":
+        raise ValueError(f"{name} must have the shape {space.shape}, of numbers, got {array.shape} of {array.dtype}")
+    return array
+
+
 class _Single(gymnasium.Env[Observation, Action]):
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
     task_of: ClassVar[type[_Task]]
 
     def __init__(self, links: int = 2, render_mode: str | None = None) -> None:
+        _check_render_mode(render_mode)
         self._task = self.task_of(1, links, 1)
         self.render_mode = render_mode
         self.observation_space = self._task.observation_space
@@ -150,7 +169,7 @@ class _Single(gymnasium.Env[Observation, Action]):
         return self._task.observe()[0], {}
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        self._task.go_on(np.asarray(action)[None])
+        self._task.go_on(_checked("action", action, self.action_space)[None])
         return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, {}
 
 
@@ -162,10 +181,13 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self,
         num_envs: int = 1,
         links: int = 2,
-        max_episode_steps: int = 200,
+        max_episode_steps: int | None = None,
         threads: int | None = None,
         render_mode: str | None = None,
     ) -> None:
+        _check_render_mode(render_mode)
+        if max_episode_steps is None:
+            max_episode_steps = self.task_of.most_steps
         if max_episode_steps < 1:
             raise ValueError(f"max_episode_steps must be at least 1, got {max_episode_steps}")
         self._task = self.task_of(num_envs, links, threads)
@@ -210,7 +232,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             raise gymnasium.error.ResetNeeded("reset has to come before the first step")
         # Arms that have ended are stepped with the others, and begin anew wherever that leads.
         again = self._ended
-        self._task.go_on(np.asarray(actions))
+        self._task.go_on(_checked("actions", actions, self.action_space))
         self._elapsed += 1
         rewards, lost = self._task.reward(), self._task.lost()
         if again.any():
@@ -309,10 +331,10 @@ class PendularmReachVectorEnv(_Vector):
     task_of = _Reach
 
 
-for _name, _steps in [("Pendularm", 200), ("PendularmReach", 100)]:
+for _name, _task in [("Pendularm", _SwingUp), ("PendularmReach", _Reach)]:
     gymnasium.register(
         f"{_name}-v0",
         entry_point=f"pendularm.envs:{_name}Env",
         vector_entry_point=f"pendularm.envs:{_name}VectorEnv",
-        max_episode_steps=_steps,
+        max_episode_steps=_task.most_steps,
     )

@@ -16,7 +16,8 @@ def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str
     """Reads every table of the report in `folder`, by the stem of its file, as columns by their names.
 
     A column is of doubles, the same bits as were measured, with NaN where there is none; or of text.
-    `pandas.DataFrame` takes a table as it is. Raises `FileNotFoundError` where there is no report.
+    `pandas.DataFrame` takes a table as it is. Raises `FileNotFoundError` where there is no report, and `ValueError`,
+    with the file's name, for a table that is not whole.
     """
     files = sorted(Path(folder).glob("*.csv"))
     if not files:
@@ -28,8 +29,13 @@ def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str
 def _table(file: Path) -> dict[str, Column]:
     with file.open(encoding="utf-8", newline="") as lines:
         rows = csv.reader(lines)
-        head = next(rows)
+        head = next(rows, None)
         cells = list(rows)
+    if not head:
+        raise ValueError(f"{file} has no head")
+    for number, row in enumerate(cells, 1):
+        if len(row) != len(head):
+            raise ValueError(f"{file} has {len(row)} cells in row {number}, and {len(head)} in its head")
     return {name: _column([row[at] for row in cells]) for at, name in enumerate(head)}
 
 

@@ -1,6 +1,7 @@
 """The effect of method and timestep on the arm, predicted and measured: the answers of the services ``/study/*``.
 
-Long computations release the interpreter's lock, and Ctrl-C ends them.
+Long computations release the interpreter's lock, and Ctrl-C ends them. An answer with arrays is equal to
+itself alone.
 """
 
 from collections.abc import Mapping
@@ -39,7 +40,7 @@ class Critical:
     """The joint that it moves furthest, from 0."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stability:
     """The largest stable timesteps of a control loop [s]. `None`: nothing limits; 0: unstable at every timestep."""
 
@@ -71,7 +72,7 @@ class Stability:
     """0.8 of the smaller of that and the minimum over poses."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rollout:
     """An offline run, sample by sample, with its cost and its error."""
 
@@ -97,7 +98,7 @@ class Rollout:
     """Step and time [s] at which the run left the finite numbers, if it did; the samples end before."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Plan:
     """The cheapest method and timestep within an allowed error, and what the other methods would cost."""
 
@@ -119,7 +120,7 @@ class Plan:
     errors: Floats
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SuggestedGains:
     """Gains that are stable in every pose and settle in time, and how they fared."""
 
@@ -174,9 +175,7 @@ def stability(
     an arm left to itself. `setpoint` [rad] is the starting pose unless given. `q` [rad] and `qd` [rad/s] are the state
     from which the motion is ahead.
     """
-    found = _native.stability(
-        arm, integrator=integrator, gains=None if gains is None else dict(gains), setpoint=setpoint, q=q, qd=qd
-    )
+    found = _native.stability(arm, integrator=integrator, gains=gains, setpoint=setpoint, q=q, qd=qd)
     critical = found.pop("critical")
     return Stability(**found, critical=None if critical is None else Critical(**critical))
 
@@ -197,8 +196,9 @@ def rollout(
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 
     It begins at `q0` [rad] and `qdot0` [rad/s] (zeros unless given), lasts `duration` [s] and gives `samples`, start
-    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and a member that
-    is left out is zeros. With `reference` the run is compared with the true motion under the same held control law.
+    and end among them, or every step if there are fewer. Without `gains` nothing controls the arm, and no `setpoint`
+    may be given; a member that is left out of them is zeros. With `reference` the run is compared with the true
+    motion under the same held control law.
     """
     return Rollout(
         **_native.rollout(
@@ -208,7 +208,7 @@ def rollout(
             duration=duration,
             timestep=timestep,
             integrator=integrator,
-            gains=None if gains is None else dict(gains),
+            gains=gains,
             setpoint=setpoint,
             samples=samples,
             reference=reference,
@@ -240,7 +240,7 @@ def plan(
             duration=duration,
             q0=q0,
             qdot0=qdot0,
-            gains=None if gains is None else dict(gains),
+            gains=gains,
             setpoint=setpoint,
         )
     )

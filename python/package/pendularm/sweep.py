@@ -6,22 +6,31 @@ results.
 
 import json
 import math
+import operator
 import os
+import sys
+import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import version
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Protocol
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ._code import fingerprint
 from ._native import Batch
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
 Floats = NDArray[np.float64]
+
+TIMESTEP = 0.001
+"""[s], unless another is given."""
 
 SETTLED = 0.02
 """Largest distance of a joint from its setpoint at which an arm counts as settled [rad]."""
@@ -35,14 +44,21 @@ MOST_SETTINGS = 10_000_000
 MOST_SAMPLES = 100_000
 """Samples of a run, as many as a rollout has."""
 
+MOST_STEPS = 10_000_000
+"""Steps of a run, as many as a rollout has."""
+
+AT_ONCE = 1_000_000
+"""Steps of all arms together between two looks at whether the sweep was stopped: some tens of milliseconds."""
+
 MOST_ROWS = 10_000_000
 """Samples times settings of a piece: some 1 GB where it is done."""
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
+STATES = ("setpoint", "q0", "qdot0")
 SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Run:
     """The motion of a piece's arms, for a metric."""
 
@@ -72,7 +88,7 @@ class Executor(Protocol):
     def submit(self, fn: Callable[..., Any], /, *args: Any) -> Future[Any]: ...
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sweep:
     """The results, with an axis for each name of the grid, in its order."""
 
@@ -143,10 +159,19 @@ def sweep(
 
     Pieces of so many settings (1024 unless given, fewer if they have many samples) go to `executor`, anything that
     hands out futures as `concurrent.futures` does (Dask's `Client.get_executor()`, say), or to as many threads as
-    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. Raises
-    `ValueError` for a setting that cannot be, and where the folder holds another sweep.
+    there are cores. In `folder` every finished piece is kept, and a sweep that was stopped goes on there. It knows a
+    function by its code, which has to be a plain one there; what that finds by global names is not looked at. Ctrl-C
+    ends a sweep on threads soon. Raises `ValueError` for a setting that cannot be, and where the folder holds another
+    sweep.
     """
-    axes = {name: list(values) for name, values in grid.items()}
+    if not isinstance(grid, Mapping):
+        raise ValueError(f"grid must be a mapping from settings to their values, got {grid!r:.60}")
+    axes = {}
+    for name, values in grid.items():
+        try:
+            axes[name] = list(values)
+        except TypeError:
+            raise ValueError(f"grid[{name!r}] must be a sequence of values, got {values!r:.60}") from None
     for name, choices in axes.items():
         if name in settings:
             raise ValueError(f"{name} is both in the grid and fixed")
@@ -157,15 +182,19 @@ def sweep(
     total = math.prod(len(choices) for choices in axes.values())
     if total > MOST_SETTINGS:
         raise ValueError(f"grid must have at most {MOST_SETTINGS} combinations, got {total}")
+    links, samples, duration = _whole("links", links), _whole("samples", samples), _number("duration", duration)
+    if links not in (2, 3):
+        raise ValueError(f"links must be 2 or 3, got {links}")
     if not 2 <= samples <= MOST_SAMPLES:
         raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
     if piece is None:
         piece = max(1, min(1024, MOST_ROWS // 10 // samples))
+    piece = _whole("piece", piece)
     if not 1 <= piece <= MOST_ROWS // samples:
         raise ValueError(f"piece must be between 1 and {MOST_ROWS // samples} with {samples} samples, got {piece}")
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
-    if isinstance(metric, str) and metric not in METRICS:
+    if metric not in METRICS if isinstance(metric, str) else not callable(metric):
         raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
     question = _Question(
         axes={name: _column(name, values, links) for name, values in axes.items()},
@@ -174,21 +203,34 @@ def sweep(
         links=links,
         duration=duration,
         samples=samples,
-        servo=servo,
+        servo=bool(servo),
     )
     question.check()
     kept = None if folder is None else _Folder(Path(folder), question, piece)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
-    threads = ThreadPoolExecutor() if executor is None else None
-    try:
-        left = [start for start in starts if start not in done]
-        _run(question, left, piece, threads or executor, done, kept, progress)
-    finally:
-        if threads is not None:
-            threads.shutdown(cancel_futures=True)
+    left = [start for start in starts if start not in done]
+    if executor is not None:
+        _run(question, left, piece, executor, _solve, done, kept, progress)
+    else:
+        stopped = threading.Event()
+        with ThreadPoolExecutor(_cores()) as threads:
+            try:
+                _run(question, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
+            finally:
+                # Who leaves early, by Ctrl-C say, does not wait for the pieces that are under way.
+                stopped.set()
+    for start in starts:
+        if done[start].keys() != done[0].keys():
+            names = " and ".join(", ".join(one) for one in (done[0], done[start]))
+            raise ValueError(f"metric must answer the same names for all arms, got {names}")
     whole = {name: np.concatenate([done[start][name] for start in starts]) for name in done[0]}
     return Sweep(axes, {name: values.reshape(question.shape) for name, values in whole.items()})
+
+
+def _cores() -> int:
+    """The cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @dataclass(frozen=True)
@@ -209,14 +251,23 @@ class _Question:
 
     def check(self) -> None:
         """Tries every value once, so that a bad one is refused here and by its own name."""
-        for name, values in {**self.axes, **self.fixed}.items():
+        settings = {**self.axes, **self.fixed}
+        for name, values in settings.items():
             _begin({name: values}, len(values), self.links)
+        steps = self.duration / float(min(settings.get("timestep", [TIMESTEP])))
+        if steps > MOST_STEPS:
+            raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
     def told(self) -> dict[str, Any]:
         """The question as the folder keeps it."""
-        metric = self.metric if isinstance(self.metric, str) else f"{self.metric.__module__}.{self.metric.__qualname__}"
+        metric = self.metric
+        if not isinstance(metric, str):
+            code = fingerprint("metric", metric)
+            metric = f"{metric.__module__}.{metric.__qualname__} {code}"
         return {
-            "grid": {name: values.tolist() for name, values in self.axes.items()},
+            "version": version("pendularm"),
+            # In a list, whose order counts: the axes of the results are in that of the grid.
+            "grid": [[name, values.tolist()] for name, values in self.axes.items()],
             "settings": {name: values.tolist() for name, values in self.fixed.items()},
             "metric": metric,
             "links": self.links,
@@ -224,6 +275,28 @@ class _Question:
             "samples": self.samples,
             "servo": self.servo,
         }
+
+
+def _whole(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
+
+
+def _number(name: str, value: Any) -> float:
+    try:
+        return float(_numbers(value))
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
+
+
+def _numbers(value: Any) -> Floats:
+    """The value as doubles; text and complex numbers are none."""
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        return array.astype(np.float64)
+    return array.astype(np.float64, casting="same_kind")
 
 
 def _column(name: str, values: Sequence[Any], links: int) -> Any:
@@ -234,11 +307,17 @@ def _column(name: str, values: Sequence[Any], links: int) -> Any:
         return np.array([str(value) for value in values])
     try:
         if name in PER_JOINT:
-            return np.array([np.broadcast_to(np.asarray(value, np.float64), (links,)) for value in values])
-        return np.array([float(value) for value in values])
+            column = np.array([np.broadcast_to(_numbers(value), (links,)) for value in values])
+        else:
+            column = np.array([float(_numbers(value)) for value in values])
     except (TypeError, ValueError):
         each = f" or an array of {links}" if name in PER_JOINT else ""
         raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
+    # The other ones are refused by these names where they are tried.
+    if name in STATES and not np.isfinite(column).all():
+        row, joint = np.argwhere(~np.isfinite(column))[0]
+        raise ValueError(f"{name}[{row}][{joint}] must be finite, got {column[row, joint]}")
+    return column
 
 
 def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
@@ -260,22 +339,36 @@ def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
     return batch
 
 
-def _solve(question: _Question, start: int, stop: int) -> dict[str, NDArray[Any]]:
-    """One piece, wherever it is done."""
+def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | None) -> None:
+    """Takes so many steps with each arm, in several goes if they are many."""
+    at_once = max(1, AT_ONCE // len(batch))
+    while True:
+        if stopped is not None and stopped.is_set():
+            raise CancelledError
+        batch.step(np.minimum(steps, at_once))
+        steps = np.maximum(steps - at_once, 0)
+        if not steps.any():
+            return
+
+
+def _solve(
+    question: _Question, start: int, stop: int, stopped: threading.Event | None = None
+) -> dict[str, NDArray[Any]]:
+    """One piece, wherever it is done; one that is done in this process is over soon after it was `stopped`."""
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start
     settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
     settings |= {name: np.repeat(values, arms, axis=0) for name, values in question.fixed.items()}
     batch = _begin(settings, arms, question.links)
     batch.enable(question.servo)
-    timestep = settings.get("timestep", np.full(arms, 0.001))
+    timestep = settings.get("timestep", np.full(arms, TIMESTEP))
     shape = (question.samples, arms, question.links)
     positions, velocities, efforts = np.empty(shape), np.empty(shape), np.empty(shape)
     times, energy = np.empty(shape[:2]), np.empty(shape[:2])
     taken = np.zeros(arms, np.int64)
     for sample, time in enumerate(np.linspace(0.0, question.duration, question.samples)):
         due = np.rint(time / timestep).astype(np.int64)
-        batch.step(due - taken)
+        _advance(batch, due - taken, stopped)
         taken = due
         positions[sample], velocities[sample], efforts[sample] = batch.position, batch.velocity, batch.effort
         times[sample], energy[sample] = taken * timestep, batch.energy
@@ -286,6 +379,11 @@ def _solve(question: _Question, start: int, stop: int) -> dict[str, NDArray[Any]
     found = metric(run)
     values = {key: np.asarray(one) for key, one in (found if isinstance(found, Mapping) else {name: found}).items()}
     for key, one in values.items():
+        if not isinstance(key, str) or key in ("file", "allow_pickle"):
+            # These two NumPy takes as its own where it keeps arrays by names.
+            raise ValueError(f"metric must name its numbers by text, other than 'file' and 'allow_pickle', got {key!r}")
+        if one.dtype.hasobject:
+            raise ValueError(f"metric must answer numbers or text, got {key} of objects")
         if one.shape != (arms,):
             raise ValueError(f"metric must answer one number for each of {arms} arms, got {key} of shape {one.shape}")
     return values
@@ -296,6 +394,7 @@ def _run(
     starts: Sequence[int],
     piece: int,
     executor: Any,
+    solve: Callable[..., dict[str, NDArray[Any]]],
     done: dict[int, dict[str, NDArray[Any]]],
     kept: "_Folder | None",
     progress: bool,
@@ -308,7 +407,7 @@ def _run(
         try:
             while True:
                 while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
-                    under_way[executor.submit(_solve, question, start, min(start + piece, total))] = start
+                    under_way[executor.submit(solve, question, start, min(start + piece, total))] = start
                 if not under_way:
                     return
                 ended = wait(under_way, return_when=FIRST_COMPLETED).done
@@ -324,16 +423,23 @@ def _run(
                 future.cancel()
 
 
+def _in_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this, whose output is no terminal and is looked at all the same."""
+    interactive = sys.modules.get("IPython")
+    return interactive is not None and hasattr(interactive.get_ipython(), "kernel")
+
+
 class _Bar:
     """A progress bar where tqdm is installed and somebody is watching."""
 
     def __init__(self, total: int, already: int, wanted: bool) -> None:
         try:
-            from tqdm import tqdm
+            from tqdm.auto import tqdm
         except ImportError:
             wanted = False
         # `None`: only on a terminal.
-        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=None) if wanted else None
+        hidden = False if _in_notebook() else None
+        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=hidden) if wanted else None
 
     def __enter__(self) -> "_Bar":
         return self
@@ -352,20 +458,32 @@ class _Folder:
 
     def __init__(self, path: Path, question: _Question, piece: int) -> None:
         self._path = path
-        path.mkdir(parents=True, exist_ok=True)
+        self._piece = piece
+        self._total = math.prod(question.shape)
+        self._name = question.metric if isinstance(question.metric, str) else None
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError):
+            raise ValueError(f"folder {path} must be a folder") from None
         # Through JSON, so that it can be compared with what is read.
         told = json.loads(json.dumps({**question.told(), "piece": piece}))
         file = path / "sweep.json"
         if not file.exists():
+            if any(path.glob("[0-9]*.npz")):
+                raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
             self._write("sweep.json", lambda part: part.write_text(json.dumps(told)))
             return
-        kept = json.loads(file.read_text())
+        try:
+            kept = dict(json.loads(file.read_bytes()))
+        except (TypeError, ValueError):
+            raise ValueError(f"folder {path} holds a sweep.json that cannot be read") from None
         other = [name for name, value in told.items() if kept.get(name) != value]
         if other:
             raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
 
     def _write(self, name: str, write: Callable[[Path], Any]) -> None:
-        part = self._path / f"part-{name}"
+        # Another process may be at the same sweep.
+        part = self._path / f"part-{os.getpid()}-{name}"
         write(part)
         part.replace(self._path / name)
 
@@ -376,9 +494,15 @@ class _Folder:
         found = {}
         for start in starts:
             try:
-                with np.load(self._path / f"{start:012}.npz", allow_pickle=False) as file:
-                    found[start] = dict(file)
-            except (FileNotFoundError, BadZipFile, ValueError, EOFError):
-                # Done again.
+                # In memory, since NumPy leaves a file open that it cannot read.
+                kept = BytesIO((self._path / f"{start:012}.npz").read_bytes())
+                with np.load(kept, allow_pickle=False) as file:
+                    values = dict(file)
+            except Exception:
+                # What is not there or damaged, in whatever way, is done again.
                 continue
+            arms = min(self._piece, self._total - start)
+            known = self._name is None or list(values) == [self._name]
+            if known and values and all(one.shape == (arms,) for one in values.values()):
+                found[start] = values
         return found

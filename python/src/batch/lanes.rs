@@ -149,6 +149,16 @@ impl Piece<'_> {
     }
 }
 
+/// Ends the effort of steps that were broken off.
+pub(crate) fn end_effort<const N: usize>(lanes: &mut [Simulation<N>], steps: Steps<'_>) {
+    for (index, lane) in lanes.iter_mut().enumerate() {
+        if steps.of(index) > 0 {
+            // Negative zero changes no number that it is added to.
+            lane.disturb([-0.0; N], lane.timestep());
+        }
+    }
+}
+
 /// Kinetic plus potential energy of every lane \[J\].
 pub(crate) fn energies<const N: usize>(lanes: &[Simulation<N>]) -> Vec<f64> {
     lanes

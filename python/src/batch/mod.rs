@@ -18,9 +18,10 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
+use rayon::ThreadPool;
 
 use crate::arm::for_either;
-use crate::fields::{self, Bound, Held, Numbers, Object, refused};
+use crate::fields::{self, Bound, Held, Numbers, Object, Whole, refused};
 use crate::patience::hold;
 use given::{chosen, read, read_methods, read_steps};
 use lanes::{Piece, Steps};
@@ -62,18 +63,15 @@ pub(crate) struct Batch {
 #[pymethods]
 impl Batch {
     #[new]
-    #[pyo3(signature = (n_arms, links=2, *, threads=None))]
-    fn new(py: Python<'_>, n_arms: usize, links: usize, threads: Option<usize>) -> PyResult<Self> {
-        if !(1..=MOST_ARMS).contains(&n_arms) {
-            return Err(refused(format_args!(
-                "n_arms must be between 1 and {MOST_ARMS}, got {n_arms}"
-            )));
-        }
-        if let Some(threads) = threads.filter(|threads| !(1..=MOST_THREADS).contains(threads)) {
-            return Err(refused(format_args!(
-                "threads must be between 1 and {MOST_THREADS}, got {threads}"
-            )));
-        }
+    #[pyo3(
+        signature = (n_arms, links=Whole::Is(2), *, threads=None),
+        text_signature = "(n_arms, links=2, *, threads=None)"
+    )]
+    fn new(py: Python<'_>, n_arms: Whole, links: Whole, threads: Option<Whole>) -> PyResult<Self> {
+        let n_arms = n_arms.up_to(MOST_ARMS, "n_arms")?;
+        let threads = threads
+            .map(|threads| threads.up_to(MOST_THREADS, "threads"))
+            .transpose()?;
         let links = fields::links(links)?;
         let own = match links {
             2 => Either::Two(Mutex::new(lanes::fresh(n_arms))),
@@ -96,7 +94,8 @@ impl Batch {
 
     /// Takes `steps` steps (1 unless given) with every arm, or so many of each, (`n_arms`,), in whole numbers. An arm
     /// that has diverged takes no more. `effort` [N m] is added to the controller's for all these steps, as
-    /// `Simulation.disturb` does. The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps.
+    /// `Simulation.disturb` does. The interpreter's lock is released meanwhile, and Ctrl-C ends it between two steps,
+    /// the effort with it.
     #[pyo3(signature = (steps=None, effort=None))]
     fn step(
         &self,
@@ -120,28 +119,21 @@ impl Batch {
         let arms = u64::try_from(self.arms).unwrap_or(u64::MAX);
         let threads = u64::try_from(self.threads).unwrap_or(1);
         let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
-        let mut done = 0;
-        while done < steps.most() {
-            let piece = Piece {
+        let taken = self.take(
+            py,
+            pool.as_deref(),
+            Piece {
                 steps,
                 effort: effort.as_ref(),
-                done,
+                done: 0,
                 length,
                 is_shared: pool.is_some(),
-            };
-            for_either!(Either, &self.own, lanes => {
-                let mut lanes = hold(py, lanes);
-                let lanes = lanes.as_mut_slice();
-                self.windows.write(py, |shown| match &pool {
-                    None => lanes::advance(lanes, shown, piece),
-                    Some(pool) => pool.install(|| lanes::advance(lanes, shown, piece)),
-                })?;
-            });
-            done = done.saturating_add(length);
-            // No lock is held here: a signal's handler may want to look at the arms.
-            py.check_signals()?;
+            },
+        );
+        if taken.is_err() && effort.is_some() {
+            for_either!(Either, &self.own, lanes => lanes::end_effort(&mut hold(py, lanes), steps));
         }
-        Ok(())
+        taken
     }
 
     /// Back to the starting pose at rest, at time 0, as `Simulation.reset` does: all arms, those of a mask
@@ -151,13 +143,15 @@ impl Batch {
         let chosen = chosen(arms, self.arms)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
-            for &lane in &chosen {
-                if let Some(one) = lanes.get_mut(lane) {
-                    one.reset();
-                }
-            }
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| shown.show(lanes))
+            self.windows.write(py, |shown| {
+                for &lane in &chosen {
+                    if let Some(one) = lanes.get_mut(lane) {
+                        one.reset();
+                    }
+                }
+                shown.show(lanes);
+            })
         })
     }
 
@@ -184,16 +178,18 @@ impl Batch {
         let velocity = read("velocity", velocity)?.map(owned).transpose()?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
-            for (row, &lane) in chosen.iter().enumerate() {
-                if let Some(one) = lanes.get_mut(lane) {
-                    one.set_state(State {
-                        position: position.row(row),
-                        velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
-                    });
-                }
-            }
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| shown.show(lanes))
+            self.windows.write(py, |shown| {
+                for (row, &lane) in chosen.iter().enumerate() {
+                    if let Some(one) = lanes.get_mut(lane) {
+                        one.set_state(State {
+                            position: position.row(row),
+                            velocity: velocity.as_ref().map_or([0.0; _], |velocity| velocity.row(row)),
+                        });
+                    }
+                }
+                shown.show(lanes);
+            })
         })
     }
 
@@ -311,9 +307,11 @@ impl Batch {
     fn enable(&self, py: Python<'_>, data: bool) -> PyResult<()> {
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
-            lanes.iter_mut().for_each(|one| one.enable(data));
             let lanes = lanes.as_mut_slice();
-            self.windows.write(py, |shown| shown.show(lanes))
+            self.windows.write(py, |shown| {
+                lanes.iter_mut().for_each(|one| one.enable(data));
+                shown.show(lanes);
+            })
         })
     }
 
@@ -392,5 +390,26 @@ impl Batch {
             self.links(),
             self.threads
         )
+    }
+}
+
+impl Batch {
+    /// Takes all steps, from those of this piece on, with a look for signals between two pieces.
+    fn take(&self, py: Python<'_>, pool: Option<&ThreadPool>, first: Piece<'_>) -> PyResult<()> {
+        let mut piece = first;
+        while piece.done < piece.steps.most() {
+            for_either!(Either, &self.own, lanes => {
+                let mut lanes = hold(py, lanes);
+                let lanes = lanes.as_mut_slice();
+                self.windows.write(py, |shown| match pool {
+                    None => lanes::advance(lanes, shown, piece),
+                    Some(pool) => pool.install(|| lanes::advance(lanes, shown, piece)),
+                })?;
+            });
+            piece.done = piece.done.saturating_add(piece.length);
+            // No lock is held here: a signal's handler may want to look at the arms.
+            py.check_signals()?;
+        }
+        Ok(())
     }
 }

@@ -47,7 +47,7 @@ pub(super) struct Windows {
 }
 
 impl Windows {
-    /// Has them written, with the interpreter's lock released.
+    /// Has them written, with the interpreter's lock released. Where they are in use elsewhere, `write` is not called.
     pub(super) fn write(
         &self,
         py: Python<'_>,
