@@ -260,7 +260,7 @@ pub(crate) fn end_effector<'py>(
 
 /// Joint positions [rad], (links,), each in (-pi, pi], that put the end effector on (`x`, `y`) [m].
 ///
-/// `phi` [rad] is the heading of the last link of 3; `present` [rad] decides what the target leaves open, as
+/// `phi` [rad] is the heading of the last link of 3, and is not looked at for 2; `present` [rad] decides what the target leaves open, as
 /// `/ik/solve` does by the arm's present pose. Raises `ValueError` with the limit that a target exceeds.
 #[pyfunction]
 #[pyo3(signature = (arm, x, y, phi=None, *, present=None))]
@@ -272,11 +272,6 @@ pub(crate) fn inverse_kinematics<'py>(
     phi: Option<Real>,
     present: Option<Object<'py>>,
 ) -> PyResult<Held<'py, numpy::PyArray1<f64>>> {
-    if arm.get().links() == 2 && phi.is_some() {
-        return Err(refused(
-            "phi must be left out for an arm of 2 links: x and y decide its heading",
-        ));
-    }
     let target = kinematics::Target {
         position: [x.read("x")?, y.read("y")?].into(),
         orientation: phi.map(|phi| phi.read("phi")).transpose()?,

@@ -281,11 +281,6 @@ fn read_loop<const N: usize>(
     gains: Option<&Object<'_>>,
     setpoint: Option<&Object<'_>>,
 ) -> PyResult<ControlLoop<N>> {
-    if gains.is_none() && setpoint.is_some() {
-        return Err(refused(
-            "setpoint must be left out without gains: nothing controls the arm",
-        ));
-    }
     let gains = fields::gains(gains, no_control())?;
     let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
     Ok(ControlLoop::new(arm, gains, setpoint))

@@ -154,10 +154,6 @@ def test_arms_are_values():
         (lambda arm: setattr(arm, "timestep", "1"), "timestep must be a number, got '1'"),
         (lambda arm: pendularm.inverse_kinematics(arm.arm, "1", 1), "x must be a number, got '1'"),
         (
-            lambda arm: pendularm.inverse_kinematics(arm.arm, 1, 1, 0.5),
-            "phi must be left out for an arm of 2 links: x and y decide its heading",
-        ),
-        (
             lambda arm: arm.set_state(np.array([1, 2 + 1j])),
             "position must be an array of numbers, got array([1.+0.j, 2.+1.j])",
         ),
