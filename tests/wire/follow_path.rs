@@ -165,11 +165,6 @@ fn a_goal_ends_with_a_cancellation_or_when_its_setpoint_is_gone() {
 fn unfit_goals() -> Vec<(Value, &'static str)> {
     let good = point([0.1, 0.1], 1.0);
     let many = vec![good.clone(); MAX_POINTS + 1];
-    let with = |field: &str, value: Value| {
-        let mut point = good.clone();
-        point[field] = value;
-        through(&[point])
-    };
     let tolerance = |one: Value| {
         let mut args = through(std::slice::from_ref(&good));
         args["goal_tolerance"] = json!([one]);
@@ -198,6 +193,25 @@ fn unfit_goals() -> Vec<(Value, &'static str)> {
             through(&[good.clone(), good.clone()]),
             "trajectory.points[1].time_from_start must be greater",
         ),
+        (
+            tolerance(json!({"name": "joint3"})),
+            "goal_tolerance[0].name must be that of a joint",
+        ),
+        (
+            tolerance(json!({"name": "joint1", "position": "x"})),
+            "goal_tolerance[0].position must be a number",
+        ),
+    ]
+}
+
+/// Paths of one point that is none.
+fn unfit_points() -> Vec<(Value, &'static str)> {
+    let with = |field: &str, value: Value| {
+        let mut point = point([0.1, 0.1], 1.0);
+        point[field] = value;
+        through(&[point])
+    };
+    vec![
         (
             with("positions", json!([1])),
             "trajectory.points[0].positions must have 2 entries, got 1",
@@ -229,14 +243,6 @@ fn unfit_goals() -> Vec<(Value, &'static str)> {
             with("positions", json!([f64::MAX, 0])),
             "trajectory.points[0] must be reached from the point before by finite",
         ),
-        (
-            tolerance(json!({"name": "joint3"})),
-            "goal_tolerance[0].name must be that of a joint",
-        ),
-        (
-            tolerance(json!({"name": "joint1", "position": "x"})),
-            "goal_tolerance[0].position must be a number",
-        ),
     ]
 }
 
@@ -244,7 +250,7 @@ fn unfit_goals() -> Vec<(Value, &'static str)> {
 fn a_goal_that_is_none_is_refused_by_its_field() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
-    for (args, why) in unfit_goals() {
+    for (args, why) in unfit_goals().into_iter().chain(unfit_points()) {
         client.send(&goal("x", &args));
         let end = result(&mut client);
         assert_eq!(
