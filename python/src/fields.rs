@@ -265,7 +265,7 @@ pub(crate) fn joints_or<const N: usize>(
     value.map_or(Ok(missing), |value| joints(field, value, bound))
 }
 
-    /// A value handed in for a number; it is judged where its field's name is known.
+/// A value handed in for a number; it is judged where its field's name is known.
 #[derive(Debug)]
 pub(crate) enum Real {
     Is(f64),
