@@ -19,7 +19,7 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
 }
 
 /// Contract section 3, the table, and what came later: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 27] = [
+const SERVICES: &[(&str, &[&str], &[&str])] = &[
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -194,9 +194,9 @@ fn the_services_are_those_of_the_contract() {
 }
 
 /// Name, type, and which way it goes.
-const TOPICS: [(&str, &str, Direction); 17] = {
+const TOPICS: &[(&str, &str, Direction)] = {
     use Direction::{Published, Subscribed};
-    [
+    &[
         (
             "/joint_trajectory",
             "trajectory_msgs/msg/JointTrajectory",
