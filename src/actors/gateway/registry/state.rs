@@ -37,7 +37,7 @@ pub struct Registry {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) pursuers: Pursuers,
-    /// What those who have gone have left, which will be ended.
+    /// Left behind by those who have gone; it will be ended.
     pub(super) left: Left,
     /// When the registry looks next at what is to be ended, and the task that waits for that.
     pub(super) look: Option<(Instant, SpawnHandle)>,
