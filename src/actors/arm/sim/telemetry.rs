@@ -32,7 +32,7 @@ impl<const N: usize> ArmSim<N> {
         if self.telemetry.wants(Topic::Clock) {
             self.publish(Topic::Clock, move || Clock { clock: stamp });
         }
-        self.publish_frames(stamp);
+        self.publish_transforms(stamp);
         if self.telemetry.wants(Topic::ErrorEstimate)
             && self.telemetry.ticks.is_multiple_of(ESTIMATE_TICKS)
         {

@@ -305,7 +305,7 @@ impl FrameReader {
         self.state = Within::Between;
         Ok(RawFrame {
             bytes,
-            names: self.nesting.names,
+            has_literals: self.nesting.has_literals,
             newline,
         })
     }
