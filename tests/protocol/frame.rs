@@ -1,4 +1,4 @@
-//! Contract section 1: bytes into frames.
+//! Bytes into frames.
 //!
 //! **Invariant:** whatever is checked of a stream is checked of every way to cut it up.
 
@@ -460,7 +460,7 @@ enum Expected {
     NotUtf8,
 }
 
-/// The rules of contract section 1, written down as slowly as they read. Too long does not occur in it.
+/// The rules of frames, written down as slowly as they read. Too long does not occur in it.
 fn model(stream: &[u8]) -> Vec<Expected> {
     let line_end = |from: usize| {
         stream[from..]
