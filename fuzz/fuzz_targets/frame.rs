@@ -110,7 +110,7 @@ impl<'a> Iterator for Cuts<'a> {
     }
 }
 
-/// All that a stream holds, by contract section 1.
+/// All that a stream holds: frames end where their braces close, or with the line.
 fn model(stream: &[u8], limit: usize) -> Vec<Outcome> {
     let mut outcomes = Vec::new();
     let mut at = 0;

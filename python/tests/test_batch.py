@@ -176,7 +176,7 @@ def test_arrays_go_in_as_they_lie():
             lambda batch: batch.set_integrator(timestep=[1, 1]),
             "timestep must be a number or have the shape (3,), got [2]",
         ),
-        (lambda batch: batch.set_integrator("heun"), 'method must be one of euler, midpoint, verlet, rk4, got "heun"'),
+        (lambda batch: batch.set_integrator("leapfrog"), 'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"'),
         (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
         (lambda batch: batch.reset([3]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.reset([True]), "arms must be a mask of 3 or indices below that"),

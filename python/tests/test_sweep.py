@@ -259,7 +259,7 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"kp": [1, -2]}), "kp[1][0] must be finite and at least 0, got -2"),
         (lambda: pendularm.sweep({"kp": [[1, 2, 3]]}), "every kp must be a number or an array of 2, got [[1, 2, 3]]"),
         (lambda: pendularm.sweep({"timestep": ["x"]}), "every timestep must be a number, got ['x']"),
-        (lambda: pendularm.sweep({"method": ["heun"]}), "method must be one of euler, midpoint, verlet, rk4"),
+        (lambda: pendularm.sweep({"method": ["leapfrog"]}), "method must be one of euler, midpoint, verlet, rk4"),
         (lambda: pendularm.sweep({"kp": [1]}, "speed"), "metric must be one of final_error, settling_time"),
         (lambda: pendularm.sweep({"kp": [1]}, 5), "metric must be one of final_error, settling_time"),
         (lambda: pendularm.sweep({"q0": [[0, 0], [np.nan, 0]]}), "q0[1][0] must be finite, got nan"),

@@ -6,6 +6,10 @@
 
 use std::borrow::Cow;
 
+/// The runtime's own ids, of forwarded calls and of messages in fragments, begin with this: so a client's log shows where
+/// they come from.
+pub const OWN_ID_PREFIX: &str = "pendularm:";
+
 /// The name with its leading slash: what the registry and the catalog know it by.
 #[must_use]
 pub fn absolute(name: &str) -> Cow<'_, str> {

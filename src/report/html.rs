@@ -52,7 +52,7 @@ fn header(out: &mut String, sections: &[Section], machine: &Machine) {
     append(
         out,
         format_args!(
-            "<p>The arm of pendularm under its four integrators. Commit {}.</p><nav>",
+            "<p>The arm of pendularm under each of its integrators. Commit {}.</p><nav>",
             escape(&machine.commit)
         ),
     );

@@ -65,7 +65,8 @@ pub enum ReportError {
 /// The sections' names, in order, with commas between.
 #[must_use]
 pub fn names() -> String {
-    SECTIONS.map(|section| section.name).join(", ")
+    let all: Vec<&str> = SECTIONS.iter().map(|section| section.name).collect();
+    all.join(", ")
 }
 
 /// Makes the report and answers the page's path.
@@ -98,7 +99,7 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
         Ok(section)
     })?;
     let mut sections = Vec::new();
-    for maker in &SECTIONS {
+    for maker in SECTIONS {
         let section = made.iter().find(|section| section.name == maker.name);
         let kept = || read(&kept.join(format!("{}.json", maker.name)));
         sections.extend(section.cloned().or_else(kept));

@@ -571,7 +571,7 @@ where
                     offline.set_arm(Arm::new(lengths, masses, gravity).unwrap());
                 }
                 4 => {
-                    let method_now = Method::ALL[random.usize(0..4)];
+                    let method_now = Method::ALL[random.usize(0..Method::ALL.len())];
                     bench.ask(method(method_now)).await;
                     offline.set_method(method_now);
                 }

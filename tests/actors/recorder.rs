@@ -7,6 +7,7 @@ use pendularm::actors::arm::sim::Tell;
 use pendularm::actors::gateway::messages::Overhear;
 use pendularm::actors::recorder::limits::MAX_RECORDED_FRAME;
 use pendularm::actors::recorder::listeners;
+use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::Topic;
 use pendularm::record::{
@@ -110,9 +111,8 @@ async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::R
         ),
         3 => ("/arm_sim/set_params", json!({"lengths": weights})),
         4 => {
-            let methods = ["euler", "midpoint", "verlet", "rk4"];
             let timestep = 0.0005 + 0.001 * rng.f64();
-            let method = rng.choice(methods).unwrap();
+            let method = rng.choice(Method::ALL).unwrap().name();
             (
                 "/arm_sim/set_integrator",
                 json!({"method": method, "timestep": timestep}),

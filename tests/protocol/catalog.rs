@@ -1,6 +1,6 @@
-//! The list of topics and services agrees with the contract's tables, and with itself.
+//! The list of topics and services agrees with the tables of docs/protocol.md, and with itself.
 //!
-//! **Invariant:** names are spelled here as the contract spells them, not taken from the catalog.
+//! **Invariant:** names are spelled here as the paper spells them, not taken from the catalog.
 
 use std::collections::HashSet;
 
@@ -18,8 +18,8 @@ fn required(fields: &[Field]) -> Vec<&'static str> {
         .collect()
 }
 
-/// Contract section 3, the table, and what came later: service, request, values.
-const SERVICES: [(&str, &[&str], &[&str]); 27] = [
+/// The tables under "Services" in docs/protocol.md: service, request, values.
+const SERVICES: &[(&str, &[&str], &[&str])] = &[
     (
         "/arm_sim/integration_step",
         &["function", "x0", "xdot0", "dt", "steps", "integrator"],
@@ -175,7 +175,7 @@ const SERVICES: [(&str, &[&str], &[&str]); 27] = [
 ];
 
 #[test]
-fn the_services_are_those_of_the_contract() {
+fn the_services_are_those_of_the_paper() {
     let listed: Vec<_> = Service::ALL
         .iter()
         .map(|service| {
@@ -194,9 +194,9 @@ fn the_services_are_those_of_the_contract() {
 }
 
 /// Name, type, and which way it goes.
-const TOPICS: [(&str, &str, Direction); 17] = {
+const TOPICS: &[(&str, &str, Direction)] = {
     use Direction::{Published, Subscribed};
-    [
+    &[
         (
             "/joint_trajectory",
             "trajectory_msgs/msg/JointTrajectory",
@@ -262,7 +262,7 @@ const TOPICS: [(&str, &str, Direction); 17] = {
 };
 
 #[test]
-fn the_topics_are_those_of_the_contract_and_those_for_3d_tools() {
+fn the_topics_are_those_of_the_paper() {
     let listed: Vec<_> = Topic::ALL
         .iter()
         .map(|topic| (topic.name(), topic.type_name(), topic.direction()))

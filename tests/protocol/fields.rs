@@ -1,4 +1,4 @@
-//! Contract section 3: fields are read one by one, and rejected by name.
+//! Fields are read one by one, and rejected by name.
 //!
 //! **Invariant:** a message is compared whole: it is what the sender of a request has to go by.
 

@@ -1,4 +1,4 @@
-//! Contract section 1: bytes into frames.
+//! Bytes into frames.
 //!
 //! **Invariant:** whatever is checked of a stream is checked of every way to cut it up.
 
@@ -284,29 +284,6 @@ fn frames_that_are_done_with_are_not_kept_though_one_is_always_unfinished() {
     }
 }
 
-#[test]
-fn a_frame_that_has_begun_can_be_given_up_and_later_ones_work() {
-    let begun = "{\"a\":\"xx";
-    let mut reader = FrameReader::new();
-    assert!(!reader.is_unfinished() && !reader.give_up());
-    for (begun, rest) in [(begun, "\"}\n"), ("junk", " and more\n")] {
-        reader.push(begun.as_bytes());
-        assert_eq!(reader.next(), None);
-        assert!(reader.is_unfinished());
-        assert_eq!(reader.kept(), begun.len());
-        assert!(reader.give_up());
-        assert_eq!(reader.kept(), 0);
-        assert!(reader.is_unfinished(), "the rest of it is still to come");
-        assert!(!reader.give_up(), "nothing of it is kept");
-        reader.push(rest.as_bytes());
-        assert_eq!(reader.next(), None);
-        assert!(!reader.is_unfinished());
-        reader.push(b"{}\n");
-        assert!(reader.next().is_some_and(|found| found.is_ok()));
-        assert_eq!(reader.next(), None);
-    }
-}
-
 /// 32 bytes are enough to recognise a line by; a sender that never ends it hears of it then.
 #[test]
 fn the_beginning_of_a_line_that_is_no_object_is_told_as_soon_as_32_bytes_are_there() {
@@ -483,7 +460,7 @@ enum Expected {
     NotUtf8,
 }
 
-/// The rules of contract section 1, written down as slowly as they read. Too long does not occur in it.
+/// The rules of frames, written down as slowly as they read. Too long does not occur in it.
 fn model(stream: &[u8]) -> Vec<Expected> {
     let line_end = |from: usize| {
         stream[from..]
@@ -665,32 +642,5 @@ proptest! {
     ) {
         read(pieces.iter().map(Vec::as_slice));
         let _ = opening(&pieces.concat());
-    }
-}
-
-#[test]
-fn a_frame_that_is_given_up_is_skipped_to_its_end_and_nothing_of_it_is_kept() {
-    for (begun, rest) in [("{\"a\":[\"x", "y\"]}"), ("nonsense", " and more")] {
-        let mut reader = FrameReader::new();
-        assert!(!reader.give_up() && !reader.is_unfinished());
-        reader.push(b"{} \n");
-        assert!(reader.next().is_some() && reader.next().is_none());
-        assert!(!reader.give_up() && !reader.is_unfinished());
-        assert_eq!(reader.kept(), 0);
-        reader.push(begun.as_bytes());
-        assert!(reader.next().is_none());
-        assert!(reader.is_unfinished());
-        assert_eq!(reader.kept(), begun.len());
-        assert!(reader.give_up());
-        assert_eq!(reader.kept(), 0);
-        assert!(
-            reader.is_unfinished() && !reader.give_up(),
-            "it is being skipped"
-        );
-        reader.push(rest.as_bytes());
-        assert!(reader.next().is_none());
-        reader.push(b"\n{\"b\":1}\n");
-        assert_eq!(reader.next().unwrap().unwrap().text, "{\"b\":1}");
-        assert!(reader.next().is_none() && !reader.is_unfinished());
     }
 }

@@ -1,4 +1,4 @@
-//! Contract section 1: lenient about numbers coming in, strict about numbers going out.
+//! Lenient about numbers coming in, strict about numbers going out.
 //!
 //! **Invariant:** what is not a non-finite number passes byte for byte.
 

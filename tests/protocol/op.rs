@@ -1,4 +1,4 @@
-//! Contract section 2: the operations that clients send.
+//! The operations that clients send.
 //!
 //! **Invariant:** every bad field is tried in every operation that has it.
 

@@ -1,4 +1,4 @@
-//! Contract section 2: what waits for one connection, what is dropped, what is held back.
+//! The outbox of one connection: what waits, what is dropped, what is held back.
 //!
 //! **Invariant:** time is told, never waited for.
 

@@ -1,4 +1,4 @@
-//! Contract section 4: what a `/joint_trajectory` message sets.
+//! The setpoint that a `/joint_trajectory` message sets.
 //!
 //! **Invariant:** the joints are named as a 3-link arm's or a 2-link arm's are.
 

@@ -172,7 +172,7 @@ fn check_moves<const N: usize>(seed: u64, cases: usize) {
             velocity: [0.0; N],
         };
         let duration = 20.0 / pace * (1.0 + 2.0 * damping);
-        let method = Method::ALL[case % 4];
+        let method = Method::ALL[case % Method::ALL.len()];
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
         let motion = Motion::ahead(&control, &State::rest());
         let told = format!("seed {seed} case {case} {method} {arm:?} {gains:?} {setpoint:?}");

@@ -103,7 +103,7 @@ impl Dice {
         let arm = self.arm();
         let gains = self.gains(&arm);
         let setpoint = Setpoint::at(self.setpoint());
-        let method = Method::ALL[self.0.usize(0..4)];
+        let method = Method::ALL[self.0.usize(0..Method::ALL.len())];
         ControlLoop::new(arm, gains, setpoint).with_method(method)
     }
 }
@@ -255,7 +255,7 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     let lengths = std::array::from_fn(|_| length * dice.size(0.2));
     let masses = std::array::from_fn(|_| mass * dice.size(0.3));
     let arm = Arm::<N>::new(lengths, masses, 9.81).unwrap();
-    let method = Method::ALL[dice.0.usize(0..4)];
+    let method = Method::ALL[dice.0.usize(0..Method::ALL.len())];
     let free = ControlLoop::free(arm).with_method(method);
     let wish = Wish {
         settling_time: 4.0,
@@ -347,7 +347,8 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
     let mut dice = Dice::of(case);
     let arm = dice.arm::<N>();
     let (start, duration) = start(&mut dice, &arm);
-    let control = ControlLoop::free(arm).with_method(Method::ALL[dice.0.usize(0..4)]);
+    let control =
+        ControlLoop::free(arm).with_method(Method::ALL[dice.0.usize(0..Method::ALL.len())]);
     let timestep = duration / f64::from(dice.0.u32(100..4000));
     let plan = Plan {
         control: control.with_timestep(timestep),

@@ -1,4 +1,4 @@
-//! Contract section 2: one slow or dead client never delays another, and costs a bounded amount of memory.
+//! One slow or dead client never delays another, and costs a bounded amount of memory.
 //!
 //! **Invariant:** nothing here is told by a clock: the fast client goes in lockstep, the slow one is shown by counts and
 //! by the program's peak memory.

@@ -1,4 +1,4 @@
-//! Contract section 2: what the end of a connection withdraws, what it still owes, and what outlives it.
+//! The end of a connection: what it withdraws, what it still owes, and what outlives it.
 //!
 //! **Invariant:** a client that has only stopped sending gets every answer that it is owed.
 

@@ -1,4 +1,4 @@
-//! Contract section 2: services that clients provide.
+//! Services that clients provide.
 //!
 //! **Invariant:** a call is answered once, by its provider or with the reason why not, and under its caller's own id.
 

@@ -1,4 +1,4 @@
-//! Contract section 1: what a frame is, what is none, and that a malformed one costs nobody anything else.
+//! Frames: what is one, what is none, and that a malformed one costs nobody anything else.
 //!
 //! **Invariant:** whatever is sent, the connection works afterwards, and nothing inside a malformed frame is executed.
 

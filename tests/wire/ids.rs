@@ -1,4 +1,4 @@
-//! Contract section 1: `id` is any JSON value, and comes back exactly as it was sent.
+//! `id` is any JSON value, and comes back exactly as it was sent.
 //!
 //! **Invariant:** the ids are compared as text: a parser would hide what a number lost.
 

@@ -1,4 +1,4 @@
-//! Contract section 1: what opens like HTTP, TLS or BSON is never read as JSON.
+//! A stream that opens like HTTP, TLS or BSON is never read as JSON.
 //!
 //! **Invariant:** a foreign client gets one line and the end, however its bytes are cut up, and moves nothing.
 

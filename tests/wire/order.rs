@@ -1,5 +1,5 @@
-//! Contract section 1, **Order**: what one connection sends takes effect in the order sent, and frames to it leave in the
-//! order in which they were produced.
+//! Frames of one connection take effect in the order sent, and those to it leave in the order in which they were
+//! produced.
 //!
 //! **Invariant:** a race that is possible is given hundreds of chances.
 

@@ -1,4 +1,4 @@
-//! Contract section 2: floods of messages between clients, which go through as they are.
+//! Floods of messages between clients, which go through as they are.
 //!
 //! **Invariant:** every message is numbered, and every subscriber is told each number once, in order.
 

@@ -1,4 +1,4 @@
-//! Contract section 2: `call_service` as the runtime itself answers it.
+//! `call_service` as the runtime itself answers it.
 //!
 //! **Invariant:** exactly one `service_response` for every call, whatever is wrong with it.
 

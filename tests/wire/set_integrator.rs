@@ -1,6 +1,7 @@
 //! `/arm_sim/set_integrator` from outside.
 
 use crate::common::Runtime;
+use pendularm::math::integrator::Method;
 use serde_json::{Value, json};
 
 const SERVICE: &str = "/arm_sim/set_integrator";
@@ -17,7 +18,7 @@ fn the_defaults_are_runge_kutta_at_a_millisecond() {
 fn each_field_is_optional_and_the_answer_echoes_both() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
-    for method in ["euler", "midpoint", "verlet", "rk4"] {
+    for method in Method::ALL.map(Method::name) {
         let values = client.ask(SERVICE, json!({"method": method}));
         assert_eq!(values, json!({"method": method, "timestep": 0.001}));
     }

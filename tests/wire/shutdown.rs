@@ -1,4 +1,4 @@
-//! Contract section 7: SIGINT and SIGTERM end the program within a second, and what waits is answered.
+//! SIGINT and SIGTERM end the program within a second, and what waits is answered.
 //!
 //! **Invariant:** nothing that a client does keeps the program from ending, with exit status 0.
 

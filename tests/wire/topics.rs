@@ -1,4 +1,4 @@
-//! Contract section 2: `advertise`, `unadvertise`, `publish`, `subscribe`, `unsubscribe`, and ops that are none.
+//! `advertise`, `unadvertise`, `publish`, `subscribe`, `unsubscribe`, and ops that are none.
 //!
 //! **Invariant:** whether a message comes is told without waiting: after its sender has been answered, and then its
 //! receiver, nothing is still on its way.

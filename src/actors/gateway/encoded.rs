@@ -12,6 +12,7 @@ use tokio::sync::OnceCell;
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::budget::Memory;
 use crate::protocol::messages;
+use crate::protocol::names::OWN_ID_PREFIX;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::outbox::MAX_TOPIC_BYTES;
 use crate::protocol::ros::tree::MessageTree;
@@ -126,7 +127,7 @@ impl Encoded {
                 return Some(renamed);
             };
             let number = self.fragmented.fetch_add(1, Ordering::Relaxed) + 1;
-            let id = format!("pendularm:{number}");
+            let id = format!("{OWN_ID_PREFIX}{number}");
             return fragments::split(plain, size, &id, MAX_TOPIC_BYTES).map(Some);
         }
         let msg = messages::message_text(spelling, plain);

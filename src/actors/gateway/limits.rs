@@ -1,4 +1,4 @@
-//! Limits that several parts of the gateway keep.
+//! Limits that several parts of the gateway keep, and those that tests name, whose files are private.
 //!
 //! **Invariant:** nothing of the gateway is imported here, so that every part of it can import this.
 
@@ -48,11 +48,13 @@ pub const RESPONSES_OWED: Duration = Duration::from_secs(15);
 pub(super) const BATCH_BYTES: usize = 256 * 1024;
 /// Frames in one write.
 pub(super) const BATCH_FRAMES: usize = 64;
-/// Frames of a chunk for which nobody stands in line: more than a client has under way that waits for responses.
+/// Frames of a chunk, and messages of a series that is encoded, for which nobody stands in line: more than a client has
+/// under way that waits for responses.
 pub(super) const FREE_FRAMES: usize = 32;
 /// Subscribers of a message whose publisher stands in no line after it.
 pub(super) const FREE_DELIVERIES: usize = 32;
-/// Pieces of messages are looked at so long after they have become too old.
+/// Pieces of messages are looked at so long after they have become too old, and so often whether a client that has
+/// enough has taken some of it.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

@@ -25,6 +25,7 @@ use crate::protocol::wire::payload::Payload;
 pub const SMALL_ANSWER: usize = 16 * 1024;
 /// How long a computation waits for room that is taken by answers which wait for their clients, before it is refused.
 pub const ROOM_TIME: Duration = Duration::from_secs(2);
+
 /// A call of one of the runtime's own services, as the registry has it.
 pub struct ServiceCall {
     /// The service that was called.

@@ -12,21 +12,8 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Done, Feedback, Respond};
 use crate::actors::resources::budget::Share;
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::Arguments;
+use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::payload::Payload;
-
-/// How a goal stands at its end, as `action_msgs/msg/GoalStatus` counts.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GoalStatus {
-    /// Never accepted.
-    Unknown = 0,
-    /// Reached.
-    Succeeded = 4,
-    /// Ended because somebody asked for it.
-    Canceled = 5,
-    /// Ended because another goal or a reset took its place.
-    Aborted = 6,
-}
 
 /// A client's goal for an action or its end, as the registry has it.
 pub enum ActionRequest {

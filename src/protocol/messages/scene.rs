@@ -6,9 +6,8 @@
 use serde::Serialize;
 
 use crate::protocol::messages::Stamp;
+pub use crate::protocol::messages::telemetry::WORLD;
 
-/// The frame that everything stands in.
-pub const WORLD: &str = "world";
 /// The frame of the end effector, at the end of the last link.
 pub const END_EFFECTOR: &str = "hand";
 

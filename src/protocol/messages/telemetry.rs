@@ -4,6 +4,8 @@
 
 use serde::Serialize;
 
+/// The frame that everything stands in.
+pub const WORLD: &str = "world";
 /// Nanoseconds in a second.
 const NANOSECONDS: u32 = 1_000_000_000;
 
@@ -51,7 +53,7 @@ impl Stamp {
 pub struct Header<'a> {
     /// Simulation time.
     pub stamp: Stamp,
-    /// `"world"` in what the arm publishes.
+    /// [`WORLD`] in what the arm publishes.
     pub frame_id: &'a str,
 }
 
@@ -61,7 +63,7 @@ impl Header<'static> {
     pub fn world(time: f64) -> Self {
         Self {
             stamp: Stamp::from_seconds(time),
-            frame_id: "world",
+            frame_id: WORLD,
         }
     }
 }

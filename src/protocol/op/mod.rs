@@ -7,6 +7,7 @@
 
 pub mod fields;
 pub mod follow;
+mod goal_status;
 mod reader;
 mod rejections;
 pub mod token;
@@ -20,6 +21,7 @@ pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
+pub use goal_status::GoalStatus;
 pub use reader::read;
 
 /// Longest `args` and trajectory for a node of ours, without what it has no use for: its thread reads them, within

@@ -24,7 +24,7 @@ pub(super) struct Nesting {
     in_string: bool,
     escaped: bool,
     /// Whether an `N` or an `I` stood outside strings: only then can there be a `NaN` or an `Infinity`.
-    pub(super) names: bool,
+    pub(super) has_literals: bool,
 }
 
 impl Nesting {
@@ -34,7 +34,7 @@ impl Nesting {
             brackets: 0,
             in_string: false,
             escaped: false,
-            names: false,
+            has_literals: false,
         }
     }
 
@@ -80,7 +80,7 @@ impl Nesting {
             b'[' => return self.open(1),
             b'}' => return self.close(0),
             b']' => return self.close(1),
-            b'N' | b'I' => self.names = true,
+            b'N' | b'I' => self.has_literals = true,
             _ => {}
         }
         None

@@ -308,12 +308,9 @@ fn verdict(swing: &Swing) -> Verdict {
         }
     };
     let text: Vec<String> = horizons.iter().map(shown).collect();
-    let holds = match horizons.as_slice() {
-        &[euler, midpoint, verlet, rk4] => {
-            euler < midpoint.min(verlet) && midpoint.max(verlet) < rk4
-        }
-        _ => false,
-    };
+    let of_orders = || Method::ALL.map(Method::order).into_iter().zip(&horizons);
+    let holds = of_orders()
+        .all(|(order, at)| of_orders().all(|(higher, later)| order >= higher || at < later));
     Verdict {
         claim: format!(
             "{} links: a method of higher order has a later horizon at {}",

@@ -34,7 +34,7 @@ pub(crate) struct Maker {
 }
 
 /// All sections in the order in which they are shown.
-pub(crate) const SECTIONS: [Maker; 12] = [
+pub(crate) const SECTIONS: &[Maker] = &[
     Maker {
         name: "error",
         title: "Error against cost",

@@ -178,7 +178,7 @@ impl Key {
         }
     }
 
-    /// The four methods.
+    /// All methods.
     pub(crate) fn methods() -> Vec<Self> {
         Method::ALL.map(Self::of).to_vec()
     }

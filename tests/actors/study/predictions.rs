@@ -250,8 +250,8 @@ fn wrong_loops() -> [(Value, &'static str); 11] {
             "setpoint must have 2 entries, got 3",
         ),
         (
-            json!({"integrator": "heun"}),
-            "integrator must be one of euler, midpoint, verlet, rk4, got \"heun\"",
+            json!({"integrator": "leapfrog"}),
+            "integrator must be one of euler, midpoint, verlet, rk4, got \"leapfrog\"",
         ),
         (
             json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),

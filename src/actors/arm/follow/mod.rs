@@ -16,11 +16,12 @@ use actix::prelude::*;
 use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
 use crate::actors::node::Done;
-use crate::actors::wire::follower::{Canceller, GoalFollower, GoalStatus};
+use crate::actors::wire::follower::{Canceller, GoalFollower};
 use crate::math::arm::State;
 use crate::math::goal::Cadence;
 use crate::math::pid::Setpoint;
 use crate::math::trajectory::{Course, JointPath, Standing, Tolerance, Waypoint};
+use crate::protocol::op::GoalStatus;
 
 /// Time between two moves of the setpoint, which the arm holds in between: at a radian a second it is some millimetres
 /// behind.

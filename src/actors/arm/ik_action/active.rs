@@ -5,10 +5,11 @@
 use super::services::{GoalNews, GoalOwner};
 use crate::actors::arm::ik::target_message;
 use crate::actors::arm::sim::GoalJudged;
-use crate::actors::wire::follower::{Canceller, GoalStatus};
+use crate::actors::wire::follower::Canceller;
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Target;
 use crate::protocol::messages::goal::{IkFeedback, IkResult};
+use crate::protocol::op::GoalStatus;
 
 /// The goal that is being pursued.
 pub(super) struct ActiveGoal<const N: usize> {

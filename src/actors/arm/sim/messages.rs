@@ -13,7 +13,7 @@ use crate::study::control_loop::ControlLoop;
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
 
-/// Asks for simulation time \[s\]. From `rosapi` and `rosout`.
+/// Asks for simulation time \[s\]. From `rosapi`, `rosout` and the republisher of frames.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "f64")]
 pub struct SimulationTime;
@@ -59,7 +59,8 @@ pub struct RefuseSteps(pub &'static str);
 
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
-/// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it.
+/// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it, and from the republisher
+/// of frames, whenever some are due.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Pose<N>")]
 pub struct ArmPose<const N: usize>;

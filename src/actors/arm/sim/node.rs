@@ -169,6 +169,7 @@ impl<const N: usize> ArmSim<N> {
             ctx.wait(others.map(|(), arm, _| arm.turn = Turn::new()));
         }
     }
+
     /// To be called at every message that depends on the present state or changes it.
     pub(super) fn attend(&mut self, ctx: &mut Context<Self>) {
         self.count_message(ctx);

@@ -10,7 +10,7 @@ use crate::protocol::ros::{srdf, urdf};
 
 impl<const N: usize> ArmSim<N> {
     /// `/tf`, if anybody wants it.
-    pub(super) fn publish_frames(&self, stamp: Stamp) {
+    pub(super) fn publish_transforms(&self, stamp: Stamp) {
         if self.telemetry.wants(Topic::Tf) {
             let lengths = *self.simulation.arm().lengths();
             let positions = self.simulation.state().position;

@@ -12,12 +12,11 @@ use crate::actors::node::{FrameOut, Publish};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
 use crate::protocol::catalog::Topic;
+use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{
     self, Clock, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Stamp,
 };
 
-/// The frame in which everything is expressed.
-const FRAME_ID: &str = "world";
 /// Ticks between two messages of `/arm_sim/error_estimate`, which so comes at 10 Hz: it is for reading, not for
 /// control.
 const ESTIMATE_TICKS: u64 = 6;
@@ -33,7 +32,7 @@ impl<const N: usize> ArmSim<N> {
         if self.telemetry.wants(Topic::Clock) {
             self.publish(Topic::Clock, move || Clock { clock: stamp });
         }
-        self.publish_frames(stamp);
+        self.publish_transforms(stamp);
         if self.telemetry.wants(Topic::ErrorEstimate)
             && self.telemetry.ticks.is_multiple_of(ESTIMATE_TICKS)
         {
@@ -78,7 +77,7 @@ impl<const N: usize> ArmSim<N> {
     fn header(stamp: Stamp) -> Header<'static> {
         Header {
             stamp,
-            frame_id: FRAME_ID,
+            frame_id: WORLD,
         }
     }
 

@@ -1,4 +1,4 @@
-//! `/arm_sim/integration_step`: the four methods on `x'' = f(t)`, done on the worker pool, apart from the live arm.
+//! `/arm_sim/integration_step`: each method on `x'' = f(t)`, done on the worker pool, apart from the live arm.
 //!
 //! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
 //! time.

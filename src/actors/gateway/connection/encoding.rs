@@ -72,7 +72,7 @@ impl Drop for EncodingTask {
         if let Some(outgoing) = self.0.upgrade() {
             outgoing.unencoded.borrow_mut().at_work = false;
             // The writer may have waited for this to end.
-            outgoing.tell();
+            outgoing.wake_writer();
         }
     }
 }
@@ -97,7 +97,7 @@ impl EncodingTask {
             }
             if let Some(outgoing) = self.0.upgrade() {
                 let _ = outgoing.pass(message);
-                outgoing.tell();
+                outgoing.wake_writer();
             }
             tokio::task::yield_now().await;
         }

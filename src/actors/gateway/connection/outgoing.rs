@@ -3,7 +3,7 @@
 //!
 //! The connection's handlers put things in and the [writer](super::writer) takes them out. The writer is polled after
 //! each message that the actor has handled, so it looks for itself; whatever changes something from another task says
-//! so by [`Outgoing::tell`]. Where it stands in line, it is polled in its turn as well, and the actor is not.
+//! so by [`Outgoing::wake_writer`]. Where it stands in line, it is polled in its turn as well, and the actor is not.
 //!
 //! **Invariant:** nothing that borrows a cell here waits while it does.
 
@@ -96,7 +96,7 @@ impl Outgoing {
         let dropped = outbox.dropped() - before;
         if outbox.is_throttled() {
             // It may be held back, and the writer has to know until when.
-            self.tell();
+            self.wake_writer();
         }
         drop(outbox);
         self.count_dropped(dropped);
@@ -122,7 +122,7 @@ impl Outgoing {
             }) => outbox.set_throttle(topic, Some((interval, queue_length))),
             None => outbox.forget(topic),
         }
-        self.tell();
+        self.wake_writer();
     }
 
     /// Keeps a message's publisher waiting until the message has been offered to the socket.
@@ -209,8 +209,8 @@ impl Outgoing {
 
     // ---- news -------------------------------------------------------------------------------------------------------
 
-    /// Wakes the writer.
-    pub(super) fn tell(&self) {
+    /// Has the writer look: there is something for it to do.
+    pub(super) fn wake_writer(&self) {
         self.has_news.set(true);
         self.listener.borrow().wake_by_ref();
     }

@@ -12,10 +12,11 @@ use crate::actors::gateway::turns;
 use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::resources::awake::stay_awake;
 use crate::actors::resources::budget::Share;
-use crate::actors::wire::follower::GoalStatus;
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::{self, Level};
-use crate::protocol::op::{self, CallService, Compression, Incoming, Op, OpError, Subscribe};
+use crate::protocol::op::{
+    self, CallService, Compression, GoalStatus, Incoming, Op, OpError, Subscribe,
+};
 use crate::protocol::wire::frame::{Cut, Foreign, FrameError, FrameReader, RawFrame, is_host_line};
 use crate::protocol::wire::payload::Payload;
 

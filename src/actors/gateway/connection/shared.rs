@@ -87,7 +87,7 @@ impl Shared {
     pub(super) fn refuse(&self, status: Bytes) {
         self.ending.set(Ending::Refused);
         self.outgoing.push_response(status, &[]);
-        self.outgoing.tell();
+        self.outgoing.wake_writer();
     }
 
     /// Whether the client has been refused.
@@ -157,7 +157,7 @@ impl Shared {
     /// Nothing more is read; what is queued is sent.
     pub(super) fn finish(&self) {
         self.finishing.set(true);
-        self.outgoing.tell();
+        self.outgoing.wake_writer();
         self.room.notify_one();
     }
 

@@ -1,7 +1,7 @@
 //! Transports carry frames between a client and its connection: as plain bytes, or with another protocol around them.
 //!
-//! **Invariant:** whatever the transport, the reader sees a stream of bytes in which every frame ends as contract
-//! section 1 says, and the writer hands over whole frames that end in a newline.
+//! **Invariant:** whatever the transport, the reader sees a stream of bytes in which every frame ends where its braces
+//! close or with its line, and the writer hands over whole frames that end in a newline.
 
 use std::future::Future;
 use std::io::{self, IoSlice};

@@ -220,7 +220,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
             self.next_ping = now + PING_INTERVAL;
             self.asked.get_or_insert(now);
             self.link.ping_is_due.set(true);
-            self.shared.outgoing.tell();
+            self.shared.outgoing.wake_writer();
         }
         Ok(())
     }

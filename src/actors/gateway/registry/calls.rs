@@ -68,7 +68,7 @@ impl Registry {
             self.forward(&origin, &call, ctx)
         };
         if let Err(why) = refusal {
-            self.send_response(origin.from, &call.service, origin.id.as_ref(), &why);
+            self.refuse_call(origin.from, &call.service, origin.id.as_ref(), &why);
         }
         Handled::at_once()
     }

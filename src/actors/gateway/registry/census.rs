@@ -95,7 +95,7 @@ impl Tally {
     }
 
     /// All that there is, up to the limit of what is listed.
-    pub(super) fn take(&self) -> Census {
+    pub(super) fn census(&self) -> Census {
         let topics = self.topics.iter().take(MAX_LISTED);
         let listed = |(name, type_name): (&Arc<str>, &Option<Arc<str>>)| ListedService {
             name: Arc::clone(name),
@@ -128,14 +128,14 @@ mod tests {
             tally.add(&format!("/{n:05}"), Use::Advertised, None);
             tally.provide(&format!("/{n:05}"), None);
         }
-        let census = tally.take();
+        let census = tally.census();
         assert_eq!(
             (census.topics.len(), census.services.len()),
             (MAX_LISTED, MAX_LISTED)
         );
         tally.remove("/00000", Use::Advertised);
         assert_eq!(
-            &*tally.take().topics[MAX_LISTED - 1].name,
+            &*tally.census().topics[MAX_LISTED - 1].name,
             format!("/{MAX_LISTED:05}")
         );
     }

@@ -174,7 +174,7 @@ impl Handler<TakeCensus> for Registry {
         let replayed = self.nodes.replayed.clone();
         MessageResult(Census {
             replayed,
-            ..self.tally.take()
+            ..self.tally.census()
         })
     }
 }

@@ -11,11 +11,10 @@ use super::state::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{CALL_BYTES, MAX_BACKLOG, MAX_PROVIDED, MAX_WAITING_GOALS};
 use crate::actors::gateway::messages::{Deliver, Frames};
-use crate::actors::wire::follower::GoalStatus;
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionGoal, Arguments, PursuerOp};
+use crate::protocol::op::{ActionGoal, Arguments, GoalStatus, PursuerOp};
 use crate::protocol::wire::payload::Payload;
 
 impl Registry {

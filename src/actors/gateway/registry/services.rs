@@ -9,13 +9,11 @@ use tokio::time::Instant;
 use super::numbers::Numbers;
 use crate::actors::ConnectionId;
 use crate::actors::resources::budget::Share;
-use crate::protocol::names;
+use crate::protocol::names::{self, OWN_ID_PREFIX};
 use crate::protocol::wire::payload::Payload;
 
-/// The runtime's own ids for forwarded calls begin with this, so that a provider's log shows where they come from.
-const CALL_ID_PREFIX: &str = "pendularm:";
 /// Longest spelling of such an id in JSON: the prefix, twenty digits, quotes, every character escaped as `\u0070`.
-const LONGEST_CALL_ID: usize = 6 * (CALL_ID_PREFIX.len() + 20) + 2;
+const LONGEST_CALL_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;
 
 /// A call that was forwarded to its provider and not answered yet.
 pub(super) struct Forwarded {
@@ -79,14 +77,14 @@ impl Services {
 
     /// The id under which call `number` goes to its provider.
     pub(super) fn call_id(number: u64) -> String {
-        format!("{CALL_ID_PREFIX}{number}")
+        format!("{OWN_ID_PREFIX}{number}")
     }
 
     /// The number of the call that has this id.
     pub(super) fn number_of(id: &Payload) -> Option<u64> {
         let id = Some(id).filter(|id| id.get().len() <= LONGEST_CALL_ID)?;
         let id: String = serde_json::from_str(id.get()).ok()?;
-        let number: u64 = id.strip_prefix(CALL_ID_PREFIX)?.parse().ok()?;
+        let number: u64 = id.strip_prefix(OWN_ID_PREFIX)?.parse().ok()?;
         // One id a call: `+1` and `01` are numbers too.
         (id == Self::call_id(number)).then_some(number)
     }

@@ -37,7 +37,7 @@ pub struct Registry {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) pursuers: Pursuers,
-    /// What those who have gone have left, which will be ended.
+    /// Left behind by those who have gone; it will be ended.
     pub(super) left: Left,
     /// When the registry looks next at what is to be ended, and the task that waits for that.
     pub(super) look: Option<(Instant, SpawnHandle)>,
@@ -283,7 +283,7 @@ impl Registry {
 
     /// Fails a forwarded call.
     pub(super) fn answer_forwarded(&mut self, call: &Forwarded, why: &Refusal) {
-        self.send_response(call.caller, &call.service, call.id.as_ref(), why);
+        self.refuse_call(call.caller, &call.service, call.id.as_ref(), why);
         self.note_answered(call.caller);
     }
 
@@ -296,8 +296,8 @@ impl Registry {
         }
     }
 
-    /// Answers a call with `result: false`.
-    pub(super) fn send_response(
+    /// Answers a call with `result: false`, and why.
+    pub(super) fn refuse_call(
         &self,
         to: ConnectionId,
         service: &str,

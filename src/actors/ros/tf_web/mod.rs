@@ -17,11 +17,12 @@ use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose, SimulationTime};
 use crate::actors::node::{Ask, Call, Interest, Publish};
-use crate::actors::wire::follower::{Canceller, GoalFollower, GoalStatus};
+use crate::actors::wire::follower::{Canceller, GoalFollower};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::republished::{frames, seen_from};
 use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{self, Empty, Stamp};
+use crate::protocol::op::GoalStatus;
 
 /// Wishes for frames that are kept; the oldest gives way, for a viewer may go without a word.
 pub const MAX_WISHES: usize = 64;

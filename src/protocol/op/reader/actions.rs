@@ -6,14 +6,9 @@ use serde_json::value::RawValue;
 
 use super::OpReader;
 use crate::protocol::catalog::Action;
-use crate::protocol::op::{ActionGoal, Op, OpError, Problem, PursuerOp};
+use crate::protocol::op::{ActionGoal, GoalStatus, Op, OpError, Problem, PursuerOp};
 use crate::protocol::wire::json;
 use crate::protocol::wire::payload::Payload;
-
-/// The greatest status of a goal: aborted.
-const ABORTED: u8 = 6;
-/// The status of a goal that was reached.
-const SUCCEEDED: u8 = 4;
 
 impl OpReader<'_> {
     /// A goal. As soon as its action is known it can be answered as a goal, whatever else is wrong.
@@ -71,11 +66,15 @@ impl OpReader<'_> {
 
     fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {
         let Some(raw) = self.get("status") else {
-            return Ok(if is_good { SUCCEEDED } else { ABORTED });
+            return Ok(if is_good {
+                GoalStatus::Succeeded
+            } else {
+                GoalStatus::Aborted
+            } as u8);
         };
         let status = json::integer(raw).and_then(|status| u8::try_from(status).ok());
         status
-            .filter(|status| *status <= ABORTED)
+            .filter(|status| *status <= GoalStatus::Aborted as u8)
             .ok_or_else(|| self.mistyped("status", "an integer from 0 to 6", raw))
     }
 }

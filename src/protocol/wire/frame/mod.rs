@@ -41,8 +41,8 @@ enum Within {
 
 /// Takes bytes as they come and gives frames, one at a time.
 ///
-/// [`push`](Self::push) a chunk, then take frames with `next()` until it gives `None`; at the end of the stream,
-/// [`finish`](Self::finish).
+/// [`push`](Self::push) a chunk, then [`cut`](Self::cut) until it gives `None`; at the end of the stream,
+/// [`finish`](Self::finish). As an iterator it reads each frame too, and knows no series.
 #[derive(Debug)]
 pub struct FrameReader {
     buffer: Vec<u8>,
@@ -142,30 +142,10 @@ impl FrameReader {
         self.buffer.capacity()
     }
 
-    /// How many bytes are kept, in all.
-    #[must_use]
-    pub const fn kept(&self) -> usize {
-        self.buffer.len()
-    }
-
     /// Whether a frame has begun and not ended, one that is being skipped included.
     #[must_use]
     pub fn is_unfinished(&self) -> bool {
         self.state != Within::Between
-    }
-
-    /// Gives up the frame that has begun, once `next` gives none: the rest of it is skipped, as of one that is too
-    /// long. False if there is none of which anything is kept.
-    pub fn give_up(&mut self) -> bool {
-        let skipped = match self.state {
-            Within::Object => Within::SkippedObject,
-            Within::Line => Within::SkippedLine,
-            Within::Between | Within::SkippedObject | Within::SkippedLine => return false,
-        };
-        self.state = skipped;
-        self.start = self.at;
-        self.give_back();
-        true
     }
 
     /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
@@ -325,7 +305,7 @@ impl FrameReader {
         self.state = Within::Between;
         Ok(RawFrame {
             bytes,
-            names: self.nesting.names,
+            has_literals: self.nesting.has_literals,
             newline,
         })
     }

@@ -73,7 +73,7 @@ pub enum Cut {
 pub struct RawFrame {
     pub(super) bytes: Vec<u8>,
     /// Whether there may be names of numbers that are not finite.
-    pub(super) names: bool,
+    pub(super) has_literals: bool,
     pub(super) newline: bool,
 }
 
@@ -99,7 +99,7 @@ impl RawFrame {
         let text = String::from_utf8(self.bytes).map_err(|error| FrameError::NotUtf8 {
             at: error.utf8_error().valid_up_to(),
         })?;
-        let text = if self.names {
+        let text = if self.has_literals {
             json::accept_literals(text)
         } else {
             text

@@ -1,4 +1,4 @@
-//! Error against cost: the same scenes for all four methods, each against one reference.
+//! Error against cost: the same scenes for every method, each against one reference.
 //!
 //! A [`Scene`] is an arm (or the particle of `/arm_sim/integration_step`), a start, a control law and a duration, cut
 //! into [`OUTPUTS`] equal intervals. A run takes `64 k` equal steps, so that every method at every timestep lands on
