@@ -6,8 +6,8 @@
 
 use std::borrow::Cow;
 
-/// The runtime's own ids, of forwarded calls and of messages in fragments, begin with this: so a client's log shows where
-/// they come from.
+/// The runtime's own ids, of forwarded calls and of messages in fragments, begin with this: so a client's log shows
+/// where they come from.
 pub const OWN_ID_PREFIX: &str = "pendularm:";
 
 /// The name with its leading slash: what the registry and the catalog know it by.

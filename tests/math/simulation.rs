@@ -177,15 +177,15 @@ impl Truncation {
         }
     }
 
-    /// Half the timestep leaves `2⁻ᵖ` of the error, as long as that is small: one of a tenth and more says nothing. Where
-    /// one of the two errors passes through zero, the next order is left of it: a share of the other.
+    /// Half the timestep leaves `2⁻ᵖ` of the error, as long as that is small: one of more than a thousandth says
+    /// nothing. Where one of the two errors passes through zero, the next order is left of it: a share of the other.
     fn by_halving<const N: usize>(method: Method, whole: &State<N>, halves: &State<N>) -> Self {
         let share = 1.0 - 0.5_f64.powi(method.order() as i32);
         let error = |one: &[f64; N], other: &[f64; N]| apart(one, other) / share;
         let q = error(&whole.position, &halves.position);
         let qd = error(&whole.velocity, &halves.velocity);
         let larger = q.max(qd);
-        let doubt = if larger < 0.1 {
+        let doubt = if larger < 1e-3 {
             0.2 * larger
         } else {
             f64::INFINITY
