@@ -294,7 +294,7 @@ impl Real {
     }
 }
 
-/// What was handed in for a whole number that is not negative; it is judged where its field's name is known.
+/// A value handed in for a whole number that is not negative; it is judged where its field's name is known.
 #[derive(Debug)]
 pub(crate) enum Whole {
     Is(u64),

@@ -114,14 +114,12 @@ fn check_motion<const N: usize>(case: &Case) {
             let more = (time / case.dt).round() as u64 - steps;
             steps += more;
             (0..more).for_each(|_| offline.step());
-            let expected = match stored {
-                Some(errors) => Truncation::stored(errors[sample]),
-                None => {
-                    (0..2 * more).for_each(|_| finer.step());
-                    Truncation::by_halving(method, &offline.state, &finer.state)
-                }
-            };
-            check_sample(case, method, sample, &offline.state, &expected);
+            (0..2 * more).for_each(|_| finer.step());
+            let halved = Truncation::by_halving(method, &offline.state, &finer.state);
+            let stored = stored.map(|errors| Truncation::stored(errors[sample]));
+            for expected in stored.into_iter().chain([halved]) {
+                check_sample(case, method, sample, &offline.state, &expected);
+            }
             // The live arm has no effort but its controller's, which is off.
             if offline.tau == [0.0; N] {
                 live.advance(more);
