@@ -265,17 +265,22 @@ pub(crate) fn joints_or<const N: usize>(
     value.map_or(Ok(missing), |value| joints(field, value, bound))
 }
 
-/// A value handed in for a number; it is judged where its field's name is known.
+/// A value handed in for a number of this type; it is judged where its field's name is known.
 #[derive(Debug)]
-pub(crate) enum Real {
-    Is(f64),
+pub(crate) enum Handed<T> {
+    Is(T),
     Other(String),
 }
 
-impl<'py> FromPyObject<'_, 'py> for Real {
+/// Any number.
+pub(crate) type Real = Handed<f64>;
+/// A whole number that is not negative.
+pub(crate) type Whole = Handed<u64>;
+
+impl<'a, 'py, T: FromPyObject<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
     type Error = Infallible;
 
-    fn extract(value: Borrowed<'_, 'py, PyAny>) -> Result<Self, Infallible> {
+    fn extract(value: Borrowed<'a, 'py, PyAny>) -> Result<Self, Infallible> {
         Ok(value
             .extract()
             .map_or_else(|_| Self::Other(shown(&value)), Self::Is))
@@ -291,23 +296,6 @@ impl Real {
                 "{field} must be a number, got {value}"
             ))),
         }
-    }
-}
-
-/// A value handed in for a whole number that is not negative; it is judged where its field's name is known.
-#[derive(Debug)]
-pub(crate) enum Whole {
-    Is(u64),
-    Other(String),
-}
-
-impl<'py> FromPyObject<'_, 'py> for Whole {
-    type Error = Infallible;
-
-    fn extract(value: Borrowed<'_, 'py, PyAny>) -> Result<Self, Infallible> {
-        Ok(value
-            .extract()
-            .map_or_else(|_| Self::Other(shown(&value)), Self::Is))
     }
 }
 

@@ -3,8 +3,11 @@
 import json
 import socket
 import subprocess
+import sys
 import sysconfig
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -69,3 +72,36 @@ def runtime(links: int) -> Iterator[Runtime]:
     one = Runtime("--links", str(links))
     yield one
     one.end()
+
+
+@pytest.fixture
+def turns_of_another_thread() -> Callable[[Callable[[], object]], int]:
+    """Counts the turns of another thread in the middle of a call, with an interpreter that takes its lock from nobody;
+    the call is made until there is one, 1000 times at most."""
+
+    def count(call: Callable[[], object]) -> int:
+        seen, done = 0, threading.Event()
+
+        def watch() -> None:
+            nonlocal seen
+            while not done.is_set():
+                seen += 1
+                time.sleep(0.0001)
+
+        watcher = threading.Thread(target=watch)
+        interval = sys.getswitchinterval()
+        try:
+            watcher.start()
+            sys.setswitchinterval(1000)
+            before = seen
+            for _ in range(1000):
+                call()
+                if seen > before:
+                    break
+            return seen - before
+        finally:
+            done.set()
+            sys.setswitchinterval(interval)
+            watcher.join()
+
+    return count

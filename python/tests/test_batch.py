@@ -244,33 +244,9 @@ def test_what_is_refused_has_not_happened():
     assert batch.effort.any()
 
 
-def test_the_interpreters_lock_is_released_while_it_steps():
-    """Another thread gets on in the middle of a call, with an interpreter that takes its lock from nobody."""
+def test_the_interpreters_lock_is_released_while_it_steps(turns_of_another_thread):
     batch = pendularm.Batch(64, threads=1)
-    seen, done = 0, threading.Event()
-
-    def watch():
-        nonlocal seen
-        while not done.is_set():
-            seen += 1
-            time.sleep(0.001)
-
-    watcher = threading.Thread(target=watch)
-    interval = sys.getswitchinterval()
-    try:
-        watcher.start()
-        sys.setswitchinterval(1000)
-        before = seen
-        for _ in range(1000):
-            batch.step(1000)
-            if seen > before:
-                break
-        during = seen - before
-    finally:
-        done.set()
-        sys.setswitchinterval(interval)
-        watcher.join()
-    assert during > 0
+    assert turns_of_another_thread(lambda: batch.step(1000)) > 0
 
 
 def test_calls_of_several_threads_wait_for_each_other():

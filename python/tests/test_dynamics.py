@@ -1,9 +1,6 @@
 """The equation of motion against reference values that were reckoned in 160 digits by another derivation."""
 
 import json
-import sys
-import threading
-import time
 from pathlib import Path
 
 import numpy as np
@@ -68,34 +65,10 @@ def test_many_states_are_as_many_single_ones(links):
     assert dynamics.coriolis(arm, q[:1], qd[0]).shape == (1, links)
 
 
-def test_the_interpreters_lock_is_released_for_many_states(links):
-    """Another thread gets on in the middle of a call, with an interpreter that takes its lock from nobody."""
+def test_the_interpreters_lock_is_released_for_many_states(links, turns_of_another_thread):
     arm, many = pendularm.Arm(links), np.zeros((200_000, links))
     for function, fields in [(dynamics.mass_matrix, 1), (dynamics.forward_dynamics, 3), (pendularm.end_effector, 1)]:
-        seen, done = 0, threading.Event()
-
-        def watch(done=done):
-            nonlocal seen
-            while not done.is_set():
-                seen += 1
-                time.sleep(0.0001)
-
-        watcher = threading.Thread(target=watch)
-        interval = sys.getswitchinterval()
-        try:
-            watcher.start()
-            sys.setswitchinterval(1000)
-            before = seen
-            for _ in range(1000):
-                function(arm, *[many] * fields)
-                if seen > before:
-                    break
-            during = seen - before
-        finally:
-            done.set()
-            sys.setswitchinterval(interval)
-            watcher.join()
-        assert during > 0, function
+        assert turns_of_another_thread(lambda f=function, n=fields: f(arm, *[many] * n)) > 0, function
 
 
 def test_inverse_kinematics_puts_the_end_effector_there(links):

@@ -499,7 +499,7 @@ class _Folder:
                 with np.load(kept, allow_pickle=False) as file:
                     values = dict(file)
             except Exception:
-                # What is not there or damaged, in whatever way, is done again.
+                # A piece that is not there or damaged, in whatever way, is done again.
                 continue
             arms = min(self._piece, self._total - start)
             known = self._name is None or list(values) == [self._name]

@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** every call is answered once: a caller that is dropped unanswered says so itself.
 
+use std::fmt::Display;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -15,8 +16,8 @@ use tokio::time::Instant;
 use crate::actors::ConnectionId;
 use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::budget::{Account, NoRoom, Promise};
-use crate::protocol::catalog::Service;
-use crate::protocol::messages::{self, ErrorForm};
+use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::{self, ErrorForm, Level};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
 
@@ -48,6 +49,21 @@ pub struct TopicMessage {
     pub id: Option<Payload>,
     /// Dropped when the message has taken effect: the connection reads its next frame then.
     pub done: Done,
+}
+
+impl TopicMessage {
+    /// Tells the client by an error status why this is no message for `topic`.
+    pub fn refuse(self, topic: Topic, why: &impl Display) {
+        let msg = format!("{}: {why}", topic.name());
+        let frame = messages::status(Level::Error, &msg, self.id.as_ref());
+        self.respond.do_send(Respond {
+            connection: self.connection,
+            frame: frame.into(),
+            service: None,
+            status: Some(Level::Error),
+            done: Some(self.done),
+        });
+    }
 }
 
 /// Destination of a response, and what it has to say of the call.

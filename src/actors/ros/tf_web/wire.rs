@@ -10,14 +10,12 @@ use serde_json::json;
 use serde_json::value::RawValue;
 
 use super::{ForgetFrames, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames, Wisher};
-use crate::actors::node::Respond;
 use crate::actors::wire::follower::ActionRequest;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::republished::is_frame;
 use crate::protocol::messages::scene::WORLD;
-use crate::protocol::messages::{self, Level};
 use crate::protocol::op::fields::{Bound, Fields, RejectedField, Rejections};
 use crate::protocol::op::{Arguments, MAX_ARGS};
 use crate::protocol::wire::{json, text};
@@ -143,20 +141,8 @@ fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections
 fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
     Box::new(move |message| match read_goal(message.msg.raw(), N) {
         Ok(goal) => wish.do_send(goal),
-        Err(rejections) => refuse(message, Topic::TfWebGoal, &rejections),
+        Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
     })
-}
-
-fn refuse(message: TopicMessage, topic: Topic, rejections: &Rejections) {
-    let msg = format!("{}: {rejections}", topic.name());
-    let frame = messages::status(Level::Error, &msg, message.id.as_ref());
-    message.respond.do_send(Respond {
-        connection: message.connection,
-        frame: frame.into(),
-        service: None,
-        status: Some(Level::Error),
-        done: Some(message.done),
-    });
 }
 
 /// `tf2_web_republisher/TFSubscriptionActionGoal`.
@@ -179,7 +165,7 @@ fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
 fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
     Box::new(move |message| match read_cancel(message.msg.raw()) {
         Ok(id) => forget.do_send(ForgetFrames::Published(id)),
-        Err(rejections) => refuse(message, Topic::TfWebCancel, &rejections),
+        Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
     })
 }
 

@@ -5,13 +5,12 @@
 use actix::prelude::*;
 
 use crate::actors::arm::sim::node::{ArmSim, joint_names};
-use crate::actors::node::{Done, Respond};
+use crate::actors::node::Done;
 use crate::actors::wire::{Nodes, Route, TopicMessage};
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::trajectory::{TrajectoryError, joint_trajectory};
-use crate::protocol::messages::{self, Level};
 
 /// Has the registry bring this file's setpoints.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
@@ -45,17 +44,7 @@ fn setpoints<const N: usize>(arm: Recipient<SetSetpoint<N>>) -> Route<TopicMessa
             setpoint,
             done: Some(message.done),
         }),
-        Err(why) => {
-            let msg = format!("{}: {why}", Topic::JointTrajectory.name());
-            let frame = messages::status(Level::Error, &msg, message.id.as_ref());
-            message.respond.do_send(Respond {
-                connection: message.connection,
-                frame: frame.into(),
-                service: None,
-                status: Some(Level::Error),
-                done: Some(message.done),
-            });
-        }
+        Err(why) => message.refuse(Topic::JointTrajectory, &why),
     })
 }
 
