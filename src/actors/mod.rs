@@ -46,9 +46,11 @@
 //!   every step; its end.
 //! - [`SimulationTime`], from `rosapi`, `rosout` and `tf_web`: the time.
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
-//! - [`Consult`], [`RefuseSteps`], from the runtime: whom to ask for the largest stable timestep; the end, at which
-//!   steps that are still to be taken are refused.
+//! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
 //! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
+//!
+//! To `arm_sim`, `ik_action`, `follow` and `tf_web`, from the runtime: [`node::ShutDown`], the end, at which steps that
+//! are still to be taken are refused and goals are aborted.
 //!
 //! To `follow`: [`FollowPath`], [`StopFollowing`], from the registry: a path, and its end.
 //!
@@ -116,7 +118,6 @@
 //! [`SimulationTime`]: arm::sim::SimulationTime
 //! [`Tell`]: arm::sim::Tell
 //! [`Consult`]: arm::sim::Consult
-//! [`RefuseSteps`]: arm::sim::RefuseSteps
 //! [`GoalJudged`]: arm::sim::GoalJudged
 //! [`HeldLimit`]: arm::sim::HeldLimit
 //! [`Solve`]: arm::ik::Solve

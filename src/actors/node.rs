@@ -38,6 +38,12 @@ pub struct Call<A: Ask> {
     pub reply: Reply<A::Answer>,
 }
 
+/// The end, and the reason for it: calls that wait are refused, goals aborted. From the runtime, once the registry lets
+/// nothing more through.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct ShutDown(pub &'static str);
+
 /// Why a question has no answer; nothing of what it asked for has been done, or is done any more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Unserved {

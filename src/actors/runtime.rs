@@ -15,14 +15,14 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::net::TcpListener;
 use tokio::runtime::Builder;
-use tokio::time::{Instant, sleep, timeout};
+use tokio::time::{Instant, sleep, timeout_at};
 
 use super::signals::Signals;
 use crate::actors::arm::follow::{PathArm, PathFollower};
 use crate::actors::arm::ik::Ik;
 use crate::actors::arm::ik_action::{GoalTracker, IkAction};
 use crate::actors::arm::ik_trial::{GoalClient, IkTrial};
-use crate::actors::arm::sim::{ArmSim, Consult, RefuseSteps};
+use crate::actors::arm::sim::{ArmSim, Consult};
 use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
@@ -31,6 +31,7 @@ use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
+use crate::actors::node::ShutDown;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
@@ -159,7 +160,7 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     for listener in listeners {
         listener.do_send(StopListening);
     }
-    shut_down(&registry, ends.steps.as_ref(), &workers, &gauges).await;
+    shut_down(&registry, &ends.busy, &workers, &gauges).await;
     #[cfg(feature = "record")]
     ends.finish_record().await;
     arm_thread.stop();
@@ -194,8 +195,8 @@ fn gate(options: &Options, unauthenticated: usize) -> Gate {
 /// The ways by which the nodes that know the number of links are told of the end.
 #[derive(Default)]
 struct NodeEnds {
-    /// Steps that are still to be taken are refused.
-    steps: Option<Recipient<RefuseSteps>>,
+    /// Who has something under way for clients.
+    busy: Vec<Recipient<ShutDown>>,
     #[cfg(feature = "record")]
     record: Option<Recipient<RecordTo>>,
     #[cfg(feature = "record")]
@@ -218,7 +219,7 @@ impl NodeEnds {
     /// Ends the record, if there is one, for a bounded time.
     async fn finish_record(&self) {
         if let Some(recorder) = &self.end_record {
-            let _ = timeout(RECORD_TIME, recorder.send(EndRecord)).await;
+            let _ = timeout_at(Instant::now() + RECORD_TIME, recorder.send(EndRecord)).await;
         }
     }
 }
@@ -254,7 +255,8 @@ where
         arm.clone().recipient(),
         registry.clone().recipient(),
     );
-    TfRepublisher::attach(&frames.start(), nodes);
+    let frames = frames.start();
+    TfRepublisher::attach(&frames, nodes);
 
     let study = Study::<N>::new(arm.clone().recipient(), workers.clone()).start();
     Study::attach(&study, nodes);
@@ -263,7 +265,8 @@ where
     let publish = registry.clone().recipient();
     let ik = Ik::<N>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
-    PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), nodes);
+    let follower = PathFollower::new(PathArm::of(&arm)).start();
+    PathFollower::attach(&follower, nodes);
     let tracker = GoalTracker {
         track: arm.clone().recipient(),
         command: arm.clone().recipient(),
@@ -271,6 +274,12 @@ where
     };
     let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
     IkAction::attach(&action, nodes);
+    let busy = vec![
+        arm.clone().recipient(),
+        action.clone().recipient(),
+        follower.recipient(),
+        frames.recipient(),
+    ];
     let goals = GoalClient {
         send: action.clone().recipient(),
         cancel: action.clone().recipient(),
@@ -290,7 +299,7 @@ where
     #[cfg(not(feature = "record"))]
     let _ = options;
     NodeEnds {
-        steps: Some(arm.recipient()),
+        busy,
         #[cfg(feature = "record")]
         record: Some(recorder.clone().recipient()),
         #[cfg(feature = "record")]
@@ -358,15 +367,15 @@ fn announce_page(address: SocketAddr, asks_token: bool) {
 /// Refuses what waits, lets every connection send what it owes, for a bounded time.
 async fn shut_down(
     registry: &Addr<Registry>,
-    steps: Option<&Recipient<RefuseSteps>>,
+    busy: &[Recipient<ShutDown>],
     workers: &WorkerPool,
     gauges: &Gauges,
 ) {
     let _ = registry.send(RefuseCalls(SHUTTING_DOWN)).await;
     workers.close(SHUTTING_DOWN);
     let answered = Instant::now() + ANSWER_TIME;
-    if let Some(steps) = steps {
-        let _ = timeout(ANSWER_TIME, steps.send(RefuseSteps(SHUTTING_DOWN))).await;
+    for node in busy {
+        let _ = timeout_at(answered, node.send(ShutDown(SHUTTING_DOWN))).await;
     }
     until(answered, || workers.is_idle()).await;
     let _ = registry.send(FinishAll).await;

@@ -6,7 +6,10 @@
 //!
 //! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
 
-use std::sync::{LazyLock, OnceLock};
+use std::sync::LazyLock;
+
+use tokio::sync::OnceCell;
+use tokio::task::spawn_blocking;
 
 use super::authority::Authority;
 use super::bundle::{bundle, styles};
@@ -143,9 +146,9 @@ static BUNDLES: LazyLock<[Asset; 2]> = LazyLock::new(|| {
     ]
 });
 
-/// Each file once packed: a fraction of a millisecond, when it is first asked for.
-static PACKED: [OnceLock<Vec<u8>>; ASSETS.len() + 2] =
-    [const { OnceLock::new() }; ASSETS.len() + 2];
+/// Each file once packed, when it is first asked for.
+static PACKED: [OnceCell<Vec<u8>>; ASSETS.len() + 2] =
+    [const { OnceCell::const_new() }; ASSETS.len() + 2];
 
 /// How hard the packing tries: beyond it text gets hardly smaller.
 const LEVEL: u8 = 6;
@@ -169,7 +172,7 @@ pub fn versioned(path: &str) -> String {
 /// The answer to a request for `path`, if that is a file of the page. It goes out packed to a client that takes
 /// `encodings` with `deflate` among them; the document shows the way to the report if there is one.
 #[must_use]
-pub fn answer(
+pub async fn answer(
     path: &str,
     own: &Authority,
     encodings: &str,
@@ -184,14 +187,12 @@ pub fn answer(
     };
     let mut served = ASSETS.iter().chain(bundles).enumerate();
     let (index, asset) = served.find(|(_, asset)| asset.path == wanted)?;
+    let takes_packed = encodings.split(',').any(|one| one.trim() == "deflate");
     let response = if wanted == "/" {
         let html = document(asset.bytes, has_report);
         HttpResponse::file(asset.kind, policy(own), html)
-    } else if encodings.split(',').any(|one| one.trim() == "deflate") {
-        let packed = PACKED
-            .get(index)?
-            .get_or_init(|| miniz_oxide::deflate::compress_to_vec_zlib(asset.bytes, LEVEL));
-        let response = HttpResponse::file(asset.kind, policy(own), packed.as_slice());
+    } else if takes_packed && let Some(packed) = packed(index, asset.bytes).await {
+        let response = HttpResponse::file(asset.kind, policy(own), packed);
         response.with("Content-Encoding", "deflate")
     } else {
         HttpResponse::file(asset.kind, policy(own), asset.bytes)
@@ -201,6 +202,13 @@ pub fn answer(
         Some(_) if wanted != "/" => response.kept(),
         _ => response,
     })
+}
+
+/// The file, packed: by another thread, since it takes milliseconds once. `None` if the runtime ends meanwhile.
+async fn packed(index: usize, bytes: &'static [u8]) -> Option<&'static [u8]> {
+    let pack = || spawn_blocking(|| miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL));
+    let packed = PACKED.get(index)?.get_or_try_init(pack).await;
+    packed.ok().map(Vec::as_slice)
 }
 
 /// The page's document: its files by their versioned names, its scripts as one and its style sheets as one.
@@ -233,7 +241,10 @@ fn policy(own: &Authority) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use futures_util::FutureExt;
     use std::collections::BTreeSet;
+    use std::future::ready;
+    use std::pin::pin;
 
     #[test]
     fn every_file_of_the_folder_is_served() {
@@ -248,8 +259,8 @@ mod tests {
         assert_eq!(paths.len(), ASSETS.len());
     }
 
-    #[test]
-    fn the_document_names_only_files_that_are_served() {
+    #[tokio::test]
+    async fn the_document_names_only_files_that_are_served() {
         let html = String::from_utf8(document(ASSETS[0].bytes, false)).unwrap();
         let own = Authority::parse("127.0.0.1:9095").unwrap();
         let named: Vec<&str> = html
@@ -259,8 +270,23 @@ mod tests {
         let files: BTreeSet<&str> = named.iter().copied().collect();
         assert_eq!(files.len(), 3, "{files:?}");
         for path in named {
-            assert!(answer(path, &own, "", false).is_some(), "{path}");
+            assert!(answer(path, &own, "", false).await.is_some(), "{path}");
         }
+    }
+
+    #[tokio::test]
+    async fn a_file_is_packed_once_and_not_by_the_thread_that_serves_everybody() {
+        let own = Authority::parse("127.0.0.1:9095").unwrap();
+        let path = versioned(SCRIPT);
+        let mut asked = pin!(answer(&path, &own, "gzip, deflate", false));
+        let first = tokio::select! {
+            biased;
+            response = &mut asked => panic!("packed at once: {response:?}"),
+            () = ready(()) => asked.await.unwrap(),
+        };
+        assert!(first.head().contains("Content-Encoding: deflate"));
+        let again = answer(&path, &own, "deflate", false).now_or_never();
+        assert_eq!(again.flatten().unwrap().body(), first.body());
     }
 
     #[test]

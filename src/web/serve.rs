@@ -71,7 +71,7 @@ pub async fn receive<S: AsyncRead + Unpin>(
     due: Instant,
 ) -> Option<Result<Served, Declined>> {
     match timeout_at(due, read_head(stream, bytes)).await {
-        Ok(Some(Ok(request))) => Some(judge(&request, door, local)),
+        Ok(Some(Ok(request))) => Some(judge(&request, door, local).await),
         Ok(Some(Err(error))) => Some(Err(malformed(&error).into())),
         Ok(None) => None,
         Err(_) => {
@@ -144,7 +144,7 @@ fn malformed(error: &HeadError) -> HttpResponse {
 }
 
 /// Judges a request: may it be served, and how.
-fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served, Declined> {
+async fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served, Declined> {
     let own = door.access.host(request, local)?;
     let opens_socket = upgrade::is_wanted(request);
     if opens_socket {
@@ -155,7 +155,7 @@ fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served
     if opens_socket {
         return Ok(open_socket(request, cookie.as_deref()));
     }
-    Ok(match find(request, &own, door) {
+    Ok(match find(request, &own, door).await {
         Served::Answer(response) => Served::Answer(with_cookie(response, cookie)),
         Served::Report(name, _) => Served::Report(name, cookie),
         upgrade @ Served::Upgrade(_) => upgrade,
@@ -195,11 +195,12 @@ fn open_socket(request: &RequestHead, cookie: Option<&str>) -> Served {
 }
 
 /// Finds the page, the file or the sentence that stands at a path.
-fn find(request: &RequestHead, own: &Authority, door: &Door) -> Served {
+async fn find(request: &RequestHead, own: &Authority, door: &Door) -> Served {
     let path = request.path.as_str();
     let encodings = request.one("accept-encoding").unwrap_or_default();
     let has_report = || report::exists(&door.report);
-    if let Some(response) = page::answer(path, own, encodings, path == "/" && has_report()) {
+    let page = page::answer(path, own, encodings, path == "/" && has_report());
+    if let Some(response) = page.await {
         return Served::Answer(response);
     }
     if let Some(rest) = path.strip_prefix(report::PREFIX) {

@@ -11,11 +11,13 @@ use std::time::Duration;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSettings, ArmSim, Disturb, Enable, EndGoal, MAX_STEPS, Pause, RefuseSteps, Reset,
+    ArmPose, ArmSettings, ArmSim, Disturb, Enable, EndGoal, MAX_STEPS, Pause, Reset,
     STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, SimulationTime, Step, Stepped,
     StepsEnd, TURN_MESSAGES, TakeSnapshot,
 };
-use pendularm::actors::node::{Ask, Asker, Call, Done, Interest, Publish, Reply, Unserved};
+use pendularm::actors::node::{
+    Ask, Asker, Call, Done, Interest, Publish, Reply, ShutDown, Unserved,
+};
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
@@ -445,7 +447,7 @@ fn at_the_end_the_steps_that_are_left_are_refused() {
         for connection in 1..=3 {
             bench.step(connection, MAX_STEPS);
         }
-        bench.arm.do_send(RefuseSteps("shutting down"));
+        bench.arm.do_send(ShutDown("shutting down"));
         bench.until_answers(3).await;
         assert_eq!(bench.snapshot().await.steps(), 3 * STEPS_IN_A_ROW);
         for (_, answer) in bench.answers() {

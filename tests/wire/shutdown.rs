@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::arm::ticks;
 use crate::common::{Client, PATIENCE, Runtime};
+use pendularm::protocol::op::GoalStatus;
 use serde_json::{Value, json};
 
 /// The contract's second, and one more for a machine that is busy with other tests.
@@ -113,6 +114,46 @@ fn pending_calls_are_told_that_the_program_is_shutting_down() {
         assert_eq!(frame["result"], false, "{frame}");
         assert_eq!(frame["values"], json!({}));
         assert_eq!(frame["status"], "shutting down");
+    }
+}
+
+#[test]
+fn goals_are_told_that_the_program_is_shutting_down() {
+    let mut runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let far_off = json!({"positions": [1, 1], "time_from_start": {"sec": 1000}});
+    let goals = [
+        ("/ik_action", json!({"x": 0.5, "y": 1, "tolerance": 1e-12})),
+        (
+            "/joint_trajectory_controller/follow_joint_trajectory",
+            json!({"trajectory": {"joint_names": ["joint1", "joint2"], "points": [far_off]}}),
+        ),
+        (
+            "/tf2_web_republisher",
+            json!({"source_frames": ["link_1"], "target_frame": "world", "rate": 10}),
+        ),
+    ];
+    for (action, args) in &goals {
+        client.send(
+            &json!({"op": "send_action_goal", "action": action, "id": action, "args": args,
+            "feedback": true}),
+        );
+        client.receive_where("feedback", |frame| {
+            frame["op"] == "action_feedback" && frame["action"] == *action
+        });
+    }
+    ends_on(&mut runtime, "TERM");
+    let ends: Vec<Value> = rest(&mut client)
+        .into_iter()
+        .filter(|frame| frame["op"] == "action_result")
+        .collect();
+    let mut told: Vec<&str> = ends.iter().filter_map(|end| end["id"].as_str()).collect();
+    told.sort_unstable();
+    let mut sent = goals.map(|(action, _)| action);
+    sent.sort_unstable();
+    assert_eq!(told, sent, "{ends:?}");
+    for end in &ends {
+        assert_eq!(end["status"], GoalStatus::Aborted as u8, "{end}");
     }
 }
 

@@ -73,6 +73,11 @@ pub const ATTACKS: &[Attack] = &[
         "50 clients send pieces of a byte, out of order, of messages that never end",
         many_fragments,
     ),
+    Attack::new(
+        "one-after-another",
+        "clients that fill memory in one way leave, and others come who fill it in another",
+        one_after_another,
+    ),
 ];
 
 fn deaf_statuses() -> Vec<Client> {
@@ -241,4 +246,22 @@ fn many_fragments() -> Vec<Client> {
         .advertises("/attack/pieces")
         .repeats_each(0..8 * 4000, piece)
         .times(50)
+}
+
+/// Memory of those who have left is the allocator's, until it has given it back.
+fn one_after_another() -> Vec<Client> {
+    let ways = [
+        deaf_topics(),
+        unfinished_frames(),
+        deaf_lists(),
+        fragment_bombs(),
+    ];
+    let turns = ways.into_iter().zip((0..).step_by(1000));
+    turns
+        .flat_map(|(clients, begin)| {
+            clients
+                .into_iter()
+                .map(move |client| client.after(begin).leaves_after(800))
+        })
+        .collect()
 }

@@ -15,7 +15,7 @@ use actix::prelude::*;
 
 use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
-use crate::actors::node::Done;
+use crate::actors::node::{Done, ShutDown};
 use crate::actors::wire::follower::{Canceller, GoalFollower};
 use crate::math::arm::State;
 use crate::math::goal::Cadence;
@@ -152,6 +152,14 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
     }
 }
 
+impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
+    type Result = ();
+
+    fn handle(&mut self, ShutDown(why): ShutDown, _: &mut Context<Self>) {
+        self.abort(why);
+    }
+}
+
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ActivePath<N> {
@@ -280,7 +288,7 @@ impl<const N: usize> PathFollower<N> {
         }));
     }
 
-    /// Ends the goal, whose setpoint is gone.
+    /// Ends the goal, whose setpoint is gone or will not be moved any more.
     fn abort(&mut self, why: &str) {
         if let Some(goal) = self.active.take() {
             goal.end(GoalStatus::Aborted, ResultCode::Successful, why);

@@ -20,8 +20,8 @@ pub(super) struct ActiveGoal<const N: usize> {
     pub(super) positions: [f64; N],
     /// Who follows it besides the subscribers.
     pub(super) owner: Option<GoalOwner<N>>,
-    /// Somebody has asked for its end.
-    pub(super) cancelled: bool,
+    /// The status that its client hears if it ends before it is reached.
+    pub(super) if_preempted: GoalStatus,
 }
 
 impl<const N: usize> ActiveGoal<N> {
@@ -51,8 +51,7 @@ impl<const N: usize> ActiveGoal<N> {
     fn status(&self, judged: &GoalJudged<N>) -> GoalStatus {
         match judged.outcome {
             Some(Outcome::Reached) => GoalStatus::Succeeded,
-            _ if self.cancelled => GoalStatus::Canceled,
-            _ => GoalStatus::Aborted,
+            _ => self.if_preempted,
         }
     }
 

@@ -20,11 +20,12 @@ pub use self::services::{
 };
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names};
-use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ask};
+use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Action, Node, Service, Topic};
 use crate::protocol::messages::{self as frames, goal::setpoint_trajectory};
+use crate::protocol::op::GoalStatus;
 
 /// The error for a client that cancels a goal which it has not sent, or which has ended.
 const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
@@ -107,7 +108,7 @@ impl<const N: usize> Handler<Call<CancelGoal>> for IkAction<N> {
 
     fn handle(&mut self, call: Call<CancelGoal>, ctx: &mut Context<Self>) {
         let mut reply = call.reply;
-        let cancellation = self.cancel(call.ask.goal_id.as_deref());
+        let cancellation = self.end(call.ask.goal_id.as_deref(), GoalStatus::Canceled);
         ctx.wait(cancellation.map(move |outcome, _, _| reply.answer(outcome)));
     }
 }
@@ -124,8 +125,16 @@ impl<const N: usize> Handler<CancelFollowed> for IkAction<N> {
         else {
             return from.refuse(NOT_ACTIVE);
         };
-        let cancellation = self.cancel(Some(&id));
+        let cancellation = self.end(Some(&id), GoalStatus::Canceled);
         ctx.wait(cancellation.map(move |_, _, _| drop(done)));
+    }
+}
+
+impl<const N: usize> Handler<ShutDown> for IkAction<N> {
+    type Result = ResponseActFuture<Self, ()>;
+
+    fn handle(&mut self, _: ShutDown, _: &mut Context<Self>) -> Self::Result {
+        Box::pin(self.end(None, GoalStatus::Aborted).map(|_, _, _| ()))
     }
 }
 
@@ -212,7 +221,7 @@ impl<const N: usize> IkAction<N> {
             target: goal.target,
             positions: tracking.positions,
             owner: goal.owner,
-            cancelled: false,
+            if_preempted: GoalStatus::Aborted,
         });
         id
     }
@@ -234,8 +243,13 @@ impl<const N: usize> IkAction<N> {
         self.arm.command.do_send(CommandGoal { number, positions });
     }
 
-    /// Preempts the active goal if it is the one that is meant, and if the arm has not found it reached already.
-    fn cancel(&self, goal_id: Option<&str>) -> ResponseActFuture<Self, Result<(), CancelRejected>> {
+    /// Preempts the active goal if it is the one that is meant, and if the arm has not found it reached already; its
+    /// client hears of that `status`.
+    fn end(
+        &self,
+        goal_id: Option<&str>,
+        status: GoalStatus,
+    ) -> ResponseActFuture<Self, Result<(), CancelRejected>> {
         let number = match &self.active {
             None => Err(CancelRejected::NotActive),
             Some(goal) if goal_id.is_some_and(|id| id != goal.id) => {
@@ -251,10 +265,10 @@ impl<const N: usize> IkAction<N> {
             let ended = arm.send(EndGoal { number }).await;
             ended.map_err(|_| CancelRejected::NoAnswer)
         };
-        Box::pin(ended.into_actor(self).map(|ended, node, _| {
+        Box::pin(ended.into_actor(self).map(move |ended, node, _| {
             let ended = ended?.ok_or(CancelRejected::NotActive)?;
             if let Some(goal) = &mut node.active {
-                goal.cancelled = true;
+                goal.if_preempted = status;
             }
             node.conclude(&ended);
             match ended.outcome {

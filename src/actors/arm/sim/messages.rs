@@ -52,11 +52,6 @@ pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 #[rtype(result = "()")]
 pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
 
-/// The steps that are still to be taken are refused, for the reason given. From the runtime, when it ends.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct RefuseSteps(pub &'static str);
-
 // ---- goals ----------------------------------------------------------------------------------------------------------
 
 /// Asks for the arm's pose now. From `ik` and `ik_trial`, at every request that depends on it, and from the republisher

@@ -16,7 +16,7 @@ use actix::prelude::*;
 use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose, SimulationTime};
-use crate::actors::node::{Ask, Call, Interest, Publish};
+use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
 use crate::actors::wire::follower::{Canceller, GoalFollower};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::republished::{frames, seen_from};
@@ -187,6 +187,17 @@ impl<const N: usize> Handler<Interest> for TfRepublisher<N> {
                     self.forget_published(None);
                 }
             }
+        }
+        self.keep_timer(ctx);
+    }
+}
+
+impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
+    type Result = ();
+
+    fn handle(&mut self, _: ShutDown, ctx: &mut Context<Self>) {
+        for (wish, _) in self.wishes.drain(..) {
+            wish.end(GoalStatus::Aborted);
         }
         self.keep_timer(ctx);
     }

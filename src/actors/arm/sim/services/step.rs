@@ -12,10 +12,9 @@ use serde::Serialize;
 
 use super::disturb::DIVERGED;
 use super::field_by_field::FieldByField;
-use crate::actors::arm::sim::messages::RefuseSteps;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::arm::sim::state::steps::{Stepped, Steps, StepsEnd};
-use crate::actors::node::{Ask, Call, Unserved};
+use crate::actors::node::{Ask, Call, ShutDown, Unserved};
 use crate::actors::wire::{Address, Answered, Nodes};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
@@ -45,10 +44,11 @@ impl Ask for Step {
     type Answer = Result<Stepped, Rejections>;
 }
 
-impl<const N: usize> Handler<RefuseSteps> for ArmSim<N> {
+impl<const N: usize> Handler<ShutDown> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, RefuseSteps(why): RefuseSteps, ctx: &mut Context<Self>) {
+    /// The goal that the arm pursues is its owner's to end.
+    fn handle(&mut self, ShutDown(why): ShutDown, ctx: &mut Context<Self>) {
         self.count_message(ctx);
         for mut steps in self.steps.drain(..) {
             steps.reply.refuse(Unserved::Refused(why));
