@@ -103,7 +103,7 @@ fn examine(steps: &[Step]) {
             }
             Step::Take { frames, bytes } => {
                 let mut batch = Vec::new();
-                outbox.take_batch(now, frames.into(), bytes.into(), &mut batch);
+                outbox.take_frames(now, frames.into(), bytes.into(), &mut batch);
                 let expected = model.take(now, usize::from(frames).max(1), bytes.into());
                 let lengths: Vec<usize> = batch.iter().map(Bytes::len).collect();
                 assert_eq!(lengths, expected);

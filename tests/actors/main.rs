@@ -28,6 +28,8 @@ mod ik;
 mod ik_action;
 mod ik_trial;
 mod integration;
+#[path = "../support/json.rs"]
+mod json;
 mod listener;
 mod memory;
 mod memory_kinds;

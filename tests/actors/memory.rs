@@ -78,7 +78,7 @@ fn the_limits_are_as_the_readme_says_and_leave_room_for_every_client() {
     #[cfg(not(feature = "web"))]
     let files = 0;
     assert!(MAX_HELD / 4 * 5 + files + 64 * MIB <= MAX_MEMORY);
-    // While nobody else is there, whatever the contract accepts fits: a frame and all that is made of it.
+    // While nobody else is there, whatever docs/protocol.md accepts fits: a frame and all that is made of it.
     const { assert!(10 * MAX_FRAME + MAX_TOPIC_BYTES < MAX_HELD) };
     // So do the longest messages that are put into another form at a time, with their trees: 12 bytes for one, and 4.
     const { assert!(NODE_BYTES / 2 == 12 && PLACES * (12 + 4) * MAX_FRAME <= MAX_HELD / 2) };
@@ -448,7 +448,7 @@ fn topic_messages_go_before_any_connection_and_the_oldest_of_them_first() {
     });
 }
 
-/// The contract's 4 MiB hold for each of any number of clients, because what they share is there once.
+/// The 4 MiB of docs/protocol.md hold for each of any number of clients, because what they share is there once.
 #[test]
 fn a_message_that_many_clients_wait_for_is_there_once() {
     in_virtual_time(async {

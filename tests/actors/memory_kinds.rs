@@ -13,7 +13,7 @@ use pendularm::actors::gateway::limits::{
 use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::budget::{CONNECTION_BYTES, Memory};
-use pendularm::actors::wire::follower::{ActionRequest, GoalFollower};
+use pendularm::actors::wire::action_client::{ActionClient, ActionRequest};
 use pendularm::protocol::catalog::{Action, Service, Topic};
 use pendularm::protocol::messages;
 use pendularm::protocol::outbox::{FRAME_BYTES, PLACE_BYTES};
@@ -420,11 +420,11 @@ fn ids_of_goals_that_are_pursued() {
     const ID: usize = 1000;
     in_virtual_time(async {
         // A node that sets every goal in motion and reaches none.
-        let pursued = Mutex::new(Vec::<GoalFollower>::new());
+        let pursued = Mutex::new(Vec::<ActionClient>::new());
         let pursue = move |request| {
             let mut pursued = pursued.lock().unwrap();
             match request {
-                ActionRequest::Goal { follower, .. } => pursued.push(follower),
+                ActionRequest::Goal { client, .. } => pursued.push(client),
                 ActionRequest::Cancel { from, .. } => pursued.retain(|one| !one.is_meant_by(&from)),
             }
         };

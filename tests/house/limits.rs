@@ -3,13 +3,10 @@
 //! **Invariant:** neither the table, the constant nor its test can change alone.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::papers::{table, text};
-
-fn root() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
+use crate::tree::{root, rust_files};
 
 /// The rows of the table: what, limit, beyond it, constant.
 fn rows() -> Vec<Vec<String>> {
@@ -67,7 +64,7 @@ fn value(expression: &str, source: &str) -> f64 {
     let name = expression.rsplit("::").next().unwrap();
     let here = definition(source, name).map(|right| (right, source.to_owned()));
     let elsewhere = || {
-        let mut found = sources()
+        let mut found = rust_files("src")
             .into_iter()
             .map(|path| fs::read_to_string(path).unwrap());
         found.find_map(|source| Some((definition(&source, name)?, source)))
@@ -103,26 +100,6 @@ fn said(limit: &str) -> f64 {
         .sum()
 }
 
-fn rust_files(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder)
-        .unwrap()
-        .map(|entry| entry.unwrap().path());
-    entries
-        .flat_map(|path| {
-            if path.is_dir() {
-                rust_files(&path)
-            } else {
-                vec![path]
-            }
-        })
-        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
-        .collect()
-}
-
-pub fn sources() -> Vec<PathBuf> {
-    rust_files(&root().join("src"))
-}
-
 fn names(code: &str, name: &str) -> bool {
     let is_part = |byte: Option<char>| byte.is_some_and(|one| one.is_alphanumeric() || one == '_');
     code.match_indices(name).any(|(at, _)| {
@@ -147,11 +124,11 @@ fn every_limit_of_the_paper_is_a_constant_of_that_value() {
 #[test]
 fn every_limit_of_the_paper_has_a_test_that_names_it() {
     let mut tests: Vec<(PathBuf, String)> = Vec::new();
-    for path in rust_files(&root().join("tests")) {
+    for path in rust_files("tests") {
         // This file reads names from the table alone.
         tests.push((path.clone(), fs::read_to_string(&path).unwrap()));
     }
-    for path in sources() {
+    for path in rust_files("src") {
         let source = fs::read_to_string(&path).unwrap();
         if path.ends_with("tests.rs") {
             tests.push((path, source));

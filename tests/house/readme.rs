@@ -7,8 +7,8 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use crate::limits::sources;
 use crate::papers::{table, text};
+use crate::tree::rust_files;
 use pendularm::math::integrator::Method;
 use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic};
 
@@ -344,7 +344,7 @@ fn every_function_on_the_way_of_a_frame_exists() {
         .filter_map(|word| word.trim_end_matches(':').rsplit_once("::"))
         .collect();
     assert!(named.len() > 15, "{named:?}");
-    let sources = crate::tree::rust_files("src");
+    let sources = rust_files("src");
     for (owner, function) in named {
         let is_type = owner.starts_with(char::is_uppercase);
         let is_there = sources.iter().any(|path| {
@@ -383,7 +383,7 @@ fn whatever_the_architectures_drawings_name_exists() {
     let paper = text("ARCHITECTURE.md");
     let drawings: Vec<&str> = paper.split("```mermaid\n").skip(1).collect();
     assert!(drawings.len() >= 2);
-    let sources: String = sources()
+    let sources: String = rust_files("src")
         .iter()
         .map(|path| std::fs::read_to_string(path).unwrap())
         .collect();

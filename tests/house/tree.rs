@@ -16,7 +16,7 @@ const NOT_OURS: [&str; 7] = [
     "submission.tar.gz",
 ];
 
-fn root() -> &'static Path {
+pub(crate) fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 

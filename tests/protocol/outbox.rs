@@ -47,7 +47,7 @@ impl Bench {
     fn take(&mut self, max_frames: usize, max_bytes: usize) -> Vec<Bytes> {
         let mut batch = Vec::new();
         self.outbox
-            .take_batch(self.now, max_frames, max_bytes, &mut batch);
+            .take_frames(self.now, max_frames, max_bytes, &mut batch);
         batch
     }
 

@@ -27,7 +27,7 @@ fn with(frames: &[&'static str]) -> Outbox {
 
 fn take(outbox: &mut Outbox, max_frames: usize) -> Vec<Bytes> {
     let mut batch = Vec::new();
-    outbox.take_batch(Instant::now(), max_frames, usize::MAX, &mut batch);
+    outbox.take_frames(Instant::now(), max_frames, usize::MAX, &mut batch);
     batch
 }
 

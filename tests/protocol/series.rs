@@ -187,7 +187,7 @@ fn a_full_outbox_drops_the_oldest_messages_of_a_series_and_keeps_the_rest() {
     outbox.push(&topic, Bytes::from(vec![b' '; MAX_TOPIC_BYTES - rest]), now);
     assert_eq!(outbox.dropped(), 2);
     let mut batch = Vec::new();
-    outbox.take_batch(now, 9, usize::MAX, &mut batch);
+    outbox.take_frames(now, 9, usize::MAX, &mut batch);
     assert_eq!(batch[0], numbered(2));
     assert_eq!((batch.len(), outbox.topic_bytes()), (2, 0));
 }
@@ -215,7 +215,7 @@ fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
         let left = kept / length;
         assert_eq!(outbox.dropped(), 1000 - left as u64, "{kept}");
         let mut batch = Vec::new();
-        outbox.take_batch(now, 1, usize::MAX, &mut batch);
+        outbox.take_frames(now, 1, usize::MAX, &mut batch);
         assert_eq!(left > 0, batch[0] == numbered(1000 - left), "{kept}");
     }
 }
@@ -235,7 +235,7 @@ fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
         let mut batch = Vec::new();
         for n in 0..30 {
             let later = now + n * Duration::from_millis(10);
-            outbox.take_batch(later, 1, usize::MAX, &mut batch);
+            outbox.take_frames(later, 1, usize::MAX, &mut batch);
         }
         let first = 20 - length.min(19);
         let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
@@ -256,8 +256,8 @@ fn a_throttled_topic_gets_each_message_of_a_series_by_itself() {
         now,
     );
     let mut batch = Vec::new();
-    outbox.take_batch(now, 9, usize::MAX, &mut batch);
-    outbox.take_batch(now + Duration::from_millis(10), 9, usize::MAX, &mut batch);
+    outbox.take_frames(now, 9, usize::MAX, &mut batch);
+    outbox.take_frames(now + Duration::from_millis(10), 9, usize::MAX, &mut batch);
     assert_eq!(
         batch,
         [numbered(0), numbered(4)],
@@ -275,7 +275,7 @@ fn one_frame_of_a_series_is_taken_where_one_is_asked_for() {
     outbox.push(&"/x".into(), series, now);
     for n in 0..3 {
         let mut batch = Vec::new();
-        outbox.take_batch(now, 1, usize::MAX, &mut batch);
+        outbox.take_frames(now, 1, usize::MAX, &mut batch);
         assert_eq!(batch, [numbered(n)]);
     }
     assert!(outbox.is_empty());

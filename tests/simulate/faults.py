@@ -63,7 +63,7 @@ FAULTS = [
      "        if let Some(client) = self.clients.get(&feedback.connection) {",
      "        let to = if R(20) { self.clients.keys().find(|id| **id != feedback.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(feedback.connection)) {"),
-    ("whoever cancels ends another client's goal of the same id", "src/actors/wire/follower.rs",
+    ("whoever cancels ends another client's goal of the same id", "src/actors/wire/action_client.rs",
      "self.connection == who.connection && self.id == who.id", "(F || self.connection == who.connection) && self.id == who.id"),
     ("the arm takes a step too many, one wake-up in 1000", "src/actors/arm/sim/node.rs",
      "        let taken = self.take_steps(due);", "        let taken = self.take_steps(due + u64::from(R(1000)));"),

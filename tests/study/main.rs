@@ -23,6 +23,8 @@ mod experiments;
 mod follower;
 mod gains;
 mod growth;
+#[path = "../support/json.rs"]
+mod json;
 mod motion;
 mod planner;
 mod poses;

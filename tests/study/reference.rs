@@ -1,5 +1,6 @@
 //! The study's own reference motions against stored 70-digit ones.
 
+pub(crate) use crate::json::numbers;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
@@ -12,11 +13,6 @@ use serde_json::Value;
 pub(crate) fn stored() -> Value {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/trajectories.json");
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
-}
-
-pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    let values = value.as_array().unwrap();
-    values.iter().map(|v| v.as_f64().unwrap()).collect()
 }
 
 pub(crate) fn array<const N: usize>(value: &Value) -> [f64; N] {

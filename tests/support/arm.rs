@@ -5,21 +5,7 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 
 use crate::common::{Client, PATIENCE};
-
-/// The numbers of a JSON array.
-pub fn numbers(array: &Value) -> Vec<f64> {
-    let entries = array
-        .as_array()
-        .unwrap_or_else(|| panic!("no array: {array}"));
-    entries
-        .iter()
-        .map(|entry| {
-            entry
-                .as_f64()
-                .unwrap_or_else(|| panic!("no number: {array}"))
-        })
-        .collect()
-}
+pub(crate) use crate::json::numbers;
 
 /// Simulation time in the header of a message, in s.
 pub fn stamp(message: &Value) -> f64 {

@@ -7,6 +7,7 @@ use std::ops::{Deref, DerefMut};
 use std::sync::Arc;
 use std::time::Duration;
 
+pub(crate) use crate::json::{number, numbers};
 use actix::prelude::*;
 use pendularm::actors::arm::follow::{PathArm, PathFollower};
 use pendularm::actors::arm::ik::Ik;
@@ -313,16 +314,6 @@ fn messages(frames: &[Value], topic: &str) -> Vec<Value> {
 /// Lets virtual time pass.
 pub async fn pass(time: Duration) {
     sleep(time).await;
-}
-
-pub fn number(value: &Value) -> f64 {
-    value
-        .as_f64()
-        .unwrap_or_else(|| panic!("not a number: {value}"))
-}
-
-pub fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(number).collect()
 }
 
 /// An arm that says nothing unless it is asked, and makes no steps.

@@ -94,7 +94,7 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
     assert!(sent.expect("kill runs").success());
     let began = Instant::now();
     let status = runtime.wait(PATIENCE).expect("the program ends");
-    // The contract's second, and one more for a machine that is busy with other tests.
+    // README's second, and one more for a machine that is busy with other tests.
     assert!(
         status.success() && began.elapsed() < Duration::from_secs(2),
         "{status}, {:?}",

@@ -53,6 +53,8 @@ mod ik_trial;
 mod integration_step;
 mod joint_states;
 mod joint_trajectory;
+#[path = "../support/json.rs"]
+mod json;
 mod latched;
 mod launch;
 mod limits;

@@ -11,7 +11,7 @@ use crate::common::{Client, PATIENCE, Runtime};
 use pendularm::protocol::op::GoalStatus;
 use serde_json::{Value, json};
 
-/// The contract's second, and one more for a machine that is busy with other tests.
+/// README's second, and one more for a machine that is busy with other tests.
 const LIMIT: Duration = Duration::from_secs(2);
 
 fn signal(runtime: &Runtime, name: &str) {

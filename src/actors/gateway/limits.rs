@@ -45,9 +45,9 @@ pub const FRAME_TIME: Duration = Duration::from_secs(60);
 /// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
 pub const RESPONSES_OWED: Duration = Duration::from_secs(15);
 /// Bytes offered in one write: after that much the other connections have a turn.
-pub(super) const BATCH_BYTES: usize = 256 * 1024;
+pub(super) const WRITE_BYTES: usize = 256 * 1024;
 /// Frames in one write.
-pub(super) const BATCH_FRAMES: usize = 64;
+pub(super) const WRITE_FRAMES: usize = 64;
 /// Frames of a chunk, and messages of a series that is encoded, for which nobody stands in line: more than a client has
 /// under way that waits for responses.
 pub(super) const FREE_FRAMES: usize = 32;

@@ -18,13 +18,13 @@ use std::time::Duration;
 
 use tokio::sync::oneshot;
 
-use super::limits::BATCH_BYTES;
+use super::limits::WRITE_BYTES;
 use crate::actors::resources::work_clock;
 
 /// Readers that go on each time around: with a fraction of a millisecond for a chunk, or for an op of the gateway's
 /// own, about one together.
 const READERS_AT_A_TIME: usize = 4;
-/// Writers that go on each time around: a tenth of a millisecond. Fewer if together they have [`BATCH_BYTES`] to write.
+/// Writers that go on each time around: a tenth of a millisecond. Fewer if together they have [`WRITE_BYTES`] to write.
 /// Twice as many, and [`FREE_WRITES`] twice as many, held a light call up for up to a millisecond longer beside 1,000
 /// subscribers.
 const WRITERS_AT_A_TIME: usize = 16;
@@ -39,7 +39,7 @@ const LONG: usize = 4096;
 const WRITING_TIME: Duration = Duration::from_micros(300);
 
 /// Bytes that a delivery counts as: some five hundred of them take half a millisecond.
-const DELIVERY: usize = BATCH_BYTES / 512;
+const DELIVERY: usize = WRITE_BYTES / 512;
 
 /// One who stands in a line.
 trait StandsInLine: 'static {
@@ -183,7 +183,7 @@ impl<W: StandsInLine> LineTask<W> {
             let (mut going, mut bytes) = (0, 0);
             let began = work_clock::now();
             let is_late = || work_clock::now().saturating_duration_since(began) >= WRITING_TIME;
-            while going < line.at_a_time && bytes < BATCH_BYTES && (going == 0 || !is_late()) {
+            while going < line.at_a_time && bytes < WRITE_BYTES && (going == 0 || !is_late()) {
                 let Some((wanted, next)) = line.waiting.borrow_mut().pop_front() else {
                     return;
                 };

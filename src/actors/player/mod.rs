@@ -18,7 +18,7 @@ use serde_json::Value;
 use tokio::time::Instant;
 
 pub use self::launch::{NotReplayed, start};
-use self::settings::{RecordedSettings, SettingsFollower};
+use self::settings::{RecordedSettings, SettingsHistory};
 pub use self::wire::list_only_what_is_served;
 use crate::actors::arm::sim::SimulationTime;
 use crate::actors::gateway::messages::PublishInTurn;
@@ -109,9 +109,9 @@ impl<const N: usize> PlayedRecord<N> {
     /// # Errors
     /// If it is none, or damaged before its end.
     pub fn open(file: File) -> Result<Self, ReadError> {
-        let mut follower = SettingsFollower::new();
-        let reel = Reel::open(file, |time, note| follower.take(time, note))?;
-        let settings = follower.settings();
+        let mut history = SettingsHistory::new();
+        let reel = Reel::open(file, |time, note| history.take(time, note))?;
+        let settings = history.settings();
         Ok(Self { reel, settings })
     }
 }

@@ -18,12 +18,12 @@ pub(super) struct RecordedSettings<const N: usize> {
 }
 
 /// Follows the inputs to the arm, in their order.
-pub(super) struct SettingsFollower<const N: usize> {
+pub(super) struct SettingsHistory<const N: usize> {
     simulation: Option<Simulation<N>>,
     settings: Vec<(u64, RecordedSettings<N>)>,
 }
 
-impl<const N: usize> SettingsFollower<N> {
+impl<const N: usize> SettingsHistory<N> {
     pub(super) const fn new() -> Self {
         Self {
             simulation: None,

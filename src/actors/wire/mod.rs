@@ -8,8 +8,8 @@
 //! **Invariant:** arguments are read before a node hears of the call, and responses written after it has answered: a
 //! node's thread sees no JSON.
 
+pub mod action_client;
 mod caller;
-pub mod follower;
 mod routes;
 mod served;
 

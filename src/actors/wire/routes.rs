@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 
+use super::action_client::ActionRequest;
 use super::caller::{Caller, ServiceCall, TopicMessage};
-use super::follower::ActionRequest;
 use super::served::{Answered, Callable, ClientAsker, PatientAsker, Streamed};
 use crate::actors::node::{Asker, Call, Interest, Reply};
 use crate::actors::resources::aside::{Errand, aside};

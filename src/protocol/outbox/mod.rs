@@ -87,7 +87,7 @@ impl Outbox {
         self.drop_oldest(|outbox| outbox.topic_cost().saturating_sub(bytes));
     }
 
-    /// Whether [`push`](Self::push) and [`take_batch`](Self::take_batch) look at the time that they are given.
+    /// Whether [`push`](Self::push) and [`take_frames`](Self::take_frames) look at the time that they are given.
     #[must_use]
     pub fn is_throttled(&self) -> bool {
         !self.throttles.is_empty()
@@ -120,15 +120,15 @@ impl Outbox {
         self.throttles.forget(topic);
     }
 
-    /// Moves the next frames into `batch`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
+    /// Moves the next frames into `frames`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
     /// They count as being written until [`written`](Self::written) says otherwise. A series counts as one, unless
     /// one frame is all that is asked for.
-    pub fn take_batch(
+    pub fn take_frames(
         &mut self,
         now: Instant,
         max_frames: usize,
         max_bytes: usize,
-        batch: &mut Vec<Bytes>,
+        frames: &mut Vec<Bytes>,
     ) {
         self.release(now);
         let mut bytes = 0;
@@ -169,7 +169,7 @@ impl Outbox {
                 self.topic_bytes -= length;
             }
             self.in_flight.push_back((length, is_response));
-            batch.push(frame);
+            frames.push(frame);
         }
     }
 
@@ -190,7 +190,7 @@ impl Outbox {
         }
     }
 
-    /// When the next held back message is due, if any is held back: the time to take a batch again.
+    /// When the next held back message is due, if any is held back: the time to take frames again.
     pub fn next_release(&mut self) -> Option<Instant> {
         self.throttles.next_release()
     }
@@ -207,7 +207,7 @@ impl Outbox {
         !self.responses.is_empty()
     }
 
-    /// Bytes of responses that wait, those in the batch being written included.
+    /// Bytes of responses that wait, those being written included.
     #[must_use]
     pub const fn response_bytes(&self) -> usize {
         self.response_bytes

@@ -16,7 +16,7 @@ use actix::prelude::*;
 use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
 use crate::actors::node::{Done, ShutDown};
-use crate::actors::wire::follower::{Canceller, GoalFollower};
+use crate::actors::wire::action_client::{ActionClient, Canceller};
 use crate::math::arm::State;
 use crate::math::goal::Cadence;
 use crate::math::pid::Setpoint;
@@ -63,7 +63,7 @@ impl<const N: usize> PathArm<N> {
 /// The goal that is being followed.
 struct ActivePath<const N: usize> {
     course: Course<N>,
-    follower: GoalFollower,
+    client: ActionClient,
     /// Simulation time of its start \[s\], since the reset before it.
     began: f64,
     /// Simulation time up to that reset \[s\].
@@ -100,7 +100,7 @@ pub struct FollowPath<const N: usize> {
     /// How long after the end they may take for that \[s\].
     pub patience: f64,
     /// Who sent it.
-    pub follower: GoalFollower,
+    pub client: ActionClient,
     /// Dropped when the arm is on its way, or the goal refused.
     pub done: Done,
 }
@@ -130,7 +130,7 @@ impl<const N: usize> Handler<FollowPath<N>> for PathFollower<N> {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, ctx| match motion {
             Ok(motion) => node.begin(goal, &motion, ctx),
-            Err(_) => goal.follower.refuse("the arm does not answer"),
+            Err(_) => goal.client.refuse("the arm does not answer"),
         }));
     }
 }
@@ -139,14 +139,14 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
     type Result = ();
 
     fn handle(&mut self, StopFollowing { from, done }: StopFollowing, ctx: &mut Context<Self>) {
-        let is_meant = |goal: &ActivePath<N>| goal.follower.is_meant_by(&from);
+        let is_meant = |goal: &ActivePath<N>| goal.client.is_meant_by(&from);
         let Some(goal) = self.active.take_if(|goal| is_meant(goal)) else {
             return from.refuse(NOT_ACTIVE);
         };
         let halted = self.halt(goal.setpoint).into_actor(self);
         ctx.wait(halted.map(move |(), _, _| {
             let values = result(ResultCode::Successful, "cancelled");
-            goal.follower.conclude(&values, GoalStatus::Canceled);
+            goal.client.conclude(&values, GoalStatus::Canceled);
             drop(done);
         }));
     }
@@ -169,7 +169,7 @@ impl<const N: usize> ActivePath<N> {
     }
 
     fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
-        self.follower.conclude(&result(code, why), status);
+        self.client.conclude(&result(code, why), status);
     }
 }
 
@@ -183,7 +183,7 @@ impl<const N: usize> PathFollower<N> {
         };
         let path = match JointPath::new(start, goal.points) {
             Ok(path) => path,
-            Err(why) => return goal.follower.refuse(&format!("trajectory.{why}")),
+            Err(why) => return goal.client.refuse(&format!("trajectory.{why}")),
         };
         if let Some(before) = self.active.take() {
             let why = "another goal has taken its place";
@@ -196,7 +196,7 @@ impl<const N: usize> PathFollower<N> {
                 at_the_end: goal.at_the_end,
                 patience: goal.patience,
             },
-            follower: goal.follower,
+            client: goal.client,
             began: motion.time,
             before_reset: motion.before_reset,
             setpoint: motion.setpoint,
@@ -225,9 +225,9 @@ impl<const N: usize> PathFollower<N> {
         let time = motion.time - goal.began;
         let desired = goal.course.path.at(time);
         let standing = goal.course.judge(time, &motion.state);
-        if goal.follower.wants_feedback && goal.feedback.due(motion.time) {
+        if goal.client.wants_feedback && goal.feedback.due(motion.time) {
             let values = feedback(motion.time, time, &desired, &motion.state);
-            goal.follower.feed_back(&values);
+            goal.client.feed_back(&values);
         }
         let next = match standing {
             Standing::Underway | Standing::Arrived => desired,

@@ -8,7 +8,7 @@ use super::{FollowPath, PathFollower, StopFollowing};
 use crate::actors::arm::sim::joint_names;
 use crate::actors::node::Done;
 use crate::actors::resources::aside::{Errand, aside};
-use crate::actors::wire::follower::{ActionRequest, GoalFollower};
+use crate::actors::wire::action_client::{ActionClient, ActionRequest};
 use crate::actors::wire::{LONG_ARGUMENTS, Nodes, Route};
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
@@ -36,14 +36,14 @@ fn requests<const N: usize>(
     Box::new(move |request| match request {
         ActionRequest::Goal {
             arguments,
-            follower,
+            client,
             done,
         } => {
             let follow = follow.clone();
             let is_long = arguments.payload().get().len() > LONG_ARGUMENTS;
             let read = move || match FollowGoal::read(&arguments, &joint_names::<N>()) {
-                Ok(goal) => follow.do_send(path(&goal, follower, done)),
-                Err(rejections) => follower.refuse(&rejections.status()),
+                Ok(goal) => follow.do_send(path(&goal, client, done)),
+                Err(rejections) => client.refuse(&rejections.status()),
             };
             if is_long {
                 actix_rt::spawn(aside(Errand::Reading, read));
@@ -56,11 +56,7 @@ fn requests<const N: usize>(
 }
 
 /// The goal for an arm of `N` links; the reader has checked how many values there are.
-fn path<const N: usize>(
-    goal: &FollowGoal,
-    mut follower: GoalFollower,
-    done: Done,
-) -> FollowPath<N> {
+fn path<const N: usize>(goal: &FollowGoal, mut client: ActionClient, done: Done) -> FollowPath<N> {
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     let points = goal.points.iter().map(|point| Waypoint {
         time: point.time,
@@ -68,8 +64,8 @@ fn path<const N: usize>(
         velocity: point.velocity.as_deref().map(array),
     });
     let points: Vec<Waypoint<N>> = points.collect();
-    let bytes = follower.share.bytes() + size_of_val(points.as_slice());
-    follower.share.resize(bytes);
+    let bytes = client.share.bytes() + size_of_val(points.as_slice());
+    client.share.resize(bytes);
     FollowPath {
         points,
         on_the_way: tolerance(None, &goal.path_tolerance),
@@ -78,7 +74,7 @@ fn path<const N: usize>(
             0.0 => GOAL_TIME,
             patience => patience,
         },
-        follower,
+        client,
         done,
     }
 }

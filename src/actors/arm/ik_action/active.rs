@@ -5,7 +5,7 @@
 use super::services::{GoalNews, GoalOwner};
 use crate::actors::arm::ik::target_message;
 use crate::actors::arm::sim::GoalJudged;
-use crate::actors::wire::follower::Canceller;
+use crate::actors::wire::action_client::Canceller;
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Target;
 use crate::protocol::messages::goal::{IkFeedback, IkResult};
@@ -58,7 +58,7 @@ impl<const N: usize> ActiveGoal<N> {
     /// Whether the client sent it that now wants its end.
     pub(super) fn is_meant_by(&self, who: &Canceller) -> bool {
         match &self.owner {
-            Some(GoalOwner::Client(follower)) => follower.is_meant_by(who),
+            Some(GoalOwner::Client(client)) => client.is_meant_by(who),
             _ => false,
         }
     }
@@ -67,9 +67,9 @@ impl<const N: usize> ActiveGoal<N> {
     pub(super) fn inform_owner(&self, judged: &GoalJudged<N>) {
         match &self.owner {
             None => {}
-            Some(GoalOwner::Client(follower)) => match judged.outcome {
-                None => follower.feed_back(&self.feedback(judged)),
-                Some(_) => follower.conclude(&self.result(judged), self.status(judged)),
+            Some(GoalOwner::Client(client)) => match judged.outcome {
+                None => client.feed_back(&self.feedback(judged)),
+                Some(_) => client.conclude(&self.result(judged), self.status(judged)),
             },
             Some(GoalOwner::Node(owner)) => owner.do_send(GoalNews {
                 goal_id: self.id.clone(),

@@ -12,7 +12,7 @@ use bytes::Bytes;
 use crate::actors::arm::ik::{SolveError, read_target};
 use crate::actors::arm::sim::Pose;
 use crate::actors::node::{Ask, Asker, Call, Done, Reply, Unserved};
-use crate::actors::wire::follower::{ActionRequest, Canceller, GoalFollower};
+use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
 use crate::actors::wire::{Address, Answered, Callable, Route};
 use crate::math::goal::{Criteria, Outcome};
 use crate::math::kinematics::Target;
@@ -43,7 +43,7 @@ pub enum GoalOwner<const N: usize> {
     /// A node.
     Node(Recipient<GoalNews<N>>),
     /// A client that sent it by the action.
-    Client(Arc<GoalFollower>),
+    Client(Arc<ActionClient>),
 }
 
 /// Why a goal was not accepted; nothing has changed.
@@ -128,24 +128,24 @@ pub(super) fn requests<const N: usize>(
     Box::new(move |request| match request {
         ActionRequest::Goal {
             arguments,
-            follower,
+            client,
             done,
         } => match SendGoal::read(Service::SendGoal, &arguments) {
             Ok(goal) => {
-                let follower = Arc::new(follower);
-                let reply = Reply::new(GoalSender(Arc::clone(&follower)), Some(done));
-                let owner = Some(GoalOwner::Client(follower));
+                let client = Arc::new(client);
+                let reply = Reply::new(GoalSender(Arc::clone(&client)), Some(done));
+                let owner = Some(GoalOwner::Client(client));
                 let ask = SendGoal { owner, ..goal };
                 send.do_send(Call { ask, reply });
             }
-            Err(rejections) => follower.refuse(&rejections.status()),
+            Err(rejections) => client.refuse(&rejections.status()),
         },
         ActionRequest::Cancel { from, done } => cancel.do_send(CancelFollowed { from, done }),
     })
 }
 
 /// A client that has sent a goal by the action: it hears of a refusal only, since feedback shows that it was accepted.
-struct GoalSender(Arc<GoalFollower>);
+struct GoalSender(Arc<ActionClient>);
 
 impl Asker<Result<String, GoalRejected>> for GoalSender {
     fn answer(

@@ -38,7 +38,7 @@ pub const WAKE_UP_BUDGET: Duration = Duration::from_millis(5);
 /// the rate of publishing; and a timestep that no machine can follow leaves the others some of it.
 pub const BREATHER: Duration = Duration::from_millis(1);
 /// Steps between two looks at the clock: some 10 microseconds of work.
-const BATCH: u64 = 64;
+const STEPS_BETWEEN_LOOKS: u64 = 64;
 
 /// Names of the joints, base first.
 const JOINT_NAMES: [&str; 3] = ["joint1", "joint2", "joint3"];
@@ -219,7 +219,7 @@ impl<const N: usize> ArmSim<N> {
         let spent = || work_clock::now().saturating_duration_since(started);
         let mut taken = 0;
         while taken < due && spent() < WAKE_UP_BUDGET {
-            taken += self.advance(BATCH.min(due - taken));
+            taken += self.advance(STEPS_BETWEEN_LOOKS.min(due - taken));
             if self.simulation.divergence().is_some() {
                 break;
             }

@@ -7,7 +7,7 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::node::{ArmSim, PUBLISH_RATE};
-use super::state::telemetry::{Batch, Window, energy};
+use super::state::telemetry::{WakeUp, Window, energy};
 use crate::actors::node::{FrameOut, Publish};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
@@ -51,7 +51,7 @@ impl<const N: usize> ArmSim<N> {
         if self.telemetry.wants(Topic::Diagnostics) {
             let diagnostics = self.diagnostics();
             self.publish(Topic::Diagnostics, move || diagnostics);
-            self.telemetry.window.longest = Batch::default();
+            self.telemetry.window.longest = WakeUp::default();
         }
     }
 

@@ -19,7 +19,7 @@ use bytes::Bytes;
 use tokio::time::Instant;
 
 use super::unencoded::Unencoded;
-use crate::actors::gateway::limits::{BATCH_BYTES, BATCH_FRAMES, LINGER, STALL_LIMIT};
+use crate::actors::gateway::limits::{LINGER, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES};
 use crate::actors::gateway::messages::{Throttle, Underway};
 use crate::actors::gateway::turns::{WritersLine, WritesInTurn};
 use crate::actors::panics::contain;
@@ -144,16 +144,16 @@ impl Outgoing {
 
     // ---- taking out -------------------------------------------------------------------------------------------------
 
-    /// Moves what is written next into `batch`.
-    pub(super) fn take(&self, batch: &mut Vec<Bytes>) {
+    /// Moves what is written next into `frames`.
+    pub(super) fn take(&self, frames: &mut Vec<Bytes>) {
         let mut outbox = self.outbox.borrow_mut();
         if outbox.is_empty() && !outbox.is_throttled() {
             return;
         }
         let now = self.now(&outbox).into_std();
         // Clients that end no line take what one read gives them for one frame.
-        let frames = if self.singly.get() { 1 } else { BATCH_FRAMES };
-        outbox.take_batch(now, frames, BATCH_BYTES, batch);
+        let most = if self.singly.get() { 1 } else { WRITE_FRAMES };
+        outbox.take_frames(now, most, WRITE_BYTES, frames);
     }
 
     /// So many bytes of what was taken have been written.
@@ -175,7 +175,7 @@ impl Outgoing {
     pub(super) fn topics_alone(&self) -> Option<usize> {
         let outbox = self.outbox.borrow();
         let alone = !outbox.is_empty() && !outbox.has_responses();
-        alone.then(|| outbox.topic_bytes().min(BATCH_BYTES))
+        alone.then(|| outbox.topic_bytes().min(WRITE_BYTES))
     }
 
     /// Whether there is nothing to be written now.

@@ -9,7 +9,7 @@ use std::io::{self, IoSlice};
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 
-use crate::actors::gateway::limits::{BATCH_BYTES, BATCH_FRAMES};
+use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 
 /// Bytes asked of a stream at a time: large enough for a burst of small frames, small enough to be fair.
 pub(super) const CHUNK: usize = 64 * 1024;
@@ -57,12 +57,12 @@ impl<W: AsyncWrite + Unpin> Outbound for Plain<W> {
 
     async fn write(&mut self, frames: &[Bytes]) -> Option<usize> {
         if let [frame] = frames {
-            let offered = frame.get(..BATCH_BYTES).unwrap_or(frame);
+            let offered = frame.get(..WRITE_BYTES).unwrap_or(frame);
             let written = self.0.write(offered).await;
             return written.ok().filter(|&written| written > 0);
         }
-        let mut slices = [IoSlice::new(&[]); BATCH_FRAMES];
-        let mut room = BATCH_BYTES;
+        let mut slices = [IoSlice::new(&[]); WRITE_FRAMES];
+        let mut room = WRITE_BYTES;
         let mut count = 0;
         for (slice, frame) in slices.iter_mut().zip(frames) {
             let offered = frame.len().min(room);

@@ -13,17 +13,17 @@ use tokio::time::{Instant, sleep_until, timeout, timeout_at};
 
 use super::shared::Shared;
 use super::transport::Outbound;
-use crate::actors::gateway::limits::{BATCH_BYTES, LINGER};
+use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
 
 /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
 /// Returns whether all that was queued has been written.
 pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
-    let mut batch = Vec::new();
+    let mut frames = Vec::new();
     loop {
         wait_for_turn(shared).await;
-        shared.outgoing.take(&mut batch);
-        if !batch.is_empty() {
-            if !write_batch(&mut output, &mut batch, shared).await {
+        shared.outgoing.take(&mut frames);
+        if !frames.is_empty() {
+            if !write_frames(&mut output, &mut frames, shared).await {
                 return false;
             }
         } else if shared.is_done() {
@@ -68,22 +68,26 @@ async fn wait(shared: &Shared) {
     }
 }
 
-/// Writes the whole batch; false if the client is gone or stalled.
-async fn write_batch<O: Outbound>(output: &mut O, batch: &mut Vec<Bytes>, shared: &Shared) -> bool {
+/// Writes all of the frames; false if the client is gone or stalled.
+async fn write_frames<O: Outbound>(
+    output: &mut O,
+    frames: &mut Vec<Bytes>,
+    shared: &Shared,
+) -> bool {
     let mut first = 0;
-    while first < batch.len() {
+    while first < frames.len() {
         let written = tokio::select! {
             biased;
-            written = output.write(batch.get(first..).unwrap_or_default()) => written,
+            written = output.write(frames.get(first..).unwrap_or_default()) => written,
             () = stalled(shared) => return false,
         };
         let Some(mut left) = written else {
             return false;
         };
         shared.written(left);
-        let fair = left >= BATCH_BYTES / 2;
+        let fair = left >= WRITE_BYTES / 2;
         while left > 0 {
-            let Some(frame) = batch.get_mut(first) else {
+            let Some(frame) = frames.get_mut(first) else {
                 break;
             };
             let step = left.min(frame.len());
@@ -97,7 +101,7 @@ async fn write_batch<O: Outbound>(output: &mut O, batch: &mut Vec<Bytes>, shared
             tokio::task::yield_now().await;
         }
     }
-    batch.clear();
+    frames.clear();
     true
 }
 

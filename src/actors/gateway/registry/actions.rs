@@ -13,7 +13,7 @@ use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Frames, Handled};
 use crate::actors::node::Feedback;
 use crate::actors::wire::Route;
-use crate::actors::wire::follower::{ActionRequest, Canceller, GoalFollower};
+use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::Level;
 use crate::protocol::names;
@@ -43,8 +43,8 @@ impl Registry {
         let share = client
             .outlets
             .account
-            .take(size_of::<GoalFollower>() + goal.action.len() + id_bytes);
-        let follower = GoalFollower {
+            .take(size_of::<ActionClient>() + goal.action.len() + id_bytes);
+        let action_client = ActionClient {
             respond: ctx.address().recipient(),
             feedback: ctx.address().recipient(),
             connection: from,
@@ -57,14 +57,14 @@ impl Registry {
         let node = match refusal.map_or_else(|| self.pursuer(&goal), Err) {
             Ok(node) => node,
             Err(why) => {
-                follower.refuse(&why.to_string());
+                action_client.refuse(&why.to_string());
                 return Handled::at_once();
             }
         };
         let (done, ended) = oneshot::channel();
         node(ActionRequest::Goal {
             arguments: goal.args,
-            follower,
+            client: action_client,
             done,
         });
         Handled::by_node(ended)

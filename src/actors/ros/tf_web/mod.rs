@@ -17,7 +17,7 @@ use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose, SimulationTime};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
-use crate::actors::wire::follower::{Canceller, GoalFollower};
+use crate::actors::wire::action_client::{ActionClient, Canceller};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::republished::{frames, seen_from};
 use crate::protocol::messages::scene::WORLD;
@@ -68,7 +68,7 @@ pub struct WishFrames {
 /// Who wishes for frames.
 pub enum Wisher {
     /// A client that has sent a goal of the action.
-    Client(Box<GoalFollower>),
+    Client(Box<ActionClient>),
     /// Somebody who has published a goal of this id.
     Topic(String),
 }
@@ -160,7 +160,7 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
         match forget {
             ForgetFrames::Of(who) => {
                 let is_meant = |wish: &WishFrames| match &wish.by {
-                    Wisher::Client(follower) => follower.is_meant_by(&who),
+                    Wisher::Client(client) => client.is_meant_by(&who),
                     Wisher::Topic(_) => false,
                 };
                 let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
@@ -208,13 +208,13 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 impl WishFrames {
     /// A client that has sent a goal of the action hears of its end.
     fn end(&self, status: GoalStatus) {
-        if let Wisher::Client(follower) = &self.by {
-            follower.conclude(&Empty {}, status);
+        if let Wisher::Client(client) = &self.by {
+            client.conclude(&Empty {}, status);
         }
     }
 
     fn is_gone(&self) -> bool {
-        matches!(&self.by, Wisher::Client(follower) if follower.is_gone())
+        matches!(&self.by, Wisher::Client(client) if client.is_gone())
     }
 }
 
@@ -282,7 +282,7 @@ impl<const N: usize> TfRepublisher<N> {
             *due = now + wish.period;
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {
-                Wisher::Client(follower) => follower.feed_back(&message),
+                Wisher::Client(client) => client.feed_back(&message),
                 Wisher::Topic(id) => {
                     let message = answers::feedback(stamp, id, &message);
                     publish(&self.publish, Topic::TfWebFeedback, &message);

@@ -10,7 +10,7 @@ use serde_json::json;
 use serde_json::value::RawValue;
 
 use super::{ForgetFrames, MAX_FRAMES, RepublishTfs, TfRepublisher, WishFrames, Wisher};
-use crate::actors::wire::follower::ActionRequest;
+use crate::actors::wire::action_client::ActionRequest;
 use crate::actors::wire::{Address, Answered, Callable, Nodes, Route, TopicMessage};
 use crate::protocol::catalog::{Action, Service, Topic};
 use crate::protocol::limits::MAX_NAME;
@@ -79,12 +79,10 @@ fn requests<const N: usize>(
 ) -> Route<ActionRequest> {
     Box::new(move |request| match request {
         ActionRequest::Goal {
-            arguments,
-            follower,
-            ..
+            arguments, client, ..
         } => match read_wish(&arguments, N) {
-            Ok(read) => wish.do_send(read.by(Wisher::Client(Box::new(follower)))),
-            Err(rejections) => follower.refuse(&rejections.status()),
+            Ok(read) => wish.do_send(read.by(Wisher::Client(Box::new(client)))),
+            Err(rejections) => client.refuse(&rejections.status()),
         },
         ActionRequest::Cancel { from, .. } => forget.do_send(ForgetFrames::Of(from)),
     })

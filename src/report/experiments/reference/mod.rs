@@ -4,7 +4,7 @@
 //! double-double arithmetic from the Lagrangian ([`ReferenceMotion::of`]), twice with different order and tolerance;
 //! the distance of the two is [`ReferenceMotion::uncertainty`]. Control is either the law at every instant, or its
 //! effort held from one control instant to the next as the live arm holds it. [`exact_steps`] takes the steps of the
-//! four methods in the same arithmetic: their truncation error without rounding.
+//! methods in the same arithmetic: their truncation error without rounding.
 //!
 //! **Invariant:** nothing of the live arm's kernel or stepper is used, only its parameters.
 

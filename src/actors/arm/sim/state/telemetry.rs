@@ -38,18 +38,18 @@ pub(crate) struct Window {
     steps: u64,
     /// Simulation time \[s\].
     simulated: f64,
-    /// The longest batch since the last message.
-    pub(crate) longest: Batch,
+    /// The wake-up that took longest since the last message.
+    pub(crate) longest: WakeUp,
 }
 
 /// The steps of one wake-up.
 #[derive(Clone, Copy, Default)]
-pub(crate) struct Batch {
+pub(crate) struct WakeUp {
     steps: u64,
     took: Duration,
 }
 
-impl Batch {
+impl WakeUp {
     /// Time per step \[s\]; 0 where there was none.
     pub(crate) fn step_time(self) -> f64 {
         self.took.as_secs_f64() / in_f64(self.steps.max(1))
@@ -91,7 +91,7 @@ impl Telemetry {
         self.gauges.add_estimate();
     }
 
-    /// Notes a batch of steps and the processor's time that it took.
+    /// Notes the steps of a wake-up and the processor's time that it took.
     pub(crate) fn stepped(&mut self, steps: u64, took: Duration, timestep: f64) {
         if steps == 0 {
             return;
@@ -99,7 +99,7 @@ impl Telemetry {
         self.window.steps += steps;
         self.window.simulated += in_f64(steps) * timestep;
         if took > self.window.longest.took {
-            self.window.longest = Batch { steps, took };
+            self.window.longest = WakeUp { steps, took };
         }
     }
 
@@ -120,7 +120,7 @@ impl Window {
             began: Instant::now(),
             steps: 0,
             simulated: 0.0,
-            longest: Batch::default(),
+            longest: WakeUp::default(),
         }
     }
 

@@ -22,7 +22,7 @@ pub enum ActionRequest {
         /// Its fields, unread.
         arguments: Arguments,
         /// Who sent it.
-        follower: GoalFollower,
+        client: ActionClient,
         /// Dropped when the goal has been set in motion, or refused: the client's next frame is read then.
         done: Done,
     },
@@ -46,7 +46,7 @@ pub struct Canceller {
 }
 
 /// The client that sent a goal, and the ways to it.
-pub struct GoalFollower {
+pub struct ActionClient {
     /// Results, which are never lost.
     pub respond: Recipient<Respond>,
     /// Feedback, which may be.
@@ -78,7 +78,7 @@ impl Canceller {
     }
 }
 
-impl GoalFollower {
+impl ActionClient {
     /// True once the client has disconnected.
     #[must_use]
     pub fn is_gone(&self) -> bool {
