@@ -21,8 +21,8 @@ set -euo pipefail
 
 root=$(cd "$(dirname "$0")/.." && pwd)
 bar=90
-# Processor time of one run of a layer's tests, which need about 2, 0.6 and 35 s, the actors' up to 180 where others use the processor too: what loops
-# is caught so, however busy the machine is.
+# Processor time of one run of a layer's tests, which need about 2, 0.6 and 35 s on a quiet machine, the actors' more than 80 on a busy one:
+# what loops is caught so.
 declare -A cpu_seconds=([math]=10 [protocol]=6 [actors]=240)
 base=${MUTANTS_DIR:-$root/target/mutants}
 # Each layer builds in its own folder.

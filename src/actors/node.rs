@@ -15,7 +15,8 @@ use tokio::sync::oneshot;
 use super::ConnectionId;
 use crate::actors::resources::budget::NoRoom;
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::Level;
+use crate::protocol::messages::{self, Level};
+use crate::protocol::wire::payload::Payload;
 
 // ---- questions ------------------------------------------------------------------------------------------------------
 
@@ -312,6 +313,20 @@ pub struct Respond {
     pub status: Option<Level>,
     /// Dropped once the frame is on its way, where that is also the end of the call.
     pub done: Option<Done>,
+}
+
+impl Respond {
+    /// An error status that says why; `id` is that of the frame at fault.
+    #[must_use]
+    pub fn error(connection: ConnectionId, why: &str, id: Option<&Payload>) -> Self {
+        Self {
+            connection,
+            frame: messages::status(Level::Error, why, id).into(),
+            service: None,
+            status: Some(Level::Error),
+            done: None,
+        }
+    }
 }
 
 /// Feedback of a goal, for the client that sent it; may be dropped when that is slow. From the node that pursues the

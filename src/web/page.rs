@@ -169,15 +169,17 @@ pub fn versioned(path: &str) -> String {
     format!("{}{path}", *VERSION)
 }
 
-/// The answer to a request for `path`, if that is a file of the page. It goes out packed to a client that takes
-/// `encodings` with `deflate` among them; the document shows the way to the report if there is one.
+/// A file of the page that was asked for, as it is and perhaps to be packed.
+#[derive(Debug)]
+pub struct PageFile {
+    response: HttpResponse,
+    to_pack: Option<(&'static OnceCell<Vec<u8>>, &'static [u8])>,
+}
+
+/// The file at `path`, if that is one of the page's. It goes out packed to a client that takes `encodings` with
+/// `deflate` among them; the document shows the way to the report if there is one.
 #[must_use]
-pub async fn answer(
-    path: &str,
-    own: &Authority,
-    encodings: &str,
-    has_report: bool,
-) -> Option<HttpResponse> {
+pub fn find(path: &str, own: &Authority, encodings: &str, has_report: bool) -> Option<PageFile> {
     let kept = path.strip_prefix(VERSION.as_str());
     let wanted = kept.unwrap_or(path);
     let bundles = if kept.is_some() {
@@ -185,30 +187,39 @@ pub async fn answer(
     } else {
         &[]
     };
-    let mut served = ASSETS.iter().chain(bundles).enumerate();
-    let (index, asset) = served.find(|(_, asset)| asset.path == wanted)?;
-    let takes_packed = encodings.split(',').any(|one| one.trim() == "deflate");
-    let response = if wanted == "/" {
+    let mut served = ASSETS.iter().chain(bundles).zip(&PACKED);
+    let (asset, packed) = served.find(|(asset, _)| asset.path == wanted)?;
+    let is_document = wanted == "/";
+    let response = if is_document {
         let html = document(asset.bytes, has_report);
         HttpResponse::file(asset.kind, policy(own), html)
-    } else if takes_packed && let Some(packed) = packed(index, asset.bytes).await {
-        let response = HttpResponse::file(asset.kind, policy(own), packed);
-        response.with("Content-Encoding", "deflate")
     } else {
         HttpResponse::file(asset.kind, policy(own), asset.bytes)
     };
     let response = response.with("Vary", "Accept-Encoding");
-    Some(match kept {
-        Some(_) if wanted != "/" => response.kept(),
-        _ => response,
+    let takes_packed = encodings.split(',').any(|one| one.trim() == "deflate");
+    Some(PageFile {
+        response: match kept {
+            Some(_) if !is_document => response.kept(),
+            _ => response,
+        },
+        to_pack: (takes_packed && !is_document).then_some((packed, asset.bytes)),
     })
 }
 
-/// The file, packed: by another thread, since it takes milliseconds once. `None` if the runtime ends meanwhile.
-async fn packed(index: usize, bytes: &'static [u8]) -> Option<&'static [u8]> {
-    let pack = || spawn_blocking(|| miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL));
-    let packed = PACKED.get(index)?.get_or_try_init(pack).await;
-    packed.ok().map(Vec::as_slice)
+impl PageFile {
+    /// The answer. Packing a file takes milliseconds, once: another thread does it.
+    pub async fn answer(self) -> HttpResponse {
+        let Some((packed, bytes)) = self.to_pack else {
+            return self.response;
+        };
+        let pack = || spawn_blocking(|| miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL));
+        match packed.get_or_try_init(pack).await {
+            Ok(packed) => self.response.packed(packed),
+            // The runtime is ending.
+            Err(_) => self.response,
+        }
+    }
 }
 
 /// The page's document: its files by their versioned names, its scripts as one and its style sheets as one.
@@ -259,8 +270,8 @@ mod tests {
         assert_eq!(paths.len(), ASSETS.len());
     }
 
-    #[tokio::test]
-    async fn the_document_names_only_files_that_are_served() {
+    #[test]
+    fn the_document_names_only_files_that_are_served() {
         let html = String::from_utf8(document(ASSETS[0].bytes, false)).unwrap();
         let own = Authority::parse("127.0.0.1:9095").unwrap();
         let named: Vec<&str> = html
@@ -270,7 +281,7 @@ mod tests {
         let files: BTreeSet<&str> = named.iter().copied().collect();
         assert_eq!(files.len(), 3, "{files:?}");
         for path in named {
-            assert!(answer(path, &own, "", false).await.is_some(), "{path}");
+            assert!(find(path, &own, "", false).is_some(), "{path}");
         }
     }
 
@@ -278,15 +289,15 @@ mod tests {
     async fn a_file_is_packed_once_and_not_by_the_thread_that_serves_everybody() {
         let own = Authority::parse("127.0.0.1:9095").unwrap();
         let path = versioned(SCRIPT);
-        let mut asked = pin!(answer(&path, &own, "gzip, deflate", false));
+        let ask = || find(&path, &own, "gzip, deflate", false).unwrap().answer();
+        let mut asked = pin!(ask());
         let first = tokio::select! {
             biased;
             response = &mut asked => panic!("packed at once: {response:?}"),
-            () = ready(()) => asked.await.unwrap(),
+            () = ready(()) => asked.await,
         };
         assert!(first.head().contains("Content-Encoding: deflate"));
-        let again = answer(&path, &own, "deflate", false).now_or_never();
-        assert_eq!(again.flatten().unwrap().body(), first.body());
+        assert_eq!(ask().now_or_never(), Some(first));
     }
 
     #[test]

@@ -114,6 +114,13 @@ impl HttpResponse {
         self
     }
 
+    /// The same with `body`, its own body packed by `deflate`.
+    #[must_use]
+    pub fn packed(mut self, body: &'static [u8]) -> Self {
+        self.body = body.into();
+        self.with("Content-Encoding", "deflate")
+    }
+
     /// The sentence.
     #[must_use]
     pub fn body(&self) -> &[u8] {

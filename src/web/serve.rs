@@ -40,6 +40,8 @@ pub enum Served {
     Answer(HttpResponse),
     /// The stream becomes a WebSocket once this has been sent.
     Upgrade(Vec<u8>),
+    /// It is answered with a file of the page, and a cookie to be set with it.
+    Page(page::PageFile, Option<String>),
     /// A file of the report is to be read, and a cookie to be set with it.
     Report(report::FileName, Option<String>),
 }
@@ -71,7 +73,7 @@ pub async fn receive<S: AsyncRead + Unpin>(
     due: Instant,
 ) -> Option<Result<Served, Declined>> {
     match timeout_at(due, read_head(stream, bytes)).await {
-        Ok(Some(Ok(request))) => Some(judge(&request, door, local).await),
+        Ok(Some(Ok(request))) => Some(judge(&request, door, local)),
         Ok(Some(Err(error))) => Some(Err(malformed(&error).into())),
         Ok(None) => None,
         Err(_) => {
@@ -96,6 +98,7 @@ pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
     // The room of a file is given back once it has been sent.
     let (response, _room) = match outcome {
         Served::Answer(response) => (response, None),
+        Served::Page(found, cookie) => (with_cookie(found.answer().await, cookie), None),
         Served::Report(name, cookie) => {
             let (response, room) = read_report(name, door, make_room).await;
             (with_cookie(response, cookie), room)
@@ -144,7 +147,7 @@ fn malformed(error: &HeadError) -> HttpResponse {
 }
 
 /// Judges a request: may it be served, and how.
-async fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served, Declined> {
+fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served, Declined> {
     let own = door.access.host(request, local)?;
     let opens_socket = upgrade::is_wanted(request);
     if opens_socket {
@@ -155,8 +158,9 @@ async fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<
     if opens_socket {
         return Ok(open_socket(request, cookie.as_deref()));
     }
-    Ok(match find(request, &own, door).await {
+    Ok(match find(request, &own, door) {
         Served::Answer(response) => Served::Answer(with_cookie(response, cookie)),
+        Served::Page(found, _) => Served::Page(found, cookie),
         Served::Report(name, _) => Served::Report(name, cookie),
         upgrade @ Served::Upgrade(_) => upgrade,
     })
@@ -195,13 +199,12 @@ fn open_socket(request: &RequestHead, cookie: Option<&str>) -> Served {
 }
 
 /// Finds the page, the file or the sentence that stands at a path.
-async fn find(request: &RequestHead, own: &Authority, door: &Door) -> Served {
+fn find(request: &RequestHead, own: &Authority, door: &Door) -> Served {
     let path = request.path.as_str();
     let encodings = request.one("accept-encoding").unwrap_or_default();
     let has_report = || report::exists(&door.report);
-    let page = page::answer(path, own, encodings, path == "/" && has_report());
-    if let Some(response) = page.await {
-        return Served::Answer(response);
+    if let Some(found) = page::find(path, own, encodings, path == "/" && has_report()) {
+        return Served::Page(found, None);
     }
     if let Some(rest) = path.strip_prefix(report::PREFIX) {
         return match report::FileName::parse(rest) {

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::actors::ConnectionId;
 use crate::actors::node::{Done, Feedback, Respond};
 use crate::actors::resources::budget::Share;
-use crate::protocol::messages::{self, Level};
+use crate::protocol::messages;
 use crate::protocol::op::{Arguments, GoalStatus};
 use crate::protocol::wire::payload::Payload;
 
@@ -68,13 +68,8 @@ pub struct ActionClient {
 impl Canceller {
     /// Tells why nothing was ended.
     pub fn refuse(&self, why: &str) {
-        self.respond.do_send(Respond {
-            connection: self.connection,
-            frame: messages::status(Level::Error, why, self.id.as_ref()).into(),
-            service: None,
-            status: Some(Level::Error),
-            done: None,
-        });
+        let status = Respond::error(self.connection, why, self.id.as_ref());
+        self.respond.do_send(status);
     }
 }
 

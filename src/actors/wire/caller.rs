@@ -17,7 +17,7 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::budget::{Account, NoRoom, Promise};
 use crate::protocol::catalog::{Service, Topic};
-use crate::protocol::messages::{self, ErrorForm, Level};
+use crate::protocol::messages::{self, ErrorForm};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
 
@@ -55,13 +55,10 @@ impl TopicMessage {
     /// Tells the client by an error status why this is no message for `topic`.
     pub fn refuse(self, topic: Topic, why: &impl Display) {
         let msg = format!("{}: {why}", topic.name());
-        let frame = messages::status(Level::Error, &msg, self.id.as_ref());
+        let status = Respond::error(self.connection, &msg, self.id.as_ref());
         self.respond.do_send(Respond {
-            connection: self.connection,
-            frame: frame.into(),
-            service: None,
-            status: Some(Level::Error),
             done: Some(self.done),
+            ..status
         });
     }
 }

@@ -101,14 +101,8 @@ impl Reception {
         let Some(connection) = id else {
             return;
         };
-        let respond = Respond {
-            connection,
-            frame: messages::status(Level::Error, &why, None).into(),
-            service: None,
-            status: Some(Level::Error),
-            done: None,
-        };
-        let _ = self.shared.registry.send(respond).await;
+        let status = Respond::error(connection, &why, None);
+        let _ = self.shared.registry.send(status).await;
         // All that was on its way to the client has come when this is answered.
         let _ = self.shared.registry.send(Disconnect(connection)).await;
         let _ = self.finish.send(Finish).await;
