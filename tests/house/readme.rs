@@ -228,6 +228,34 @@ fn the_licence_files_are_those_that_the_manifest_names() {
     assert!(text("LICENSE-APACHE").contains("Apache License"));
 }
 
+/// Where they are built otherwise, nothing that `make test` has built serves them, and CI builds all of it twice.
+#[test]
+fn the_fuzz_targets_are_built_as_the_tests_are() {
+    let profile = |path: &str| {
+        let mut section = String::new();
+        let mut settings = BTreeSet::new();
+        for line in text(path).lines() {
+            if line.starts_with('[') {
+                line.clone_into(&mut section);
+            } else if section.starts_with("[profile.dev") && line.contains('=') {
+                settings.insert(format!("{section} {line}"));
+            }
+        }
+        settings
+    };
+    let lock = text("fuzz/Cargo.lock");
+    let mut tests = profile("Cargo.toml");
+    tests.retain(|setting| {
+        let package = setting.strip_prefix("[profile.dev.package.");
+        package.is_none_or(|rest| {
+            let name = rest.split(']').next().unwrap();
+            lock.contains(&format!("name = \"{name}\""))
+        })
+    });
+    assert!(tests.len() > 3, "{tests:?}");
+    assert_eq!(profile("fuzz/Cargo.toml"), tests);
+}
+
 /// `rust-version` is a promise to whoever has an older compiler than ours: no package may break it.
 #[test]
 fn no_dependency_asks_for_a_newer_compiler_than_we_do() {
