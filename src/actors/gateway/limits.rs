@@ -48,10 +48,10 @@ pub const RESPONSES_OWED: Duration = Duration::from_secs(15);
 pub(super) const WRITE_BYTES: usize = 256 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
-/// Frames of a chunk, and messages of a series that is encoded, for which nobody stands in line: more than a client has
-/// under way that waits for responses.
+/// Frames of a chunk, and messages of a series that is encoded, for which nobody waits in a queue: more than a client
+/// that waits for responses has under way.
 pub(super) const FREE_FRAMES: usize = 32;
-/// Subscribers of a message whose publisher stands in no line after it.
+/// Subscribers of a message whose publisher waits in no queue after it.
 pub(super) const FREE_DELIVERIES: usize = 32;
 /// Pieces of messages are looked at so long after they have become too old, and so often whether a client that has
 /// enough has taken some of it.

@@ -3,11 +3,11 @@
 //! One thread serves every client, and a light call passes it some eight times on its way. Were each of two hundred
 //! clients that send all they can, or each of a thousand subscribers of a message, to go on every time around, the
 //! call would wait for all of them eight times. So a reader with a whole chunk or many frames at hand, or whose message
-//! has gone to many, stands in one line, and a writer in another once much has been written of late. A writer whose
+//! has gone to many, waits in one queue, and a writer in another once much has been written of late. A writer whose
 //! messages all come from nodes has a third: the arm publishes on, whatever others have sent to hundreds, and who hears
 //! it does not wait behind those.
 //!
-//! **Invariant:** between two looks at what else there is to do, each line lets only so many go on, first come, first
+//! **Invariant:** between two looks at what else there is to do, each queue lets only so many go on, first come, first
 //! served, and no writer once those before it have taken [`WRITING_TIME`].
 
 use std::cell::{Cell, RefCell};
@@ -28,8 +28,8 @@ const READERS_AT_A_TIME: usize = 4;
 /// Twice as many, and [`FREE_WRITES`] twice as many, held a light call up for up to a millisecond longer beside 1,000
 /// subscribers.
 const WRITERS_AT_A_TIME: usize = 16;
-/// Writes, the longer ones counting several times, for which nobody stands in line until the line has been worked
-/// through once: half a millisecond's. A hundred subscribers of a message stand in no line: it costs a tenth of what
+/// Writes, the longer ones counting several times, for which nobody waits in a queue until the queue has been
+/// worked through once: half a millisecond's. A hundred subscribers of a message wait in none: it costs a tenth of what
 /// writing to them does.
 const FREE_WRITES: usize = 128;
 /// Bytes of a message that count as another write.
@@ -41,20 +41,20 @@ const WRITING_TIME: Duration = Duration::from_micros(300);
 /// Bytes that a delivery counts as: some five hundred of them take half a millisecond.
 const DELIVERY: usize = WRITE_BYTES / 512;
 
-/// One who stands in a line.
-trait StandsInLine: 'static {
+/// One who waits in a queue.
+trait Waits: 'static {
     /// It is their turn; false if they wait no longer.
     fn go_on(self) -> bool;
 }
 
 /// A reader is a task, which is woken.
-impl StandsInLine for oneshot::Sender<()> {
+impl Waits for oneshot::Sender<()> {
     fn go_on(self) -> bool {
         self.send(()).is_ok()
     }
 }
 
-/// Writes in its turn, where the line is worked through: its actor, if that were woken, would look at its mailbox and
+/// Writes in its turn, where the queue is worked through: its actor, if that were woken, would look at its mailbox and
 /// at all that it waits for, a thousand times for a message to a thousand subscribers.
 pub(super) trait WritesInTurn {
     /// Writes what there is to write, without waiting.
@@ -62,9 +62,9 @@ pub(super) trait WritesInTurn {
 }
 
 /// A writer that waits.
-type StandingWriter = Weak<dyn WritesInTurn>;
+type WaitingWriter = Weak<dyn WritesInTurn>;
 
-impl StandsInLine for StandingWriter {
+impl Waits for WaitingWriter {
     fn go_on(self) -> bool {
         let writer = self.upgrade();
         if let Some(writer) = &writer {
@@ -74,10 +74,10 @@ impl StandsInLine for StandingWriter {
     }
 }
 
-/// A line of this thread.
-struct Line<W> {
+/// A queue of this thread.
+struct TurnQueue<W> {
     at_a_time: usize,
-    /// How many may go on without standing in line, and how many of these still may.
+    /// How many may go on without waiting, and how many of these still may.
     free: usize,
     left: Cell<usize>,
     /// Each with the bytes that it is going to write.
@@ -87,9 +87,9 @@ struct Line<W> {
 }
 
 thread_local! {
-    static READERS: Rc<Line<oneshot::Sender<()>>> = Rc::new(Line::new(READERS_AT_A_TIME, 0));
-    static PACED: Rc<Line<StandingWriter>> = Rc::new(Line::new(WRITERS_AT_A_TIME, FREE_WRITES));
-    static UNPACED: Rc<Line<StandingWriter>> = Rc::new(Line::new(WRITERS_AT_A_TIME, FREE_WRITES));
+    static READERS: Rc<TurnQueue<oneshot::Sender<()>>> = Rc::new(TurnQueue::new(READERS_AT_A_TIME, 0));
+    static PACED: Rc<TurnQueue<WaitingWriter>> = Rc::new(TurnQueue::new(WRITERS_AT_A_TIME, FREE_WRITES));
+    static UNPACED: Rc<TurnQueue<WaitingWriter>> = Rc::new(TurnQueue::new(WRITERS_AT_A_TIME, FREE_WRITES));
 }
 
 /// Waits until it is this reader's turn.
@@ -100,32 +100,32 @@ pub(super) async fn read() {
 /// The same where the reader's last message went to so many subscribers, as its next may.
 pub(super) async fn read_after(deliveries: usize) {
     let (go, goes) = oneshot::channel();
-    READERS.with(|line| line.stand(deliveries * DELIVERY, go));
+    READERS.with(|queue| queue.join(deliveries * DELIVERY, go));
     // Where the task has ended before its time, the runtime that it ran in is ending too.
     let _ = goes.await;
 }
 
-/// A line in which writers wait.
+/// A queue in which writers wait.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum WritersLine {
+pub(super) enum WritersQueue {
     /// For messages whose publishers wait until they have been offered to the socket, be it of some of them.
     Paced,
     /// For messages of nodes, which publish on.
     Unpaced,
 }
 
-impl WritersLine {
-    /// Whether a client may be written so many bytes at once; otherwise its writer has to [`stand`](Self::stand).
+impl WritersQueue {
+    /// Whether a client may be written so many bytes at once; otherwise its writer has to [`join`](Self::join).
     pub(super) fn may_write(self, bytes: usize) -> bool {
-        self.line().with(|line| line.take(1 + bytes / LONG))
+        self.queue().with(|queue| queue.take(1 + bytes / LONG))
     }
 
-    /// Puts a writer, which has so many bytes to write, at the end of the line.
-    pub(super) fn stand(self, bytes: usize, writer: StandingWriter) {
-        self.line().with(|line| line.stand(bytes, writer));
+    /// Puts a writer, which has so many bytes to write, at the end of the queue.
+    pub(super) fn join(self, bytes: usize, writer: WaitingWriter) {
+        self.queue().with(|queue| queue.join(bytes, writer));
     }
 
-    const fn line(self) -> &'static LocalKey<Rc<Line<StandingWriter>>> {
+    const fn queue(self) -> &'static LocalKey<Rc<TurnQueue<WaitingWriter>>> {
         match self {
             Self::Paced => &PACED,
             Self::Unpaced => &UNPACED,
@@ -133,7 +133,7 @@ impl WritersLine {
     }
 }
 
-impl<W: StandsInLine> Line<W> {
+impl<W: Waits> TurnQueue<W> {
     const fn new(at_a_time: usize, free: usize) -> Self {
         Self {
             at_a_time,
@@ -152,23 +152,23 @@ impl<W: StandsInLine> Line<W> {
         left.is_some()
     }
 
-    /// Has the task work through the line, and make free again what has been taken.
+    /// Has the task work through the queue, and make free again what has been taken.
     fn work(self: &Rc<Self>) {
         if !self.at_work.replace(true) {
-            actix_rt::spawn(LineTask(Rc::clone(self)).run());
+            actix_rt::spawn(TurnQueueTask(Rc::clone(self)).run());
         }
     }
 
-    fn stand(self: &Rc<Self>, bytes: usize, waiting: W) {
+    fn join(self: &Rc<Self>, bytes: usize, waiting: W) {
         self.waiting.borrow_mut().push_back((bytes, waiting));
         self.work();
     }
 }
 
 /// The task; where it ends before its time, with the runtime that it ran in, no reader waits in vain.
-struct LineTask<W: StandsInLine>(Rc<Line<W>>);
+struct TurnQueueTask<W: Waits>(Rc<TurnQueue<W>>);
 
-impl<W: StandsInLine> Drop for LineTask<W> {
+impl<W: Waits> Drop for TurnQueueTask<W> {
     fn drop(&mut self) {
         self.0.at_work.set(false);
         self.0.left.set(self.0.free);
@@ -176,15 +176,15 @@ impl<W: StandsInLine> Drop for LineTask<W> {
     }
 }
 
-impl<W: StandsInLine> LineTask<W> {
+impl<W: Waits> TurnQueueTask<W> {
     async fn run(self) {
-        let line = &self.0;
+        let queue = &self.0;
         loop {
             let (mut going, mut bytes) = (0, 0);
             let began = work_clock::now();
             let is_late = || work_clock::now().saturating_duration_since(began) >= WRITING_TIME;
-            while going < line.at_a_time && bytes < WRITE_BYTES && (going == 0 || !is_late()) {
-                let Some((wanted, next)) = line.waiting.borrow_mut().pop_front() else {
+            while going < queue.at_a_time && bytes < WRITE_BYTES && (going == 0 || !is_late()) {
+                let Some((wanted, next)) = queue.waiting.borrow_mut().pop_front() else {
                     return;
                 };
                 // One that has ended meanwhile takes no turn.

@@ -3,7 +3,7 @@
 //!
 //! The connection's handlers put things in and the [writer](super::writer) takes them out. The writer is polled after
 //! each message that the actor has handled, so it looks for itself; whatever changes something from another task says
-//! so by [`Outgoing::wake_writer`]. Where it stands in line, it is polled in its turn as well, and the actor is not.
+//! so by [`Outgoing::wake_writer`]. Where it waits in a queue, it is polled in its turn as well, and the actor is not.
 //!
 //! **Invariant:** nothing that borrows a cell here waits while it does.
 
@@ -21,7 +21,7 @@ use tokio::time::Instant;
 use super::unencoded::Unencoded;
 use crate::actors::gateway::limits::{LINGER, STALL_LIMIT, WRITE_BYTES, WRITE_FRAMES};
 use crate::actors::gateway::messages::{Throttle, Underway};
-use crate::actors::gateway::turns::{WritersLine, WritesInTurn};
+use crate::actors::gateway::turns::{WritersQueue, WritesInTurn};
 use crate::actors::panics::contain;
 use crate::actors::resources::budget::{Account, MESSAGES_LEFT, free_elsewhere};
 use crate::actors::resources::gauges::Gauges;
@@ -41,8 +41,8 @@ pub(super) struct Outgoing {
     writer: RefCell<Option<WriterFuture>>,
     /// Wakes the actor, which polls the writer.
     actor: RefCell<Waker>,
-    /// The writer stands in line.
-    in_line: Cell<bool>,
+    /// The writer waits in its queue.
+    in_queue: Cell<bool>,
     /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
     singly: Cell<bool>,
     /// Since when responses have been waiting without a break.
@@ -72,7 +72,7 @@ impl Outgoing {
             underway: RefCell::default(),
             writer: RefCell::default(),
             actor: RefCell::new(Waker::noop().clone()),
-            in_line: Cell::new(false),
+            in_queue: Cell::new(false),
             singly: Cell::new(false),
             responses_since: Cell::new(None),
             has_news: Cell::new(false),
@@ -244,23 +244,23 @@ impl Outgoing {
         self.go_on(cx);
     }
 
-    /// The line in which the writer waits, where it has to.
-    pub(super) fn line(&self) -> WritersLine {
+    /// The queue in which the writer waits, where it has to.
+    pub(super) fn queue(&self) -> WritersQueue {
         if self.underway.borrow().is_empty() {
-            WritersLine::Unpaced
+            WritersQueue::Unpaced
         } else {
-            WritersLine::Paced
+            WritersQueue::Paced
         }
     }
 
-    /// Stands in its line, in which so many bytes are to be written, while no response waits. Publishers wait as well.
+    /// Waits in its queue, with so many bytes to be written, while no response waits. Publishers wait as well.
     pub(super) async fn wait_for_turn(self: &Rc<Self>, bytes: usize) {
-        if !self.in_line.replace(true) {
+        if !self.in_queue.replace(true) {
             let this: Weak<Self> = Rc::downgrade(self);
-            self.line().stand(bytes, this);
+            self.queue().join(bytes, this);
         }
         // It is polled in its turn, and behind the handler of a response.
-        let may_go_on = || !self.in_line.get() || self.has_responses();
+        let may_go_on = || !self.in_queue.get() || self.has_responses();
         while !may_go_on() {
             self.news(may_go_on).await;
         }
@@ -280,7 +280,7 @@ impl Outgoing {
         }
         drop(writer);
         self.recount();
-        if !self.in_line.get() {
+        if !self.in_queue.get() {
             self.underway.borrow_mut().clear();
         }
     }
@@ -350,7 +350,7 @@ impl Drop for Outgoing {
 
 impl WritesInTurn for Outgoing {
     fn write_in_turn(&self) {
-        self.in_line.set(false);
+        self.in_queue.set(false);
         let actor = self.actor.borrow();
         self.go_on(&mut Context::from_waker(&actor));
     }

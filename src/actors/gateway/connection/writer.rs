@@ -2,7 +2,7 @@
 //! that is served.
 //!
 //! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
-//! put into the outbox is offered to the socket in the same turn. Where it stands in line
+//! put into the outbox is offered to the socket in the same turn. Where it waits in a queue
 //! ([`turns`](crate::actors::gateway::turns)), it is polled in its turn. A client that takes nothing wakes it when it
 //! does.
 //!
@@ -40,7 +40,7 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
 async fn wait_for_turn(shared: &Shared) {
     let outgoing = &shared.outgoing;
     if let Some(bytes) = outgoing.topics_alone()
-        && !outgoing.line().may_write(bytes)
+        && !outgoing.queue().may_write(bytes)
     {
         outgoing.wait_for_turn(bytes).await;
     }
