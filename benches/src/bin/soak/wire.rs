@@ -337,11 +337,17 @@ impl Client {
 
     /// Waits for bytes; false if none came until `deadline`.
     async fn wait_readable(&mut self, deadline: Instant) -> Result<bool, Fault> {
+        let readable = self.is_readable(deadline).await?;
+        if readable {
+            self.take_in();
+        }
+        Ok(readable)
+    }
+
+    /// Waits for bytes and leaves them where they are; false if none came until `deadline`.
+    pub async fn is_readable(&mut self, deadline: Instant) -> Result<bool, Fault> {
         match timeout_at(deadline.into(), self.stream.readable()).await {
-            Ok(Ok(())) => {
-                self.take_in();
-                Ok(true)
-            }
+            Ok(Ok(())) => Ok(true),
             Ok(Err(error)) => Err(self.fault(format!("cannot read: {error}"))),
             Err(_) => Ok(false),
         }
