@@ -57,7 +57,7 @@ test-clients: build ## Run clients that nobody here wrote against it: roslibpy, 
 	bash tests/clients/run.sh "$(TARGET_DIR)/release/pendularm"
 
 simulate: ## Run the whole runtime in virtual time under SEEDS=1000 seeds that the commit chooses; FROM=n, MINUTES=n, SEED=n
-	@echo "make simulate: builds, then some 10 to 20 seeds a second"
+	@echo "make simulate: builds, then a few seeds a second"
 	@CARGO="$(CARGO)" SEED="$(SEED)" SEEDS="$(SEEDS)" MINUTES="$(MINUTES)" FROM="$(FROM)" WITHOUT="$(WITHOUT)" GO_ON="$(GO_ON)" \
 		bash scripts/simulate.sh
 
