@@ -271,6 +271,8 @@ fn a_modest_answer_finds_room_beside_long_ones() {
         .collect();
     assert!((1..6).contains(&long.len()), "no room is left for another");
     let modest = MAX_HELD / MODEST_PART;
+    let longer = accounts[6].promise(2 * modest, false);
+    assert!(longer.is_err(), "the next eighth is for modest ones");
     let given: Vec<_> = accounts[6..13]
         .iter()
         .map(|account| account.promise(modest, false))

@@ -98,6 +98,18 @@ fn topics_are_the_catalogs_and_the_clients_as_long_as_they_use_them() {
     }
     let answer = client.ask("/rosapi/topic_type", json!({"topic": "/chat"}));
     assert_eq!(answer["type"], "std_msgs/String");
+    other.send(&json!({"op": "advertise", "topic": "/said", "type": "std_msgs/String"}));
+    other.subscribe("/heard");
+    other.settle();
+    for (topic, publishers, subscribers) in [
+        ("/said", json!(["/gateway"]), json!([])),
+        ("/heard", json!([]), json!(["/gateway"])),
+    ] {
+        let answer = client.ask("/rosapi/publishers", json!({"topic": topic}));
+        assert_eq!(answer["publishers"], publishers, "{topic}");
+        let answer = client.ask("/rosapi/subscribers", json!({"topic": topic}));
+        assert_eq!(answer["subscribers"], subscribers, "{topic}");
+    }
 
     drop(other);
     let deadline = std::time::Instant::now() + crate::common::PATIENCE;

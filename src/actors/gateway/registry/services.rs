@@ -158,3 +158,23 @@ impl Services {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use serde_json::value::RawValue;
+
+    use super::*;
+
+    #[test]
+    fn a_calls_id_is_known_however_its_provider_spells_it() {
+        let payload = |json: String| Payload::from(RawValue::from_string(json).unwrap());
+        let id = Services::call_id(u64::MAX);
+        let escaped: String = id.bytes().map(|byte| format!("\\u{byte:04x}")).collect();
+        for spelling in [format!("\"{id}\""), format!("\"{escaped}\"")] {
+            let number = Services::number_of(&payload(spelling));
+            assert_eq!(number, Some(u64::MAX));
+        }
+        let another = format!("\"{OWN_ID_PREFIX}01\"");
+        assert_eq!(Services::number_of(&payload(another)), None);
+    }
+}
