@@ -108,20 +108,25 @@ fn make_run_runs_a_program_that_is_there_where_there_is_no_cargo() {
     );
 }
 
+/// The lines of a manifest, each with the section that it stands in.
+fn by_section(manifest: &str) -> impl Iterator<Item = (&str, &str)> {
+    let mut section = "";
+    manifest.lines().filter_map(move |line| {
+        if line.starts_with('[') {
+            section = line;
+            return None;
+        }
+        Some((section, line))
+    })
+}
+
 #[test]
 fn the_papers_have_a_reason_for_every_dependency() {
     let manifest = text("Cargo.toml");
-    let mut section = "";
-    let mut dependencies = BTreeSet::new();
-    for line in manifest.lines() {
-        if line.starts_with('[') {
-            section = line;
-        } else if section.ends_with("dependencies]")
-            && let Some((name, _)) = line.split_once(" =")
-        {
-            dependencies.insert(name.to_owned());
-        }
-    }
+    let dependencies: BTreeSet<String> = by_section(&manifest)
+        .filter(|(section, _)| section.ends_with("dependencies]"))
+        .filter_map(|(_, line)| Some(line.split_once(" =")?.0.to_owned()))
+        .collect();
     let mut named = BTreeSet::new();
     for row in table(&text("docs/development.md"), "crate") {
         assert!(row[1].len() > 10, "no reason: {row:?}");
@@ -231,17 +236,11 @@ fn the_licence_files_are_those_that_the_manifest_names() {
 /// Where they are built otherwise, nothing that `make test` has built serves them, and CI builds all of it twice.
 #[test]
 fn the_fuzz_targets_are_built_as_the_tests_are() {
-    let profile = |path: &str| {
-        let mut section = String::new();
-        let mut settings = BTreeSet::new();
-        for line in text(path).lines() {
-            if line.starts_with('[') {
-                line.clone_into(&mut section);
-            } else if section.starts_with("[profile.dev") && line.contains('=') {
-                settings.insert(format!("{section} {line}"));
-            }
-        }
-        settings
+    let profile = |path: &str| -> BTreeSet<String> {
+        by_section(&text(path))
+            .filter(|(section, line)| section.starts_with("[profile.dev") && line.contains('='))
+            .map(|(section, line)| format!("{section} {line}"))
+            .collect()
     };
     let lock = text("fuzz/Cargo.lock");
     let mut tests = profile("Cargo.toml");
