@@ -36,14 +36,21 @@ const DISCARD_BYTES: usize = 1024 * 1024;
 /// The way in which a request is served.
 #[derive(Debug)]
 pub enum Served {
-    /// It is answered.
-    Answer(HttpResponse),
+    /// It is answered with this, and a cookie to be set with it.
+    Answer(Resource, Option<String>),
     /// The stream becomes a WebSocket once this has been sent.
     Upgrade(Vec<u8>),
-    /// It is answered with a file of the page, and a cookie to be set with it.
-    Page(page::PageFile, Option<String>),
-    /// A file of the report is to be read, and a cookie to be set with it.
-    Report(report::FileName, Option<String>),
+}
+
+/// Stands at a path.
+#[derive(Debug)]
+pub enum Resource {
+    /// A sentence, or the way to another path.
+    Said(HttpResponse),
+    /// A file of the page.
+    Page(page::PageFile),
+    /// A file of the report, which is to be read.
+    Report(report::FileName),
 }
 
 /// A request that gets nothing but this answer.
@@ -95,17 +102,17 @@ pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
     door: &Door,
     make_room: impl Fn() -> bool,
 ) -> bool {
-    // The room of a file is given back once it has been sent.
-    let (response, _room) = match outcome {
-        Served::Answer(response) => (response, None),
-        Served::Page(found, cookie) => (with_cookie(found.answer().await, cookie), None),
-        Served::Report(name, cookie) => {
-            let (response, room) = read_report(name, door, make_room).await;
-            (with_cookie(response, cookie), room)
-        }
+    let (resource, cookie) = match outcome {
+        Served::Answer(resource, cookie) => (resource, cookie),
         Served::Upgrade(head) => return take(stream.write_all(&head)).await.is_some(),
     };
-    answer(stream, &response).await;
+    // The room of a file is given back once it has been sent.
+    let (response, _room) = match resource {
+        Resource::Said(response) => (response, None),
+        Resource::Page(file) => (file.answer().await, None),
+        Resource::Report(name) => read_report(name, door, make_room).await,
+    };
+    answer(stream, &with_cookie(response, cookie)).await;
     false
 }
 
@@ -158,12 +165,7 @@ fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served
     if opens_socket {
         return Ok(open_socket(request, cookie.as_deref()));
     }
-    Ok(match find(request, &own, door) {
-        Served::Answer(response) => Served::Answer(with_cookie(response, cookie)),
-        Served::Page(found, _) => Served::Page(found, cookie),
-        Served::Report(name, _) => Served::Report(name, cookie),
-        upgrade @ Served::Upgrade(_) => upgrade,
-    })
+    Ok(Served::Answer(find(request, &own, door), cookie))
 }
 
 impl From<AccessError> for Declined {
@@ -190,35 +192,36 @@ fn with_cookie(response: HttpResponse, cookie: Option<String>) -> HttpResponse {
 fn open_socket(request: &RequestHead, cookie: Option<&str>) -> Served {
     if request.path != "/" {
         let sentence = "the WebSocket of this runtime is at /";
-        return Served::Answer(HttpResponse::text(HttpStatus::NotFound, sentence));
+        let response = HttpResponse::text(HttpStatus::NotFound, sentence);
+        return Served::Answer(Resource::Said(response), None);
     }
     match upgrade::accept(request, cookie) {
         Ok(head) => Served::Upgrade(head),
-        Err(response) => Served::Answer(response),
+        Err(response) => Served::Answer(Resource::Said(response), None),
     }
 }
 
 /// Finds the page, the file or the sentence that stands at a path.
-fn find(request: &RequestHead, own: &Authority, door: &Door) -> Served {
+fn find(request: &RequestHead, own: &Authority, door: &Door) -> Resource {
     let path = request.path.as_str();
     let encodings = request.one("accept-encoding").unwrap_or_default();
     let has_report = || report::exists(&door.report);
-    if let Some(found) = page::find(path, own, encodings, path == "/" && has_report()) {
-        return Served::Page(found, None);
+    if let Some(file) = page::find(path, own, encodings, path == "/" && has_report()) {
+        return Resource::Page(file);
     }
     if let Some(rest) = path.strip_prefix(report::PREFIX) {
         return match report::FileName::parse(rest) {
-            Some(name) => Served::Report(name, None),
-            None => Served::Answer(HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE)),
+            Some(name) => Resource::Report(name),
+            None => Resource::Said(HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE)),
         };
     }
     if path == report::PREFIX.trim_end_matches('/') {
         let response =
             HttpResponse::text(HttpStatus::MovedPermanently, "the report is at /report/");
-        return Served::Answer(response.with("Location", report::PREFIX));
+        return Resource::Said(response.with("Location", report::PREFIX));
     }
     let sentence = "there is nothing here: the page is at /, the last report at /report/";
-    Served::Answer(HttpResponse::text(HttpStatus::NotFound, sentence))
+    Resource::Said(HttpResponse::text(HttpStatus::NotFound, sentence))
 }
 
 const TOO_MANY_FILES: &str = "too many files of the report are being sent; try again";

@@ -63,7 +63,7 @@ impl Reception {
     {
         let (answers, files) = (&self.gate.admission.answers, &self.gate.admission.files);
         let place = match &outcome {
-            serve::Served::Report(..) => files.take(),
+            serve::Served::Answer(serve::Resource::Report(_), _) => files.take(),
             _ => answers.take(),
         };
         let make_room = || place.displace();
