@@ -83,7 +83,7 @@ function showLimit() {
   setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("worst-text"), worstText(answer));
-  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "by search");
+  setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found");
   byId("out-every").classList.toggle("warn", said.kind === "here");
   const known = Number.isFinite(limit) && limit > 0;
   const bar = byId("limit-bar");

@@ -35,7 +35,24 @@ class Free:
         self.assertEqual(over, [])
 
 
-class Desktop(Access, PageTest):
+class Steady:
+    """A button does not go from under the pointer because a figure has come."""
+
+    def test_controls_stay_where_they_are_when_the_limit_comes(self):
+        top = "document.querySelector('#reset').getBoundingClientRect().top + scrollY"
+        self.page.until("document.querySelector('#out-every').textContent === '–'", why="no loop, no limit")
+        before = self.page.run(top)
+        self.runtime.call("/pid_controller/enable", data=True)
+        self.page.until("document.querySelector('#out-certified').textContent === 'proven'")
+        self.assertEqual(self.page.run(top), before, "proven")
+        self.runtime.call("/pid_controller/set_gains", kp=[60, 30], ki=[300, 0], kd=[25, 8])
+        self.page.until("document.querySelector('#out-certified').textContent === 'found'")
+        self.assertEqual(self.page.run(top), before, "found")
+        wide = self.page.run("[...document.querySelectorAll('.readouts dd')].filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent)")
+        self.assertEqual(wide, [])
+
+
+class Desktop(Access, Steady, PageTest):
     def box(self, selector):
         return self.page.run(f"(() => {{ const b = document.querySelector('{selector}').getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; }})()")
 
@@ -81,7 +98,7 @@ class ThreeLinks(Access, PageTest):
         self.assertTrue(captions)
 
 
-class Laptop(Free, PageTest):
+class Laptop(Free, Steady, PageTest):
     view = {"width": 1280, "height": 720}
 
     def test_captions_are_whole(self):
@@ -90,7 +107,7 @@ class Laptop(Free, PageTest):
         self.assertEqual(clipped, [])
 
 
-class Phone(Free, Access, PageTest):
+class Phone(Free, Steady, Access, PageTest):
     view = PHONE
 
     def test_arm_integrator_and_servo_come_first(self):
