@@ -27,7 +27,7 @@ run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARG
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
 # Tests of the wire wait more than they reckon: as many again run beside those that have a processor.
-test: ## Run every test but those of the page
+test: ## Run every test that needs Rust alone, but the slow ones
 	@echo "make test: unit, property, wire and documentation tests"
 	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$((2 * $$(getconf _NPROCESSORS_ONLN)))} $(CARGO) test --locked
 
@@ -148,13 +148,13 @@ attack: ## Attack the program in a hundred ways and measure what a healthy clien
 	@KEEP="$(KEEP)" ARGS="$(ARGS)" bash benches/attack/run.sh
 
 soak: ## Let badly behaved clients come and go for MINUTES (1), and check what must hold; SEED=n repeats one
-	@echo "make soak: builds, then $(or $(MINUTES),1) minutes and a little more"
+	@echo "make soak: builds, then $(or $(MINUTES),1) minutes of clients, and half as long again without"
 	@MINUTES="$(MINUTES)" SEED="$(SEED)" ONLY="$(ONLY)" bash scripts/soak.sh
 
-clean: ## Remove what was built and packed; vendored sources stay
-	@echo "make clean: $(TARGET_DIR)/, $(ARCHIVE)"
+clean: ## Remove what was built, measured and packed; vendored sources stay
+	@echo "make clean: $(TARGET_DIR)/ and the other packages' build folders, report/, $(ARCHIVE)"
 	$(CARGO) clean
-	rm -f $(ARCHIVE)
+	rm -rf $(ARCHIVE) report benches/target fuzz/target python/target tests/clients/roslibrust/target
 
 vendor: ## Fetch the dependencies' sources into vendor/, so that every later build is offline
 	@bash scripts/vendor.sh

@@ -3,7 +3,7 @@
 // the header.
 // Invariant: what is not known, or not finite, is an empty field.
 
-import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, record } from "./recorder.js";
+import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, record } from "./history.js";
 import { toFragment } from "./settings.js";
 
 /** @typedef {import("./settings.js").Settings} Settings */

@@ -21,7 +21,7 @@ import { follow, goLive } from "./playback.js";
 import { startPlayerBar } from "./player_bar.js";
 import { movePlots, redraw as redrawPlots, showValues, startPlots } from "./plots.js";
 import { describeArm, showReadouts, startReadouts } from "./readouts.js";
-import { forgetFrom, take } from "./recorder.js";
+import { forgetFrom, take } from "./history.js";
 import { start } from "./runtime.js";
 import { startSave } from "./save.js";
 import { startShare } from "./share.js";

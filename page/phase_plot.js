@@ -3,7 +3,7 @@
 // Invariant: a frame allocates nothing. It draws on whatever context it is given.
 
 import { Axis } from "./axis.js";
-import { POSITION, TIME, VELOCITY, firstAfter, record } from "./recorder.js";
+import { POSITION, TIME, VELOCITY, firstAfter, record } from "./history.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 

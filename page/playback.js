@@ -3,7 +3,7 @@
 // The arm itself always runs in real time; only its recording can be slow.
 // Invariant: looking back changes nothing of the arm; what is shown lies within what is recorded.
 
-import { EFFORT, POSITION, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./recorder.js";
+import { EFFORT, POSITION, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./history.js";
 import { MOST_LINKS, state, tell } from "./store.js";
 
 /** The joint state that the pictures show: the latest joint state, or one of the recording. */

@@ -10,7 +10,7 @@ import { onFrame, wake } from "./frames.js";
 import { PhasePlot } from "./phase_plot.js";
 import { shown as pose } from "./playback.js";
 import { energyName } from "./policy.js";
-import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./recorder.js";
+import { EFFORT, ENERGY, KINETIC, LOAD, POSITION, POTENTIAL, SETPOINT, TIME, VELOCITY, firstAfter, record } from "./history.js";
 import { state, watch } from "./store.js";
 import { StripChart } from "./strip_chart.js";
 import { colors, onTheme } from "./theme.js";

@@ -1,10 +1,10 @@
 // @ts-check
 // A strip chart: quantities over the last seconds of simulation time, one colour per joint.
-// Invariant: rows are read where the recorder wrote them. It draws on whatever context it is given, a canvas or an SVG file.
+// Invariant: rows are read where they stand in the history. It draws on whatever context it is given, a canvas or an SVG file.
 
 import { Axis, LOG_END } from "./axis.js";
 import { Pencil } from "./pencil.js";
-import { TIME, firstAfter, record } from "./recorder.js";
+import { TIME, firstAfter, record } from "./history.js";
 import { Surface } from "./surface.js";
 import { colors } from "./theme.js";
 

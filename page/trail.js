@@ -3,7 +3,7 @@
 // Invariant: between two states the curve has the tip's places and velocities at both, so it is no polygon however fast it goes.
 
 import { reach } from "./mechanics.js";
-import { POSITION, TIME, VELOCITY, firstAfter, record } from "./recorder.js";
+import { POSITION, TIME, VELOCITY, firstAfter, record } from "./history.js";
 import { colors } from "./theme.js";
 
 const SECONDS = 5;

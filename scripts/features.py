@@ -21,7 +21,7 @@ BUILDS = (
     ("default", None, "program"),
     ("without the report", "web,record,cli", "program"),
     ("without the record", "web,report,cli", "program"),
-    ("without the web", "report,cli", "program"),
+    ("without the web and the record", "report,cli", "program"),
     ("without the commands", "web,report,record", "program"),
     ("`runtime` alone", "runtime", "program"),
     ("no features: the library", "", "library"),

@@ -29,7 +29,8 @@
 //! - [`Overhear`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
 //!
-//! To a connection, from the registry: [`Deliver`], [`Response`], [`Finish`], bytes to send and the end.
+//! To a connection, from the registry: [`Deliver`], [`Response`], [`Finish`], bytes to send and the end; [`Configure`],
+//! how a topic is throttled for it.
 //!
 //! To whoever publishes a topic, from the registry: [`node::Interest`], whether anybody subscribes. Nothing is made
 //! without.
@@ -100,6 +101,7 @@
 //! [`TakeCensus`]: gateway::messages::TakeCensus
 //! [`Deliver`]: gateway::messages::Deliver
 //! [`Response`]: gateway::messages::Response
+//! [`Configure`]: gateway::messages::Configure
 //! [`Finish`]: gateway::messages::Finish
 //! [`SetIntegrator`]: arm::sim::SetIntegrator
 //! [`SetParams`]: arm::sim::SetParams

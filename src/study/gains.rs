@@ -5,7 +5,7 @@
 //! that of all links beyond it, or, where a heavy outer link turns a light inner one along, what it feels while the
 //! others are free; means of the two are tried in turn (`SHAPES`).
 //!
-//! A pace is taken if the smallest stable timestep over all poses leaves the margin, and if the arm itself, stepped as
+//! A pace is taken if the smallest timestep limit over all poses leaves the margin, and if the arm itself, stepped as
 //! the live arm is, settles in time in every one of [`MOVES`] moves. The slowest pace that does is the answer.
 //!
 //! **Invariant:** the work is bounded, and gains that are answered have been tried.
@@ -73,7 +73,7 @@ const STEPS_PER_PIECE: u64 = 1000;
 pub struct Wish {
     /// Time in which every move is to settle \[s\].
     pub settling_time: f64,
-    /// How many timesteps the smallest stable timestep over all poses is to be.
+    /// How many timesteps the smallest timestep limit over all poses is to be.
     pub margin: f64,
 }
 
@@ -82,7 +82,7 @@ pub struct Wish {
 pub struct SuggestedGains<const N: usize> {
     /// The gains.
     pub gains: Gains<N>,
-    /// The smallest stable timestep over all poses \[s\]; `None` where nothing limits.
+    /// The smallest timestep limit over all poses \[s\]; `None` where nothing limits.
     pub limit: Option<f64>,
     /// Whether that is proven to 1 %.
     pub certified: bool,

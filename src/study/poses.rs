@@ -1,4 +1,4 @@
-//! The smallest stable timestep over all poses: how far a limit at one setpoint can be trusted on the way to another.
+//! The smallest timestep limit over all poses: how far a limit at one setpoint can be trusted on the way to another.
 //!
 //! Inertia depends on every joint but the first, the pull of gravity on all of them. At every pose of a grid over the
 //! outer joints the loop is judged without gravity, and, where there is gravity, at a ring of first joints with it.

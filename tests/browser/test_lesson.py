@@ -322,7 +322,7 @@ class Ways(Lesson):
         self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 9.81, "masses": [1, 1], "lengths": [1, 1]}, "defaults")
 
     def test_the_recording_is_looked_at_while_the_arm_goes_on(self):
-        self.page.until("own('recorder.js').then(({ record }) => record.length > 90)", 20)
+        self.page.until("own('history.js').then(({ record }) => record.length > 90)", 20)
         self.page.click("#history-back")
         self.page.until("document.querySelector('#run-state').textContent === 'recording'")
         shown = float(self.page.text("#sim-time"))
@@ -341,7 +341,7 @@ class Ways(Lesson):
         self.page.until("document.querySelector('#run-state').textContent === 'running'")
 
     def test_one_cursor_is_on_all_plots(self):
-        self.page.until("own('recorder.js').then(({ record }) => record.length > 120)", 20)
+        self.page.until("own('history.js').then(({ record }) => record.length > 120)", 20)
         self.runtime.call("/arm_sim/pause", data=True)
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
         time.sleep(0.5)  # until the figures are those of the last state

@@ -68,7 +68,7 @@ class Replaying(PageTest):
         self.speed(-1)
         self.page.click("#pause")
         self.page.until("own('store.js').then(({ state }) => state.time < 3)", why="it goes back")
-        self.page.until("own('recorder.js').then(({ record }) => record.length >= 3)", why="the rows from before are there")
+        self.page.until("own('history.js').then(({ record }) => record.length >= 3)", why="the rows from before are there")
 
 
 class Live(PageTest):

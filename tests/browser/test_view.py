@@ -60,7 +60,7 @@ class Sums:
     def test_energy_and_gravity_load_are_those_of_the_runtime(self):
         self.settle(self.pose())
         self.page.until("own('store.js').then(({ state }) => state.paused && state.diagnostics?.state === 'paused')")
-        load, energy, told = self.page.run("""Promise.all([own('recorder.js'), own('store.js')]).then(([r, { state }]) => {
+        load, energy, told = self.page.run("""Promise.all([own('history.js'), own('store.js')]).then(([r, { state }]) => {
             const row = r.record.last();
             return [[...r.record.data.slice(row + r.LOAD, row + r.LOAD + state.links)], r.record.data[row + r.ENERGY], state.diagnostics.energy];
         })""")
@@ -97,7 +97,7 @@ class TwoLinks(View, Sums, PageTest):
         self.page.until("document.querySelector('#arm-text').textContent.includes('paused, servo on. Joints at 29, 29 degrees')")
 
     def test_what_is_written_can_be_saved_as_csv(self):
-        self.page.until("own('recorder.js').then(({ record }) => record.length > 30)")
+        self.page.until("own('history.js').then(({ record }) => record.length > 30)")
         self.runtime.call("/arm_sim/pause", data=True)
         # The file's text; that the button hands it to the browser is seen by the link that it makes.
         lines = self.page.run("Promise.all([own('csv.js'), own('settings.js'), own('store.js')])"

@@ -10,7 +10,8 @@ use std::process::Command;
 use crate::papers::{table, text};
 use crate::tree::rust_files;
 use pendularm::math::integrator::Method;
-use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic};
+use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic, types};
+use pendularm::protocol::op;
 
 /// The texts between the code marks of a cell, in order.
 fn codes(cell: &str) -> Vec<&str> {
@@ -148,6 +149,34 @@ fn the_papers_list_every_topic_with_its_type_and_owner() {
             "{}",
             topic.name()
         );
+    }
+}
+
+#[test]
+fn the_papers_list_every_op() {
+    let rows = table(&text("docs/protocol.md"), "op");
+    let listed: Vec<&str> = rows.iter().map(|row| codes(&row[0])[0]).collect();
+    let (mut listed, mut known) = (listed, op::OPS.to_vec());
+    listed.sort_unstable();
+    known.sort_unstable();
+    assert_eq!(listed, known);
+}
+
+#[test]
+fn the_papers_list_the_fields_of_our_own_messages() {
+    let rows = table(&text("docs/protocol.md"), "message");
+    let ours = |name: &str| name.starts_with("pendularm_interfaces/msg/");
+    let topics = Topic::ALL.into_iter().map(Topic::type_name);
+    for name in topics.filter(|name| ours(name)) {
+        assert!(rows.iter().any(|row| codes(&row[0]) == [name]), "{name}");
+    }
+    for row in &rows {
+        let name = codes(&row[0])[0];
+        let fields = types::find(name).expect(name).fields;
+        let names: Vec<&str> = fields.iter().map(|field| field.name).collect();
+        let written: Vec<&str> = codes(&row[1]);
+        let written: Vec<&str> = written.into_iter().filter(|code| *code != "null").collect();
+        assert_eq!(written, names, "{name}");
     }
 }
 

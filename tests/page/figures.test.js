@@ -6,7 +6,7 @@ import { test } from "node:test";
 import { csvText } from "../../page/csv.js";
 import { growthOf, growthRate } from "../../page/growth.js";
 import { TIMESTEPS, cheapest, endOf, errorText, read, rungs, uncertaintyOf } from "../../page/ladder.js";
-import { record, take } from "../../page/recorder.js";
+import { record, take } from "../../page/history.js";
 import { describeRun, distances, divergedAt, energyGained, partsAt } from "../../page/runs.js";
 import { LogScale } from "../../page/scale.js";
 import { DEFAULTS } from "../../page/settings.js";

@@ -105,6 +105,11 @@ impl Court {
         *self.tally.borrow_mut().entry(what).or_default() += 1;
     }
 
+    /// How often that was so far.
+    pub fn counted(&self, what: &'static str) -> u64 {
+        self.tally.borrow().get(what).copied().unwrap_or_default()
+    }
+
     /// Notes the largest of something.
     pub fn at_most(&self, what: &'static str, value: u64) {
         let mut tally = self.tally.borrow_mut();

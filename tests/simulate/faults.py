@@ -25,7 +25,7 @@ REGISTRY, CONNECTION = "src/actors/gateway/registry", "src/actors/gateway/connec
 
 # Each fault, its file, the text there, and the text there when the fault holds (plant.py says how).
 FAULTS = [
-    ("two messages of one topic are swapped in a backlog, one time in 4", "src/protocol/outbox/mod.rs",
+    ("two messages of one topic are swapped in an outbox, one time in 4", "src/protocol/outbox/mod.rs",
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));",
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));\n"
      "        let last = self.topics.len() - 1;\n        if last > 1 && R(4) { self.topics.swap(last - 1, last); }"),

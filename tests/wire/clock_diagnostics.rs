@@ -1,5 +1,6 @@
 //! `/clock` and `/diagnostics` from outside.
 
+use std::path::Path;
 use std::time::Duration;
 
 use crate::arm::{stamp, time};
@@ -27,6 +28,16 @@ fn status<'a>(message: &'a Value, name: &str) -> &'a Value {
     all.iter()
         .find(|status| status["name"] == name)
         .unwrap_or_else(|| panic!("no {name} in {message}"))
+}
+
+/// The keys that docs/protocol.md has for a status.
+fn documented(name: &str) -> Vec<String> {
+    let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/protocol.md");
+    let paper = std::fs::read_to_string(paper).unwrap();
+    let start = format!("| `{name}` | ");
+    let row = paper.lines().find_map(|line| line.strip_prefix(&start));
+    let codes = row.expect("a row of its own").split('`').skip(1).step_by(2);
+    codes.map(str::to_owned).collect()
 }
 
 fn text<'a>(status: &'a Value, key: &str) -> &'a str {
@@ -95,6 +106,7 @@ fn diagnostics_have_the_documented_statuses_and_keys_once_a_second() {
         .map(|entry| entry["key"].as_str().unwrap())
         .collect();
     assert_eq!(keys, KEYS);
+    assert_eq!(documented("arm_sim"), KEYS);
     assert_eq!(text(arm, "state"), "running");
     for key in &KEYS[1..7] {
         assert!(number(arm, key).is_finite(), "{key}");
@@ -102,6 +114,9 @@ fn diagnostics_have_the_documented_statuses_and_keys_once_a_second() {
     assert_eq!(text(arm, "warning"), "");
     let gateway = status(&first, "gateway");
     assert_eq!(gateway["level"], 0);
+    for key in documented("gateway") {
+        text(gateway, &key);
+    }
     assert_eq!(number(gateway, "connections"), 1.0);
     assert_eq!(number(gateway, "messages_dropped"), 0.0);
     assert_eq!(number(gateway, "clients_cut_off"), 0.0);

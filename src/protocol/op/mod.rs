@@ -22,7 +22,7 @@ use crate::protocol::wire::fragments::Piece;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
 pub use goal_status::GoalStatus;
-pub use reader::read;
+pub use reader::{OPS, read};
 
 /// Longest `args` and trajectory for a node of ours, without what it has no use for: its thread reads them, within
 /// some tenth of a millisecond. Those of computations, which workers read, and those for other clients are as long as

@@ -2,6 +2,8 @@
 
 use super::*;
 
+const LONG: &str = "long computations";
+
 impl Workload<'_> {
     pub(super) fn compute(&mut self) {
         let method = self.court.below(Method::ALL.len());
@@ -62,8 +64,14 @@ impl Workload<'_> {
         }
     }
 
-    /// The longest of all that clients compute: others' computations have their turns beside it.
+    /// The longest of all that clients compute: others' computations have their turns beside it. With 3 links it takes the
+    /// time of several seeds, and a third of its kind asks nothing that two have not asked.
     pub fn compute_long(&mut self) {
+        let few = if self.plan.links == 3 { 2 } else { u64::MAX };
+        if self.court.counted(LONG) >= few {
+            return;
+        }
+        self.court.count(LONG);
         let args = "{\"params\":{\"gravity\":9.81}}";
         let expect = Expect::Member("advised_timestep");
         self.call("/study/stability", args, expect, false);

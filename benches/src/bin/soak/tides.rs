@@ -28,7 +28,7 @@ use pendularm_benches::program::{Log, Program, Vitals, vitals};
 const TIDE: Duration = Duration::from_secs(40);
 /// How long the program has to let go of what it still holds: half-open clients are owed answers for 15 s.
 const LET_GO: Duration = Duration::from_secs(25);
-/// How long nothing happens at an ebb before memory is looked at: the program's allocator gives freed memory back over ten seconds.
+/// How long nothing happens at an ebb before memory is looked at: an allocator with its own defaults gives freed memory back over ten seconds.
 const QUIET: Duration = Duration::from_secs(13);
 /// Processor time that the program does not use within [`LET_GO`] for the residents alone \[s\].
 const BUSY: f64 = 3.0;

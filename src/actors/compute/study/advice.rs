@@ -28,7 +28,7 @@ use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
 pub struct SuggestGains<const N: usize> {
     /// Time in which every move is to settle \[s\], greater than 0.
     pub settling_time: Option<f64>,
-    /// How many timesteps the smallest stable timestep over all poses is to be, at least 1.
+    /// How many timesteps the smallest timestep limit over all poses is to be, at least 1.
     pub margin: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub timestep: Option<f64>,

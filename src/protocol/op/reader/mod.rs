@@ -52,8 +52,8 @@ const KEYS: [&str; 24] = [
     "feedback",
 ];
 
-/// The operations that we know.
-const OPS: [&str; 18] = [
+/// The operations that we know, by their names on the wire.
+pub const OPS: [&str; 18] = [
     "advertise",
     "unadvertise",
     "publish",
