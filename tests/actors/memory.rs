@@ -107,7 +107,7 @@ fn what_is_taken_is_given_back_with_the_last_copy() {
             (bytes, CONNECTION_BYTES + bytes)
         );
     }
-    account.queue(3, 1000);
+    account.queue(3, 1000, 0);
     let places = 3 * PLACE_BYTES;
     assert_eq!(account.messages(), 1000 + places + 3 * FRAME_BYTES);
     assert_eq!(
@@ -129,7 +129,7 @@ fn a_message_counts_once_in_all_and_whole_for_each_who_waits_for_it() {
     let at_rest = memory.held();
     let frame = memory.count(Bytes::from(vec![0; 1000]));
     for account in [&one, &other] {
-        account.queue(1, frame.len());
+        account.queue(1, frame.len(), 0);
         // Short messages cost more than their bytes: whoever hoards a million of them is no modest client.
         let each = 1000 + FRAME_BYTES + PLACE_BYTES;
         assert_eq!(account.held(), CONNECTION_BYTES + each);
@@ -140,7 +140,7 @@ fn a_message_counts_once_in_all_and_whole_for_each_who_waits_for_it() {
     );
     drop(frame);
     for account in [&one, &other] {
-        account.queue(0, 0);
+        account.queue(0, 0, 0);
     }
     assert_eq!(memory.held(), at_rest);
 }
@@ -184,12 +184,12 @@ fn messages_go_first_and_the_connection_if_that_is_not_enough() {
         let memory = Memory::of(4 * MIB);
         let (hog, other) = (memory.open(), memory.open());
         let frame = memory.count(Bytes::from(vec![0; 2 * MIB]));
-        hog.queue(1, frame.len());
+        hog.queue(1, frame.len(), 0);
         let share = hog.take(MIB);
         let rest = other.take(MIB);
         assert_eq!(asked(&hog).await, Some(false));
         drop(frame);
-        hog.queue(0, 0);
+        hog.queue(0, 0, 0);
         hog.gave_messages();
         assert_eq!(asked(&hog).await, None);
         let more = hog.take(3 * MIB);
@@ -205,9 +205,9 @@ fn nobody_gives_way_for_what_is_being_freed() {
         let memory = Memory::of(4 * MIB);
         let (gone, other) = (memory.open(), memory.open());
         let frame = memory.count(Bytes::from(vec![0; 3 * MIB]));
-        gone.queue(1, frame.len());
+        gone.queue(1, frame.len(), 0);
         let freed = gone.freeing();
-        gone.queue(0, 0);
+        gone.queue(0, 0, 0);
         let share = other.take(2 * MIB);
         assert_eq!(asked(&other).await, None);
         drop((frame, freed));
@@ -475,6 +475,46 @@ fn a_message_that_many_clients_wait_for_is_there_once() {
         for n in 0..20 {
             assert_eq!(deaf[49].receive().await["msg"]["n"], n);
         }
+    });
+}
+
+/// A message that is being written can't be dropped any more, and stays for as long as whoever subscribed takes nothing.
+#[test]
+fn a_message_that_is_being_written_counts_for_who_takes_it() {
+    in_virtual_time(async {
+        let limit = 32 * MIB;
+        let memory = Memory::of(limit);
+        let gateway = gateway(memory.clone()).await;
+        let mut publisher = gateway.connect(WIDE);
+        let mut publish = async |topic: usize, bytes: usize| {
+            let mut subscriber = gateway.connect(KIB);
+            let topic = format!("/{topic}");
+            subscriber.subscribe(&topic).await;
+            publisher.advertise(&topic).await;
+            let blob = "x".repeat(bytes);
+            let message = json!({"op": "publish", "topic": topic, "msg": {"blob": blob}});
+            publisher.send(message).await;
+            settle().await;
+            subscriber
+        };
+        let mut hogs = Vec::new();
+        for topic in 0..5 {
+            hogs.push(publish(topic, 4 * MIB - 100 * KIB).await);
+        }
+        assert_eq!(memory.cut_off(), 0);
+        let mut modest = Vec::new();
+        for topic in 5..85 {
+            modest.push(publish(topic, 190 * KIB).await);
+            assert!(memory.held() <= limit, "{topic}: {memory:?}");
+        }
+        assert_eq!(memory.cut_off(), 3, "as many hogs as need be");
+        is_served(&mut publisher).await;
+        for mut subscriber in modest {
+            assert_eq!(subscriber.receive().await["op"], "publish");
+        }
+        drop((hogs, publisher));
+        sleep(Duration::from_secs(60)).await;
+        assert_eq!(memory.held(), 0, "{memory:?}");
     });
 }
 

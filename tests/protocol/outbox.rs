@@ -170,6 +170,40 @@ fn responses_count_until_they_have_been_written() {
 }
 
 #[test]
+fn a_message_costs_its_whole_length_until_its_last_byte_has_been_written() {
+    let mut bench = Bench::new();
+    bench.push("/a", "mmmm");
+    bench.respond("1234", &[]);
+    assert_eq!(bench.outbox.writing_cost(), 0);
+    assert_eq!(bench.take(2, usize::MAX).len(), 2);
+    for _ in 0..3 {
+        bench.outbox.written(1);
+        assert_eq!(bench.outbox.writing_cost(), 4 + FRAME_BYTES);
+    }
+    bench.outbox.written(1);
+    assert_eq!(bench.outbox.writing_cost(), 0);
+    bench.outbox.written(4);
+    assert_eq!(bench.outbox.writing_cost(), 0);
+}
+
+#[test]
+fn what_is_being_written_stays_when_all_that_waits_is_taken_out() {
+    let mut bench = Bench::new();
+    bench.push("/a", "mmmm");
+    bench.respond("1234", &[]);
+    assert_eq!(bench.take(2, usize::MAX).len(), 2);
+    bench.push("/a", "nnnn");
+    bench.respond("5678", &[]);
+    bench.outbox.written(5);
+    let waiting = bench.outbox.take_waiting();
+    assert_eq!((waiting.topic_count(), waiting.topic_bytes()), (1, 4));
+    assert!(bench.outbox.is_empty());
+    assert_eq!(bench.outbox.response_cost(), 3 + FRAME_BYTES);
+    bench.outbox.written(3);
+    assert_eq!(bench.outbox.response_cost(), 0);
+}
+
+#[test]
 fn a_throttled_topic_keeps_its_distance_and_the_newest_message() {
     let mut bench = Bench::new();
     bench.throttle("/a", 100, 1);
@@ -339,7 +373,8 @@ struct Model {
     /// Queued and held back, in the order of their numbers.
     waiting: Vec<Waiting>,
     throttles: BTreeMap<usize, (Duration, usize, Option<Instant>)>,
-    in_flight: Vec<(usize, bool)>,
+    /// The length of each, what is left of it, and whether it is a response.
+    in_flight: Vec<(usize, usize, bool)>,
     dropped: u64,
 }
 
@@ -456,15 +491,18 @@ impl Model {
                 break;
             }
             let taken = self.waiting.remove(next);
-            self.in_flight
-                .push((taken.frame.len(), taken.kind == Kind::Response));
+            self.in_flight.push((
+                taken.frame.len(),
+                taken.frame.len(),
+                taken.kind == Kind::Response,
+            ));
             batch.push(taken.frame);
         }
         batch
     }
 
     fn written(&mut self, mut bytes: usize) {
-        for (left, _) in &mut self.in_flight {
+        for (_, left, _) in &mut self.in_flight {
             let done = bytes.min(*left);
             *left -= done;
             bytes -= done;
@@ -487,9 +525,15 @@ impl Model {
         let in_flight = self
             .in_flight
             .iter()
-            .filter(|(_, is_response)| *is_response);
+            .filter(|(_, _, is_response)| *is_response);
         responses.map(|waiting| waiting.frame.len()).sum::<usize>()
-            + in_flight.map(|(left, _)| left).sum::<usize>()
+            + in_flight.map(|(_, left, _)| left).sum::<usize>()
+    }
+
+    fn writing_cost(&self) -> usize {
+        let topics = self.in_flight.iter();
+        let topics = topics.filter(|(_, left, is_response)| *left > 0 && !is_response);
+        topics.map(|(length, _, _)| length + FRAME_BYTES).sum()
     }
 }
 
@@ -582,6 +626,7 @@ proptest! {
             prop_assert_eq!(bench.outbox.topic_bytes(), model.topic_bytes());
             prop_assert!(bench.outbox.topic_bytes() <= MAX_TOPIC_BYTES);
             prop_assert_eq!(bench.outbox.response_bytes(), model.response_bytes());
+            prop_assert_eq!(bench.outbox.writing_cost(), model.writing_cost());
             prop_assert_eq!(bench.outbox.dropped(), model.dropped);
             prop_assert_eq!(bench.outbox.next_release(), model.due().map(|(due, _)| due));
         }

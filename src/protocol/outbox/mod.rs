@@ -49,11 +49,23 @@ pub struct Outbox {
     topic_bytes: usize,
     /// Bytes of responses that are queued or being written.
     response_bytes: usize,
-    /// The frames that are being written: bytes left of each, and whether it is a response.
-    in_flight: VecDeque<(usize, bool)>,
+    /// The frames that are being written.
+    in_flight: VecDeque<InFlight>,
+    /// Bytes of the topic messages among them, each whole, their places included.
+    writing_cost: usize,
     /// Responses that are queued or being written.
     response_count: usize,
     dropped: u64,
+}
+
+/// A frame that is being written.
+#[derive(Debug)]
+struct InFlight {
+    /// Its bytes.
+    length: usize,
+    /// Those that have not been written.
+    left: usize,
+    is_response: bool,
 }
 
 impl Outbox {
@@ -167,27 +179,50 @@ impl Outbox {
             };
             if !is_response {
                 self.topic_bytes -= length;
+                self.writing_cost += length + FRAME_BYTES;
             }
-            self.in_flight.push_back((length, is_response));
+            self.in_flight.push_back(InFlight {
+                length,
+                left: length,
+                is_response,
+            });
             frames.push(frame);
         }
     }
 
     /// The next `bytes` of what was taken have been written.
     pub fn written(&mut self, mut bytes: usize) {
-        while let Some((left, is_response)) = self.in_flight.front_mut() {
-            let done = bytes.min(*left);
-            *left -= done;
+        while let Some(frame) = self.in_flight.front_mut() {
+            let done = bytes.min(frame.left);
+            frame.left -= done;
             bytes -= done;
-            if *is_response {
+            if frame.is_response {
                 self.response_bytes -= done;
             }
-            if *left > 0 {
+            if frame.left > 0 {
                 return;
             }
-            self.response_count -= usize::from(*is_response);
+            if frame.is_response {
+                self.response_count -= 1;
+            } else {
+                self.writing_cost -= frame.length + FRAME_BYTES;
+            }
             self.in_flight.pop_front();
         }
+    }
+
+    /// Moves out all that waits. What is being written stays, and counts until it has been.
+    #[must_use]
+    pub fn take_waiting(&mut self) -> Self {
+        let responses = || self.in_flight.iter().filter(|frame| frame.is_response);
+        let left = Self {
+            response_bytes: responses().map(|frame| frame.left).sum(),
+            response_count: responses().count(),
+            writing_cost: self.writing_cost,
+            in_flight: std::mem::take(&mut self.in_flight),
+            ..Self::default()
+        };
+        std::mem::replace(self, left)
     }
 
     /// When the next held back message is due, if any is held back: the time to take frames again.
@@ -223,6 +258,13 @@ impl Outbox {
     #[must_use]
     pub fn topic_count(&self) -> usize {
         self.topics.len() + self.throttles.count()
+    }
+
+    /// Bytes of the topic messages that are being written, their places included. They can't be dropped any more, and
+    /// each is there until its last byte has been taken.
+    #[must_use]
+    pub const fn writing_cost(&self) -> usize {
+        self.writing_cost
     }
 
     fn topic_cost(&self) -> usize {

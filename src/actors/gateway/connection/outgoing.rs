@@ -56,8 +56,9 @@ pub(super) struct Outgoing {
     pub(super) backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
     account: Arc<Account>,
-    /// Topic messages that waited when the account was last brought up to date, their bytes, and those of responses.
-    counted: Cell<(usize, usize, usize)>,
+    /// Topic messages that waited when the account was last brought up to date, their bytes, those of the ones that were
+    /// being written, and those of responses.
+    counted: Cell<[usize; 4]>,
 }
 
 /// The writer at its work, until the connection ends.
@@ -292,11 +293,12 @@ impl Outgoing {
         let outbox = self.outbox.borrow();
         let (count, bytes) = self.unencoded.borrow().size();
         let (count, bytes) = (outbox.topic_count() + count, outbox.topic_bytes() + bytes);
-        let responses = outbox.response_cost();
+        let (writing, responses) = (outbox.writing_cost(), outbox.response_cost());
+        let now = [count, bytes, writing, responses];
         // Others look at these, in memory that is not at hand: mostly nothing waits, before and after.
-        if self.counted.replace((count, bytes, responses)) != (count, bytes, responses) {
+        if self.counted.replace(now) != now {
             self.backlog.store(responses, Ordering::Relaxed);
-            self.account.queue(count, bytes);
+            self.account.queue(count, bytes, writing);
         }
     }
 
@@ -322,7 +324,7 @@ impl Outgoing {
         self.unencoded.borrow_mut().keep(0);
         self.recount();
         let freed = self.account.freeing();
-        let waiting = self.outbox.take();
+        let waiting = self.outbox.borrow_mut().take_waiting();
         self.recount();
         free_elsewhere((waiting, freed));
     }
@@ -342,7 +344,7 @@ impl Drop for Outgoing {
         let outbox = std::mem::take(self.outbox.get_mut());
         if outbox.response_cost() + outbox.topic_bytes() > FEW_BYTES {
             let freed = self.account.freeing();
-            self.account.queue(0, 0);
+            self.account.queue(0, 0, 0);
             free_elsewhere((outbox, freed));
         }
     }

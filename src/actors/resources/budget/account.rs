@@ -131,6 +131,8 @@ pub struct Account {
     places: AtomicUsize,
     /// Topic messages that wait for it, each whole, though others may wait for them too.
     pub(super) shared: AtomicUsize,
+    /// Topic messages that are being written to it, each whole as well.
+    writing: AtomicUsize,
     asked: AtomicU8,
     /// Something was asked.
     news: Notify,
@@ -143,6 +145,7 @@ impl Account {
             own: AtomicUsize::new(0),
             places: AtomicUsize::new(0),
             shared: AtomicUsize::new(0),
+            writing: AtomicUsize::new(0),
             asked: AtomicU8::new(NOTHING),
             news: Notify::new(),
         }
@@ -151,17 +154,20 @@ impl Account {
     /// Bytes that the client makes the program hold.
     #[must_use]
     pub fn held(&self) -> usize {
-        self.own.load(Ordering::Relaxed) + self.messages()
+        let own = self.own.load(Ordering::Relaxed) + self.writing.load(Ordering::Relaxed);
+        own + self.messages()
     }
 
-    /// The part of them that belongs to topic messages, which wait for the client.
+    /// The part of them that belongs to topic messages that wait for the client, and may be dropped.
     #[must_use]
     pub fn messages(&self) -> usize {
         self.places.load(Ordering::Relaxed) + self.shared.load(Ordering::Relaxed)
     }
 
-    /// So many topic messages, of so many bytes together, wait for the client now. Told by its connection alone.
-    pub fn queue(&self, count: usize, bytes: usize) {
+    /// So many topic messages, of so many bytes together, wait for the client now, and others, of `writing` bytes with
+    /// their places, are being written to it. Told by its connection alone.
+    pub fn queue(&self, count: usize, bytes: usize, writing: usize) {
+        self.writing.store(writing, Ordering::Relaxed);
         let whole = bytes + count * FRAME_BYTES;
         self.shared.store(whole, Ordering::Relaxed);
         let places = count * PLACE_BYTES;
