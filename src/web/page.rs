@@ -6,6 +6,8 @@
 //!
 //! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
 
+use std::borrow::Cow;
+use std::path::Path;
 use std::sync::LazyLock;
 
 use tokio::sync::OnceCell;
@@ -13,6 +15,7 @@ use tokio::task::spawn_blocking;
 
 use super::authority::Authority;
 use super::bundle::{bundle, styles};
+use super::report;
 use super::response::HttpResponse;
 
 /// A file of the page.
@@ -26,6 +29,12 @@ pub struct Asset {
     pub kind: &'static str,
     /// Its bytes.
     pub bytes: &'static [u8],
+}
+
+impl Asset {
+    fn is_document(&self) -> bool {
+        self.path == "/"
+    }
 }
 
 /// An entry of the table, by the file's name, which is its path too unless another is given.
@@ -169,17 +178,21 @@ pub fn versioned(path: &str) -> String {
     format!("{}{path}", *VERSION)
 }
 
-/// A file of the page that was asked for, as it is and perhaps to be packed.
+/// A file of the page that was asked for.
 #[derive(Debug)]
 pub struct PageFile {
-    response: HttpResponse,
-    to_pack: Option<(&'static OnceCell<Vec<u8>>, &'static [u8])>,
+    asset: &'static Asset,
+    policy: String,
+    /// Under a name that stands for its content.
+    is_kept: bool,
+    /// Where it is kept packed, for a client that takes it so.
+    packed: Option<&'static OnceCell<Vec<u8>>>,
 }
 
 /// The file at `path`, if that is one of the page's. It goes out packed to a client that takes `encodings` with
-/// `deflate` among them; the document shows the way to the report if there is one.
+/// `deflate` among them.
 #[must_use]
-pub fn find(path: &str, own: &Authority, encodings: &str, has_report: bool) -> Option<PageFile> {
+pub fn find(path: &str, own: &Authority, encodings: &str) -> Option<PageFile> {
     let kept = path.strip_prefix(VERSION.as_str());
     let wanted = kept.unwrap_or(path);
     let bundles = if kept.is_some() {
@@ -189,35 +202,42 @@ pub fn find(path: &str, own: &Authority, encodings: &str, has_report: bool) -> O
     };
     let mut served = ASSETS.iter().chain(bundles).zip(&PACKED);
     let (asset, packed) = served.find(|(asset, _)| asset.path == wanted)?;
-    let is_document = wanted == "/";
-    let response = if is_document {
-        let html = document(asset.bytes, has_report);
-        HttpResponse::file(asset.kind, policy(own), html)
-    } else {
-        HttpResponse::file(asset.kind, policy(own), asset.bytes)
-    };
-    let response = response.with("Vary", "Accept-Encoding");
     let takes_packed = encodings.split(',').any(|one| one.trim() == "deflate");
     Some(PageFile {
-        response: match kept {
-            Some(_) if !is_document => response.kept(),
-            _ => response,
-        },
-        to_pack: (takes_packed && !is_document).then_some((packed, asset.bytes)),
+        asset,
+        policy: policy(own),
+        is_kept: kept.is_some() && !asset.is_document(),
+        packed: (takes_packed && !asset.is_document()).then_some(packed),
     })
 }
 
 impl PageFile {
-    /// The answer. Packing a file takes milliseconds, once: another thread does it.
-    pub async fn answer(self) -> HttpResponse {
-        let Some((packed, bytes)) = self.to_pack else {
-            return self.response;
+    /// The answer; the document shows the way to the report if there is one in the folder. Looking there may take as
+    /// long as the disk does, and packing a file takes milliseconds, once: another thread does both.
+    pub async fn answer(self, report: &Path) -> HttpResponse {
+        let Asset { kind, bytes, .. } = *self.asset;
+        let body = if self.asset.is_document() {
+            let folder = report.to_owned();
+            let has_report = spawn_blocking(move || report::exists(&folder)).await;
+            Cow::Owned(document(bytes, has_report.unwrap_or(false)))
+        } else {
+            Cow::Borrowed(bytes)
+        };
+        let response = HttpResponse::file(kind, self.policy, body);
+        let response = response.with("Vary", "Accept-Encoding");
+        let response = if self.is_kept {
+            response.kept()
+        } else {
+            response
+        };
+        let Some(packed) = self.packed else {
+            return response;
         };
         let pack = || spawn_blocking(|| miniz_oxide::deflate::compress_to_vec_zlib(bytes, LEVEL));
         match packed.get_or_try_init(pack).await {
-            Ok(packed) => self.response.packed(packed),
+            Ok(packed) => response.packed(packed),
             // The runtime is ending.
-            Err(_) => self.response,
+            Err(_) => response,
         }
     }
 }
@@ -281,7 +301,7 @@ mod tests {
         let files: BTreeSet<&str> = named.iter().copied().collect();
         assert_eq!(files.len(), 3, "{files:?}");
         for path in named {
-            assert!(find(path, &own, "", false).is_some(), "{path}");
+            assert!(find(path, &own, "").is_some(), "{path}");
         }
     }
 
@@ -289,7 +309,8 @@ mod tests {
     async fn a_file_is_packed_once_and_not_by_the_thread_that_serves_everybody() {
         let own = Authority::parse("127.0.0.1:9095").unwrap();
         let path = versioned(SCRIPT);
-        let ask = || find(&path, &own, "gzip, deflate", false).unwrap().answer();
+        let file = || find(&path, &own, "gzip, deflate").unwrap();
+        let ask = || file().answer(Path::new("no report"));
         let mut asked = pin!(ask());
         let first = tokio::select! {
             biased;

@@ -109,7 +109,7 @@ pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
     // The room of a file is given back once it has been sent.
     let (response, _room) = match resource {
         Resource::Said(response) => (response, None),
-        Resource::Page(file) => (file.answer().await, None),
+        Resource::Page(file) => (file.answer(&door.report).await, None),
         Resource::Report(name) => read_report(name, door, make_room).await,
     };
     answer(stream, &with_cookie(response, cookie)).await;
@@ -165,7 +165,7 @@ fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served
     if opens_socket {
         return Ok(open_socket(request, cookie.as_deref()));
     }
-    Ok(Served::Answer(find(request, &own, door), cookie))
+    Ok(Served::Answer(find(request, &own), cookie))
 }
 
 impl From<AccessError> for Declined {
@@ -202,11 +202,10 @@ fn open_socket(request: &RequestHead, cookie: Option<&str>) -> Served {
 }
 
 /// Finds the page, the file or the sentence that stands at a path.
-fn find(request: &RequestHead, own: &Authority, door: &Door) -> Resource {
+fn find(request: &RequestHead, own: &Authority) -> Resource {
     let path = request.path.as_str();
     let encodings = request.one("accept-encoding").unwrap_or_default();
-    let has_report = || report::exists(&door.report);
-    if let Some(file) = page::find(path, own, encodings, path == "/" && has_report()) {
+    if let Some(file) = page::find(path, own, encodings) {
         return Resource::Page(file);
     }
     if let Some(rest) = path.strip_prefix(report::PREFIX) {

@@ -73,6 +73,9 @@ async fn drive(client: &mut Client, how: &str, args: Value) -> Value {
     client.ask(&format!("/rosbag2_player/{how}"), args).await
 }
 
+/// Some ticks: a place that is sought again so soon is shown at the next one.
+const TICKS: std::time::Duration = ms(50);
+
 async fn seek(client: &mut Client, sec: u32, nanosec: u32) {
     let time = json!({"time": {"sec": sec, "nanosec": nanosec}});
     let answer = drive(client, "seek", time).await;
@@ -202,7 +205,7 @@ fn a_paused_record_shows_where_it_stands() {
             "at its beginning the first one: {state}"
         );
         seek(&mut client, 1, 500_000_000).await;
-        client.settle().await;
+        client.messages_for(TICKS, "/joint_states").await;
         let state = client.messages("/joint_states").pop().unwrap();
         assert!((time_of(&state) - 1.5).abs() < 0.05, "{state}");
         // Who comes later gets it within a second.
@@ -296,7 +299,7 @@ fn a_latched_message_is_the_one_that_held_there() {
             [descriptions[1].clone()]
         );
         seek(&mut client, 1, 0).await;
-        client.settle().await;
+        client.messages_for(TICKS, "/robot_description").await;
         assert_eq!(
             client.messages("/robot_description").last(),
             Some(&descriptions[0])
@@ -416,6 +419,28 @@ fn bad_wishes_are_refused_by_name() {
         seek(&mut client, 4_000_000_000, 0).await;
         let end = drive(&mut client, "get_position", json!({})).await;
         assert_eq!(end["position"], end["duration"]);
+    });
+}
+
+/// A look back costs thousands of messages: there is one from one tick to the next.
+#[test]
+fn who_seeks_over_and_over_hears_where_it_was_first_and_where_it_is_at_the_next_tick() {
+    let entries = in_virtual_time(run());
+    in_virtual_time(async {
+        let show = Show::of("sought", &entries).await;
+        let mut client = show.connect();
+        drive(&mut client, "pause", json!({})).await;
+        client.subscribe("/joint_states").await;
+        client.messages_for(ms(100), "/joint_states").await;
+        for second in [1, 2, 3] {
+            seek(&mut client, second, 0).await;
+        }
+        let at = position(&mut client).await;
+        assert!((at - 3.0).abs() < 1e-6, "{at}");
+        let heard = client.messages_for(ms(50), "/joint_states").await;
+        let times: Vec<f64> = heard.iter().map(|one| time_of(one).round()).collect();
+        assert_eq!(times.last(), Some(&3.0), "{times:?}");
+        assert!(!times.contains(&2.0), "{times:?}");
     });
 }
 

@@ -39,7 +39,7 @@ use tokio::time::{sleep, timeout};
 /// Virtual time that anything may take before a test gives up.
 pub const PATIENCE: Duration = Duration::from_secs(600);
 
-pub fn ms(milliseconds: u64) -> Duration {
+pub const fn ms(milliseconds: u64) -> Duration {
     Duration::from_millis(milliseconds)
 }
 

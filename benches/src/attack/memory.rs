@@ -29,6 +29,11 @@ pub const ATTACKS: &[Attack] = &[
         deaf_topics,
     ),
     Attack::new(
+        "deaf-halfway",
+        "200 clients stop reading in the middle of one message of 4 MiB, each of its own",
+        deaf_halfway,
+    ),
+    Attack::new(
         "deaf-watchers",
         "800 clients subscribe to all that the arm publishes and read nothing",
         deaf_watchers,
@@ -123,6 +128,18 @@ fn deaf_topics() -> Vec<Client> {
             .says(&subscribe(&topic, ""))
             .advertises(&topic)
             .repeats(&publish(&topic, &msg))
+            .deaf()
+    })
+}
+
+fn deaf_halfway() -> Vec<Client> {
+    let msg = format!(r#"{{"data":"{}"}}"#, filler(LONG));
+    each(0..200, |k| {
+        let topic = format!("/attack/halfway/{k}");
+        Client::tcp()
+            .says(&subscribe(&topic, ""))
+            .advertises(&topic)
+            .says(&publish(&topic, &msg))
             .deaf()
     })
 }

@@ -115,8 +115,9 @@ impl<const N: usize> Player<N> {
         Ok(None)
     }
 
-    /// Owes what is present of the topics that somebody has come to: one look back costs as much for all of them as for
-    /// one, and there is one from tick to tick, so that nobody holds the record up by coming and going.
+    /// Owes what is present of the topics that somebody has come to, or that have come to another place: one look back
+    /// costs as much for all of them as for one, and there is one from tick to tick, so that nobody holds the record up
+    /// by coming and going, or by winding it.
     pub(super) fn owe_fresh(&mut self) {
         if self.has_looked || self.fresh.is_empty() {
             return;
@@ -129,12 +130,17 @@ impl<const N: usize> Player<N> {
         });
     }
 
-    /// Owes the messages that are present, and nothing else.
-    pub(super) fn owe_all_present(&mut self) -> Result<(), ReadError> {
+    /// Owes nothing any more.
+    pub(super) fn forget_owed(&mut self) {
         for moment in self.owed.drain(..) {
             // It has not been published.
             self.latched.remove(&moment.topic);
         }
+    }
+
+    /// Owes the messages that are present, and nothing else.
+    pub(super) fn owe_all_present(&mut self) -> Result<(), ReadError> {
+        self.forget_owed();
         self.owe_latched()?;
         self.fresh.clear();
         let wanted = self.wanted.clone();

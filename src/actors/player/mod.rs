@@ -75,6 +75,8 @@ pub struct Player<const N: usize> {
     fresh: BTreeSet<Topic>,
     /// Whether that has been done since the last tick.
     has_looked: bool,
+    /// Whether a place has been sought since the last tick.
+    has_sought: bool,
     /// Messages that are published before the record goes on: what is present, for who has come.
     owed: VecDeque<Moment>,
     /// Where the record is to be by now, in nanoseconds since its beginning, if it is not there yet.
@@ -127,6 +129,7 @@ impl<const N: usize> Player<N> {
             wanted: BTreeSet::new(),
             fresh: BTreeSet::new(),
             has_looked: false,
+            has_sought: false,
             owed: VecDeque::new(),
             target: None,
             left: MAX_AT_ONCE,
@@ -152,6 +155,7 @@ impl<const N: usize> Actor for Player<N> {
         ctx.run_interval(TICK, |player, ctx| {
             player.left = MAX_AT_ONCE;
             player.has_looked = false;
+            player.has_sought = false;
             player.owe_fresh();
             player.tick();
             player.go_on(ctx);
@@ -264,10 +268,13 @@ impl<const N: usize> Player<N> {
         let to = u64::try_from(to.as_nanos()).unwrap_or(u64::MAX);
         self.position = to.min(self.tape.reel.duration());
         self.target = None;
-        self.attempt(|player| {
-            player.tape.reel.wind(player.position)?;
-            player.owe_all_present()
-        });
+        self.forget_owed();
+        // All have come to another place.
+        self.fresh.clone_from(&self.wanted);
+        self.attempt(|player| player.tape.reel.wind(player.position));
+        // The first place that is sought is looked at now, whoever has come before; another at the next tick.
+        self.has_looked &= std::mem::replace(&mut self.has_sought, true);
+        self.owe_fresh();
     }
 
     /// The arm's settings as they were.

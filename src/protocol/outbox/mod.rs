@@ -61,9 +61,9 @@ pub struct Outbox {
 /// A frame that is being written.
 #[derive(Debug)]
 struct InFlight {
-    /// Its bytes.
+    /// Bytes of the whole.
     length: usize,
-    /// Those that have not been written.
+    /// Bytes of it that have not been written.
     left: usize,
     is_response: bool,
 }

@@ -56,8 +56,8 @@ pub(super) struct Outgoing {
     pub(super) backlog: Arc<AtomicUsize>,
     gauges: Arc<Gauges>,
     account: Arc<Account>,
-    /// Topic messages that waited when the account was last brought up to date, their bytes, those of the ones that were
-    /// being written, and those of responses.
+    /// Topic messages that waited when the account was last brought up to date, their bytes, those of the ones that
+    /// were being written, and those of responses.
     counted: Cell<[usize; 4]>,
 }
 
