@@ -18,6 +18,7 @@ mod pursuit;
 mod refusal;
 mod services;
 mod state;
+mod subscriptions;
 mod topics;
 
 use actix::prelude::*;
