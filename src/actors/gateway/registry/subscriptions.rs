@@ -31,9 +31,12 @@ impl Registry {
         let absolute = names::absolute(topic);
         let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
+        let client = self.clients.get(&origin.from);
+        let before = client.and_then(|client| client.subscription(topic, id.as_deref()));
         let size = match subscribe.encoding.fragment_size {
             Some(size) => {
-                let shared = self.topics.share_size(&absolute, size);
+                let given_up = before.and_then(|one| one.size.as_ref());
+                let shared = self.topics.share_size(&absolute, size, given_up);
                 Some(shared.ok_or(Refusal::TooManySizes)?)
             }
             None => None,
@@ -57,7 +60,7 @@ impl Registry {
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
             encoding: encoding_for(subscribe),
-            _size: size,
+            size,
             _share: share,
         });
         let throttle = throttle_of(subscriptions);
@@ -89,8 +92,7 @@ impl Registry {
         }
         let topic = subscribe.topic.as_str();
         if let Some(client) = self.clients.get(&from) {
-            let of_topic = client.subscriptions.get(topic).into_iter().flatten();
-            let is_new = !of_topic.into_iter().any(|one| one.id.as_deref() == id);
+            let is_new = client.subscription(topic, id).is_none();
             let held = || client.subscriptions.values().map(Vec::len).sum::<usize>();
             if is_new && held() >= MAX_SUBSCRIPTIONS {
                 return Err(Refusal::TooManySubscriptions);
