@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use crate::protocol::catalog::types::{self, Type};
 use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTED};
 
 /// How a client uses a topic.
@@ -29,6 +30,8 @@ struct Users {
     subscribers: usize,
     /// As the first that named one has it.
     type_name: Option<Arc<str>>,
+    /// The first that was named and is known: messages are encoded by it.
+    known: Option<Type>,
 }
 
 impl Users {
@@ -37,6 +40,18 @@ impl Users {
             Use::Advertised => &mut self.publishers,
             Use::Subscribed => &mut self.subscribers,
         }
+    }
+
+    /// Somebody has named a type; true if it stays with the topic.
+    fn note(&mut self, type_name: &str) -> bool {
+        if self.known.is_none() {
+            self.known = types::find(type_name);
+        }
+        let is_first = self.type_name.is_none();
+        if is_first {
+            self.type_name = Some(type_name.into());
+        }
+        is_first
     }
 }
 
@@ -48,10 +63,16 @@ impl Tally {
         }
         if let Some(users) = self.topics.get_mut(topic) {
             *users.count(how) += 1;
-            if users.type_name.is_none() {
-                users.type_name = type_name.map(Into::into);
+            if let Some(type_name) = type_name {
+                users.note(type_name);
             }
         }
+    }
+
+    /// A client that uses a topic already has named its type; true if that stays with the topic.
+    pub(super) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
+        let users = self.topics.get_mut(topic);
+        users.is_some_and(|users| users.note(type_name))
     }
 
     /// A client has ceased to use a topic in this way.
@@ -67,9 +88,9 @@ impl Tally {
         }
     }
 
-    /// The type of a topic that clients use, if one has named it.
-    pub(super) fn type_of(&self, topic: &str) -> Option<&str> {
-        self.topics.get(topic)?.type_name.as_deref()
+    /// The type of a topic that clients use, if one has named it and it is known.
+    pub(super) fn known_type(&self, topic: &str) -> Option<Type> {
+        self.topics.get(topic)?.known
     }
 
     /// A client provides a service.

@@ -110,9 +110,12 @@ impl Registry {
             return Ok(());
         };
         if new {
+            self.tally.add(topic, Use::Advertised, type_name);
+        }
+        let is_noted = |type_name| self.tally.note_type(topic, type_name);
+        if new || type_name.is_some_and(is_noted) {
             let share = client.register(bytes);
             client.advertised.insert(topic.into(), share);
-            self.tally.add(topic, Use::Advertised, type_name);
         }
         if let Some(topic) = Topic::from_name(topic) {
             client.withdrawn.remove(&topic);

@@ -49,9 +49,11 @@ impl Registry {
         let (name, new) = self
             .topics
             .add(topic, origin.from, client.outlets.deliver.clone());
+        let type_name = subscribe.type_name.as_deref();
         if new {
-            let type_name = subscribe.type_name.as_deref();
             self.tally.add(&absolute, Use::Subscribed, type_name);
+        } else if let Some(type_name) = type_name {
+            self.tally.note_type(&absolute, type_name);
         }
         let subscriptions = client.subscriptions.entry(name.clone()).or_default();
         subscriptions.retain(|one| one.id != id);
@@ -99,8 +101,8 @@ impl Registry {
             }
         }
         if subscribe.encoding.compression == Compression::CborRaw {
-            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
-            if type_name.and_then(types::find).is_none() {
+            let own = || subscribe.type_name.as_deref().and_then(types::find);
+            if self.known_type(topic).is_none() && own().is_none() {
                 return Err(Refusal::UnknownType);
             }
         }
