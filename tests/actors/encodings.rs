@@ -88,6 +88,44 @@ fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_is_refused() {
     });
 }
 
+/// Another size under the same id takes the place of the one before, also where all are in use; a refusal changes nothing.
+#[test]
+fn a_subscription_changes_its_own_size_where_all_are_in_use_and_keeps_it_where_it_may_not() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut peers = Vec::new();
+        for n in 0..MAX_FRAGMENT_SIZES {
+            let mut peer = gateway.connect(WIDE);
+            subscribe_in_pieces(&mut peer, 100 + n).await;
+            peers.push(peer);
+        }
+        let mut second = gateway.connect(WIDE);
+        subscribe_in_pieces(&mut second, 100).await;
+        assert_eq!(
+            subscribe_in_pieces(&mut second, 99).await["level"],
+            "error",
+            "another has the size that it would give up"
+        );
+        let last = peers.last_mut().unwrap();
+        let changed = subscribe_in_pieces(last, 200).await;
+        assert_eq!(changed["level"], "info", "{changed}");
+        let freed = 100 + MAX_FRAGMENT_SIZES - 1;
+        assert_eq!(
+            subscribe_in_pieces(&mut second, freed).await["level"],
+            "error",
+            "there are as many as before"
+        );
+        let mut publisher = gateway.connect(WIDE);
+        publisher.advertise("/t").await;
+        let msg = json!({"pad": "x".repeat(300)});
+        let frame = json!({"op": "publish", "topic": "/t", "msg": msg});
+        publisher.send(frame).await;
+        assert_eq!(next_message(&mut second).await.0["msg"], msg);
+        let last = peers.last_mut().unwrap();
+        assert_eq!(last.receive().await["num"], 0, "it comes in pieces");
+    });
+}
+
 #[test]
 fn messages_keep_their_order_though_long_ones_are_cut_up_elsewhere() {
     in_virtual_time(async {

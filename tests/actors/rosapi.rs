@@ -11,6 +11,7 @@ use pendularm::actors::gateway::registry::Attach;
 use pendularm::actors::node::ask;
 #[cfg(feature = "record")]
 use pendularm::actors::recorder::Recorder;
+use pendularm::actors::resources::aside::{Errand, PLACES, aside};
 use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{
     ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, Rosapi, SetParam,
@@ -130,4 +131,42 @@ fn a_question_without_its_field_or_with_arguments_of_another_form_is_refused() {
             json!({"type": "rosgraph_msgs/msg/Clock"})
         );
     });
+}
+
+/// A list of thousands is made for those alone who are about to write it: whoever waits holds none.
+#[test]
+fn the_list_is_made_once_there_is_a_place_to_write_it() {
+    in_virtual_time(async {
+        let (gateway, _rosapi) = start().await;
+        let (mut asker, mut other) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        for n in 0..100 {
+            other.advertise(&format!("/t/{n}")).await;
+        }
+        other.call("/none", 1).await;
+        other.receive().await;
+        let (free, held) = std::sync::mpsc::channel::<()>();
+        let held = std::sync::Arc::new(std::sync::Mutex::new(held));
+        for _ in 0..PLACES {
+            let held = std::sync::Arc::clone(&held);
+            actix_rt::spawn(aside(Errand::Writing, move || held.lock().unwrap().recv()));
+        }
+        turns().await;
+        let question = json!({"op": "call_service", "service": "/rosapi/topics"});
+        asker.send(question).await;
+        turns().await;
+        other.advertise("/late").await;
+        turns().await;
+        drop(free);
+        let answer = asker.receive().await;
+        let topics = answer["values"]["topics"].as_array().unwrap();
+        assert!(topics.contains(&json!("/late")), "{topics:?}");
+        assert!(topics.contains(&json!("/t/99")));
+    });
+}
+
+/// Lets everything happen that waits for nothing but its turn. The clock stands still while another thread is at work.
+async fn turns() {
+    for _ in 0..100 {
+        tokio::task::yield_now().await;
+    }
 }

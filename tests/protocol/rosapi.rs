@@ -2,21 +2,29 @@
 //!
 //! **Invariant:** answers are compared whole; names are spelled here as clients spell them.
 
+use std::sync::Arc;
+
 use pendularm::protocol::catalog::{Action, Node, Playback, Rosapi, Service, Topic, types};
 use pendularm::protocol::ros::rosapi::{AnswerError, Census, ListedService, ListedTopic, answer};
 use serde_json::{Value, json};
 
 /// Clients that talk on `/chat` and about `/joint_states`, listen to `/wish`, and provide two services.
 fn census() -> Census {
-    let topic = |name: &str, type_name: Option<&str>, published, subscribed| ListedTopic {
-        name: name.into(),
-        type_name: type_name.map(Into::into),
-        published,
-        subscribed,
+    let topic = |name: &str, type_name: Option<&str>, published, subscribed| {
+        let type_name = type_name.map(Into::into);
+        Arc::new(ListedTopic {
+            name: name.into(),
+            type_name,
+            published,
+            subscribed,
+        })
     };
-    let service = |name: &str, type_name: Option<&str>| ListedService {
-        name: name.into(),
-        type_name: type_name.map(Into::into),
+    let service = |name: &str, type_name: Option<&str>| {
+        let type_name = type_name.map(Into::into);
+        Arc::new(ListedService {
+            name: name.into(),
+            type_name,
+        })
     };
     Census {
         topics: vec![

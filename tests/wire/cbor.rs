@@ -317,6 +317,65 @@ fn cbor_raw_of_a_type_that_is_not_known_is_refused_and_of_a_known_one_delivered(
     assert_eq!(frame.get("msg").get("bytes"), &Cbor::Bytes(expected));
 }
 
+/// `/x` is advertised by another client in such a way, subscribed to as JSON with such a type, if any, and then as
+/// cbor-raw of a known type: the next message comes in that form.
+#[test]
+fn a_type_that_is_known_counts_whoever_gave_none_or_another_before() {
+    let string = Some("std_msgs/msg/String");
+    for (advertised, as_json) in [
+        (None, None),
+        (Some("demo/X"), None),
+        (None, Some("demo/X")),
+        (string, Some("demo/X")),
+    ] {
+        let runtime = Runtime::start();
+        let (mut talker, mut socket) = (runtime.connect(), Socket::open(runtime.address));
+        let typed = |op: &str, id: &str, type_name: Option<&str>| {
+            let mut frame = json!({"op": op, "id": id, "topic": "/x"});
+            if let Some(type_name) = type_name {
+                frame["type"] = json!(type_name);
+            }
+            frame
+        };
+        talker.send(&typed("advertise", "1", advertised));
+        talker.settle();
+        socket.send(&typed("subscribe", "a", as_json));
+        socket.send(&json!({"op": "set_level", "level": "info"}));
+        socket.send(
+            &json!({"op": "subscribe", "id": "b", "topic": "/x", "type": string, "compression": "cbor-raw"}),
+        );
+        let status = socket.receive();
+        assert_eq!(status["level"], "info", "{advertised:?}: {status}");
+        talker.send(&json!({"op": "publish", "topic": "/x", "msg": {"data": "hi"}}));
+        let expected = [&[0, 1, 0, 0, 3, 0, 0, 0][..], b"hi\0"].concat();
+        let frame = binary(&mut socket);
+        assert_eq!(frame.get("msg").get("bytes"), &Cbor::Bytes(expected));
+        let told = talker.ask("/rosapi/topic_type", json!({"topic": "/x"}));
+        let first = advertised.or(as_json).or(string);
+        assert_eq!(
+            told["type"],
+            json!(first),
+            "as the first to name one had it"
+        );
+    }
+}
+
+#[test]
+fn a_type_that_is_advertised_later_is_the_topics() {
+    let runtime = Runtime::start();
+    let (mut talker, mut socket) = (runtime.connect(), Socket::open(runtime.address));
+    talker.send(&json!({"op": "advertise", "topic": "/x"}));
+    talker.send(&json!({"op": "advertise", "topic": "/x", "type": "std_msgs/msg/String"}));
+    talker.settle();
+    subscribe(&mut socket, "/x", "cbor-raw");
+    socket.settle();
+    talker.send(&json!({"op": "publish", "topic": "/x", "msg": {"data": "hi"}}));
+    assert!(matches!(
+        binary(&mut socket).get("msg").get("bytes"),
+        Cbor::Bytes(_)
+    ));
+}
+
 #[test]
 fn over_raw_tcp_binary_is_refused_and_png_comes_as_it_is() {
     let runtime = Runtime::start();

@@ -1,10 +1,12 @@
 //! Aimed at the gateway's thread by numbers: hundreds of clients who all want a little at one instant.
 
 use super::Attack;
-use super::script::{Client, each, on_service, publish, subscribe};
+use super::script::{Client, call, each, on_service, publish, subscribe};
 
 /// Subscribers, or callers: with those who attack them, nearly all places.
 const CROWD: usize = 800;
+/// Clients that ask for what others have registered.
+const ASKERS: usize = 900;
 /// Calls of a client that may wait.
 const WAITING: usize = 256;
 
@@ -38,6 +40,11 @@ pub const ATTACKS: &[Attack] = &[
         "floods-to-webs",
         "20 clients flood a topic with short messages to 20 WebSockets that read",
         floods_to_webs,
+    ),
+    Attack::new(
+        "census",
+        "36 clients register 12,288 names, 900 ask rosapi for a service's type at one instant, every second",
+        census,
     ),
 ];
 
@@ -92,4 +99,33 @@ fn floods_to_webs() -> Vec<Client> {
         .advertises("/crowd")
         .floods(&publish("/crowd", "{}"));
     [reader.times(20), flood.times(20)].concat()
+}
+
+/// As many topics, services and actions as are listed.
+fn census() -> Vec<Client> {
+    let quiet = || Client::tcp().says(r#"{"op":"set_level","level":"none"}"#);
+    let typed = |op: &str, field: &str, name: String| {
+        format!(r#"{{"op":"{op}","{field}":"{name}","type":"a/b"}}"#)
+    };
+    let topics = each(0..4, |k| {
+        quiet().says_each(0..1_024, |n| {
+            typed("advertise", "topic", format!("/topic/{k}/{n}"))
+        })
+    });
+    let services = each(0..16, |k| {
+        quiet().says_each(0..256, |n| {
+            typed("advertise_service", "service", format!("/service/{k}/{n}"))
+        })
+    });
+    let actions = each(0..16, |k| {
+        quiet().says_each(0..256, |n| {
+            typed("advertise_action", "action", format!("/action/{k}/{n}"))
+        })
+    });
+    let question = call("/rosapi/service_type", "1", r#"{"service":"/service/1/1"}"#);
+    let asker = Client::tcp()
+        .after(1_000)
+        .repeats(&question)
+        .drips(question.len() + 1, std::time::Duration::from_secs(1));
+    [topics, services, actions, asker.times(ASKERS)].concat()
 }

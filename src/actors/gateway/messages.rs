@@ -171,10 +171,13 @@ impl Handled {
 #[rtype(result = "Handled")]
 pub struct PublishInTurn(pub Vec<Publish>);
 
-/// Asks for the topics and services that clients have. From `rosapi`.
+/// Asks for the topics and services that clients have. From `rosapi`; there is no answer where there are more of them.
 #[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "Census")]
-pub struct TakeCensus;
+#[rtype(result = "Option<Arc<Census>>")]
+pub struct TakeCensus {
+    /// So many of them are wanted at most.
+    pub at_most: usize,
+}
 
 /// Something that passes the registry, for whoever overhears it.
 pub enum Overheard<'a> {

@@ -9,7 +9,7 @@
 
 use std::sync::Arc;
 
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio::task::{spawn_blocking, yield_now};
 
 use crate::actors::panics::contain;
@@ -33,33 +33,51 @@ thread_local! {
     static WRITING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
 }
 
-/// Does `work` on another thread; in a simulation, which has one, on that and a turn later. `None` if it panicked,
-/// which is logged, or if the runtime is ending.
+/// A place among those who are at work on one kind of errand.
+pub struct PlaceAside(OwnedSemaphorePermit);
+
+impl PlaceAside {
+    /// A place, once one is free: for work that is to take nothing while it waits. `None` if the runtime is ending.
+    pub async fn take(errand: Errand) -> Option<Self> {
+        let free = match errand {
+            Errand::Reading => READING.with(Arc::clone),
+            Errand::Writing => WRITING.with(Arc::clone),
+        };
+        free.acquire_owned().await.ok().map(Self)
+    }
+
+    /// Does `work` on another thread; in a simulation, which has one, on that and a turn later. `None` if it panicked,
+    /// which is logged, or if the runtime is ending.
+    pub async fn perform<T: Send + 'static>(
+        self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Option<T> {
+        let Self(place) = self;
+        let work = move || {
+            let done = contain(work);
+            drop(place);
+            done
+        };
+        let done = if work_clock::is_counted() {
+            yield_now().await;
+            work()
+        } else {
+            spawn_blocking(work).await.ok()?
+        };
+        match done {
+            Ok(done) => Some(done),
+            Err(panic) => {
+                tracing::error!(%panic, "work for a client failed");
+                None
+            }
+        }
+    }
+}
+
+/// Waits for a place and does `work` there.
 pub async fn aside<T: Send + 'static>(
     errand: Errand,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Option<T> {
-    let free = match errand {
-        Errand::Reading => READING.with(Arc::clone),
-        Errand::Writing => WRITING.with(Arc::clone),
-    };
-    let place = free.acquire_owned().await.ok()?;
-    let work = move || {
-        let done = contain(work);
-        drop(place);
-        done
-    };
-    let done = if work_clock::is_counted() {
-        yield_now().await;
-        work()
-    } else {
-        spawn_blocking(work).await.ok()?
-    };
-    match done {
-        Ok(done) => Some(done),
-        Err(panic) => {
-            tracing::error!(%panic, "work for a client failed");
-            None
-        }
-    }
+    PlaceAside::take(errand).await?.perform(work).await
 }

@@ -129,17 +129,17 @@ impl Registry {
         }
     }
 
-    /// The type of a topic's messages, if anybody has said it.
-    pub(super) fn type_of(&self, topic: &str) -> Option<&str> {
+    /// The type of a topic's messages, if anybody has said it and it is known.
+    pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
         match Topic::from_name(topic) {
             Some(topic) => Some(topic.type_name()),
-            None => self.tally.type_of(&names::absolute(topic)),
+            None => Some(self.tally.known_type(&names::absolute(topic))?.name),
         }
     }
 
     /// A JSON frame, or a series of them, in another encoding.
     fn encoded(&self, spelling: &Arc<str>, plain: Bytes, encoding: Encoding) -> Encoded {
-        let type_name = self.type_of(spelling);
+        let type_name = self.known_type(spelling);
         let counters = (&self.fragmented, self.gauges.memory());
         Encoded::new(spelling, plain, encoding, type_name, counters)
     }

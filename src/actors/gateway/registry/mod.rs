@@ -18,6 +18,7 @@ mod pursuit;
 mod refusal;
 mod services;
 mod state;
+mod subscriptions;
 mod topics;
 
 use actix::prelude::*;
@@ -35,7 +36,6 @@ use super::messages::{
 use crate::actors::ConnectionId;
 use crate::actors::node::{Publish, Respond};
 use crate::protocol::catalog::Topic;
-use crate::protocol::ros::rosapi::Census;
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
@@ -49,6 +49,7 @@ impl Handler<Attach> for Registry {
     type Result = ();
 
     fn handle(&mut self, Attach(nodes): Attach, _: &mut Context<Self>) {
+        self.tally.set_replayed(nodes.replayed.clone());
         self.nodes = nodes;
     }
 }
@@ -170,12 +171,8 @@ impl Handler<Respond> for Registry {
 impl Handler<TakeCensus> for Registry {
     type Result = MessageResult<TakeCensus>;
 
-    fn handle(&mut self, _: TakeCensus, _: &mut Context<Self>) -> Self::Result {
-        let replayed = self.nodes.replayed.clone();
-        MessageResult(Census {
-            replayed,
-            ..self.tally.census()
-        })
+    fn handle(&mut self, take: TakeCensus, _: &mut Context<Self>) -> Self::Result {
+        MessageResult(self.tally.census(take.at_most))
     }
 }
 

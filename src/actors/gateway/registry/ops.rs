@@ -1,8 +1,6 @@
-//! The rosbridge ops, in the order of the protocol's table, but for calls and actions.
+//! The rosbridge ops, in the order of the protocol's table, but for subscriptions, calls and actions.
 //!
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
-
-use std::sync::Arc;
 
 use actix::prelude::*;
 use tokio::sync::oneshot;
@@ -12,17 +10,14 @@ use super::fan_out::Pace;
 use super::refusal::Refusal;
 use super::services::Provider;
 use super::state::{FrameOrigin, Registry};
-use super::topics::{Subscription, throttle_of};
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS};
-use crate::actors::gateway::messages::{Configure, Handled, Overheard, Request};
+use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED};
+use crate::actors::gateway::messages::{Handled, Overheard, Request};
 use crate::actors::wire::TopicMessage;
-use crate::protocol::catalog::{Direction, Service, Topic, types};
-use crate::protocol::limits::MAX_NAME;
+use crate::protocol::catalog::{Direction, Service, Topic};
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{Compression, Encoding, Op, Subscribe};
-use crate::protocol::ros::stamps::is_ros1_name;
+use crate::protocol::op::Op;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::series::Series;
 
@@ -115,9 +110,12 @@ impl Registry {
             return Ok(());
         };
         if new {
+            self.tally.add(topic, Use::Advertised, type_name);
+        }
+        let is_noted = |type_name| self.tally.note_type(topic, type_name);
+        if new || type_name.is_some_and(is_noted) {
             let share = client.register(bytes);
             client.advertised.insert(topic.into(), share);
-            self.tally.add(topic, Use::Advertised, type_name);
         }
         if let Some(topic) = Topic::from_name(topic) {
             client.withdrawn.remove(&topic);
@@ -200,113 +198,6 @@ impl Registry {
         pace.and(Handled::at_once())
     }
 
-    fn subscribe(&mut self, origin: &FrameOrigin, subscribe: &Subscribe) -> Result<(), Refusal> {
-        let id: Option<Box<str>> = origin.id.as_ref().map(|id| id.get().into());
-        self.may_subscribe(origin.from, id.as_deref(), subscribe)?;
-        let topic = subscribe.topic.as_str();
-        let absolute = names::absolute(topic);
-        let bytes = [id.as_deref(), subscribe.type_name.as_deref()];
-        let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
-        let size = match subscribe.encoding.fragment_size {
-            Some(size) => {
-                let shared = self.topics.share_size(&absolute, size);
-                Some(shared.ok_or(Refusal::TooManySizes)?)
-            }
-            None => None,
-        };
-        let first = !self.is_wanted(&absolute);
-        let Some(client) = self.clients.get_mut(&origin.from) else {
-            return Ok(());
-        };
-        let share = client.register(topic.len() + bytes);
-        let (name, new) = self
-            .topics
-            .add(topic, origin.from, client.outlets.deliver.clone());
-        if new {
-            let type_name = subscribe.type_name.as_deref();
-            self.tally.add(&absolute, Use::Subscribed, type_name);
-        }
-        let subscriptions = client.subscriptions.entry(name.clone()).or_default();
-        subscriptions.retain(|one| one.id != id);
-        subscriptions.push(Subscription {
-            id,
-            throttle: subscribe.throttle,
-            queue_length: subscribe.queue_length,
-            encoding: encoding_for(subscribe),
-            _size: size,
-            _share: share,
-        });
-        let throttle = throttle_of(subscriptions);
-        self.topics.configure(&name, origin.from, subscriptions);
-        let shared = Arc::clone(&name);
-        client.outlets.configure.do_send(Configure {
-            topic: name,
-            throttle,
-        });
-        // The status leaves before the first message: the topic's owner hears of the subscriber after it.
-        let msg = format!("subscribed to {topic}");
-        self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
-        if first {
-            self.tell_owner(topic, true);
-        } else if new {
-            self.deliver_latched(&shared, origin.from);
-        }
-        Ok(())
-    }
-
-    fn may_subscribe(
-        &self,
-        from: ConnectionId,
-        id: Option<&str>,
-        subscribe: &Subscribe,
-    ) -> Result<(), Refusal> {
-        if id.is_some_and(|id| id.len() > MAX_NAME) {
-            return Err(Refusal::LongSubscriptionId(MAX_NAME));
-        }
-        let topic = subscribe.topic.as_str();
-        if let Some(client) = self.clients.get(&from) {
-            let of_topic = client.subscriptions.get(topic).into_iter().flatten();
-            let is_new = !of_topic.into_iter().any(|one| one.id.as_deref() == id);
-            let held = || client.subscriptions.values().map(Vec::len).sum::<usize>();
-            if is_new && held() >= MAX_SUBSCRIPTIONS {
-                return Err(Refusal::TooManySubscriptions);
-            }
-        }
-        if subscribe.encoding.compression == Compression::CborRaw {
-            let type_name = self.type_of(topic).or(subscribe.type_name.as_deref());
-            if type_name.and_then(types::find).is_none() {
-                return Err(Refusal::UnknownType);
-            }
-        }
-        Ok(())
-    }
-
-    fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
-        let Some(client) = self.clients.get_mut(&origin.from) else {
-            return;
-        };
-        let Some((name, _)) = client.subscriptions.get_key_value(topic) else {
-            return;
-        };
-        let name = name.clone();
-        let mut left = client.subscriptions.remove(topic).unwrap_or_default();
-        match &origin.id {
-            None => left.clear(),
-            Some(id) => left.retain(|one| one.id.as_deref() != Some(id.get())),
-        }
-        let throttle = throttle_of(&left);
-        client.outlets.configure.do_send(Configure {
-            topic: name.clone(),
-            throttle,
-        });
-        if left.is_empty() {
-            self.drop_subscriber(&name, origin.from);
-        } else {
-            self.topics.configure(&name, origin.from, &left);
-            client.subscriptions.insert(name, left);
-        }
-    }
-
     fn advertise_service(
         &mut self,
         origin: &FrameOrigin,
@@ -369,19 +260,7 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
     }
 }
 
-/// The encoding that a subscription asks for. Stamps have the names of ROS 1 too on a topic of the runtime's own that
-/// is asked for by its type of ROS 1. CDR has no names.
-fn encoding_for(subscribe: &Subscribe) -> Encoding {
-    let own = Topic::from_name(&subscribe.topic).filter(|topic| !is_listened_to(*topic));
-    let mut asked = own.zip(subscribe.type_name.as_deref()).into_iter();
-    let is_ros1 = asked.any(|(topic, asked)| is_ros1_name(asked, topic.type_name()));
-    Encoding {
-        ros1_stamps: is_ros1 && subscribe.encoding.compression != Compression::CborRaw,
-        ..subscribe.encoding
-    }
-}
-
 /// Whether the runtime itself subscribes to the topic.
-fn is_listened_to(topic: Topic) -> bool {
+pub(super) fn is_listened_to(topic: Topic) -> bool {
     topic.direction() == Direction::Subscribed
 }

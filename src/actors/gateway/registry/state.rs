@@ -150,6 +150,12 @@ impl Client {
         }
     }
 
+    /// Its subscription of that `id` to the topic in that spelling.
+    pub(super) fn subscription(&self, topic: &str, id: Option<&str>) -> Option<&Subscription> {
+        let mut of_topic = self.subscriptions.get(topic)?.iter();
+        of_topic.find(|one| one.id.as_deref() == id)
+    }
+
     /// Takes what a registration costs whose names have so many bytes.
     pub(super) fn register(&self, bytes: usize) -> Share {
         self.outlets.account.take(REGISTRATION_BYTES + 3 * bytes)

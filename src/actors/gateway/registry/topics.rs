@@ -24,7 +24,7 @@ pub(super) struct Subscription {
     pub(super) queue_length: usize,
     pub(super) encoding: Encoding,
     /// Keeps its `fragment_size` among those that the topic has.
-    pub(super) _size: Option<Arc<usize>>,
+    pub(super) size: Option<Arc<usize>>,
     /// Its share of the account.
     pub(super) _share: Share,
 }
@@ -88,16 +88,22 @@ impl Topics {
         (name, new)
     }
 
-    /// A `fragment_size` to be kept by the subscription that asks for it; `None` if the topic of that absolute name
-    /// has as many others as it may have.
-    pub(super) fn share_size(&mut self, topic: &str, size: usize) -> Option<Arc<usize>> {
+    /// A `fragment_size` to be kept by the subscription that asks for it, which gives up `given_up` then; `None` if the
+    /// topic of that absolute name has as many others as it may have.
+    pub(super) fn share_size(
+        &mut self,
+        topic: &str,
+        size: usize,
+        given_up: Option<&Arc<usize>>,
+    ) -> Option<Arc<usize>> {
         let sizes = self.sizes.entry(topic.into()).or_default();
         sizes.retain(|one| one.strong_count() > 0);
         let known = sizes.iter().filter_map(Weak::upgrade);
         if let Some(known) = known.into_iter().find(|one| **one == size) {
             return Some(known);
         }
-        if sizes.len() >= MAX_FRAGMENT_SIZES {
+        let is_freed = given_up.is_some_and(|one| Arc::strong_count(one) == 1);
+        if sizes.len() - usize::from(is_freed) >= MAX_FRAGMENT_SIZES {
             return None;
         }
         let size = Arc::new(size);

@@ -20,14 +20,14 @@ use crate::actors::arm::sim::{
 };
 use crate::actors::gateway::messages::TakeCensus;
 use crate::actors::node::{Call, Reply, Unserved, ask};
-use crate::actors::resources::aside::{Errand, aside};
+use crate::actors::resources::aside::{Errand, PlaceAside};
 use crate::actors::wire::Nodes;
 use crate::protocol::catalog::{self, Node, Service};
 use crate::protocol::op::fields::Rejections;
 use crate::protocol::ros::parameters::Parameter;
 use crate::protocol::ros::urdf;
 
-/// Topics and services of clients beyond which an answer may list more than can be written in a turn.
+/// Topics, services and actions of clients beyond which an answer may list more than can be written in a turn.
 const MANY: usize = 64;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
@@ -105,19 +105,26 @@ impl<const N: usize> Handler<Call<Look>> for Rosapi<N> {
             ask: look,
             mut reply,
         } = call;
-        let census = self.registry.send(TakeCensus);
+        let registry = self.registry.clone();
         let answered = async move {
-            let census = census.await.unwrap_or_default();
-            let is_long = census.entries() > MANY;
-            let answer = move || {
+            let answer = move |census| {
                 let mut pieces = reply.answer_in_pieces(Listing { look, census });
                 while !pieces.advance() {}
             };
-            if is_long {
-                aside(Errand::Writing, answer).await;
-            } else {
-                answer();
+            let short = TakeCensus { at_most: MANY };
+            if let Ok(Some(census)) = registry.send(short).await {
+                return answer(census);
             }
+            // However many wait, a census is kept alive by those alone who are at work.
+            let Some(place) = PlaceAside::take(Errand::Writing).await else {
+                return;
+            };
+            let whole = TakeCensus {
+                at_most: usize::MAX,
+            };
+            let census = registry.send(whole).await.ok().flatten();
+            let census = census.unwrap_or_default();
+            place.perform(move || answer(census)).await;
         };
         ctx.spawn(answered.into_actor(self));
     }

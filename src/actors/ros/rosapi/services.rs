@@ -4,6 +4,7 @@
 //! exist gets as far as the node, which says so.
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use bytes::Bytes;
 use serde_json::value::RawValue;
@@ -38,7 +39,7 @@ pub struct Listing {
     /// The question.
     pub look: Look,
     /// Topics and services of clients.
-    pub census: Census,
+    pub census: Arc<Census>,
 }
 
 impl Ask for Look {
