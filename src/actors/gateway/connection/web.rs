@@ -26,7 +26,7 @@ use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
 use super::reception::Reception;
 use super::shared::{Ending, HELD_MOST, Shared};
-use super::transport::{Inbound, Outbound, read_some};
+use super::transport::{CHUNK, Inbound, Outbound, read_some};
 use super::unfinished::{First, Unfinished};
 use super::watched::{READ_BUFFER, Watched};
 use crate::actors::ConnectionId;
@@ -36,7 +36,8 @@ use crate::protocol::limits::MAX_FRAME;
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::protocol::wire::frame::FrameReader;
-use crate::web::{message, serve};
+use crate::web::message::OneLine;
+use crate::web::serve;
 
 /// How often a peer is asked for a sign of life: often enough for whatever between us forgets silent connections.
 pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
@@ -165,6 +166,8 @@ struct Input<S> {
     asked: Option<Instant>,
     /// When the last read ended.
     read_until: Instant,
+    /// The message that has come, while some of it has not been read.
+    line: Option<OneLine>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
@@ -176,6 +179,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
             next_ping: now + PING_INTERVAL,
             asked: None,
             read_until: now,
+            line: None,
         }
     }
 
@@ -194,10 +198,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
         }
     }
 
-    /// A message is complete.
-    fn take(&self, message: &[u8], chunk: &mut BytesMut) {
-        message::append_line(message, chunk);
-        self.link.socket.borrow_mut().get_mut().complete();
+    /// Takes what is still to be read of a message: a long one as it would come over TCP, a chunk at a time.
+    fn take(&mut self, mut line: OneLine, chunk: &mut BytesMut) {
+        let before = chunk.len();
+        if line.append(CHUNK, chunk) {
+            let read = chunk.len() - before;
+            self.link.socket.borrow_mut().get_mut().complete(read);
+        } else {
+            self.line = Some(line);
+        }
     }
 
     fn look_for_life(&mut self) -> io::Result<()> {
@@ -234,10 +243,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
         self.asked = self.asked.map(|asked| asked + unread);
         self.link.socket.borrow_mut().get_mut().read_on(unread);
         let before = chunk.len();
+        if let Some(line) = self.line.take() {
+            self.take(line, chunk);
+        }
         while chunk.len() == before {
             match self.next().await? {
-                Some(Ok(Message::Text(text))) => self.take(text.as_bytes(), chunk),
-                Some(Ok(Message::Binary(bytes))) => self.take(&bytes, chunk),
+                Some(Ok(Message::Text(text))) => self.take(OneLine::new(text.into()), chunk),
+                Some(Ok(Message::Binary(bytes))) => self.take(OneLine::new(bytes), chunk),
                 // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
                 // it.
                 Some(Ok(control)) => {
