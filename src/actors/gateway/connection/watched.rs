@@ -76,6 +76,11 @@ impl<S> Watched<S> {
         self.turn = TURN;
     }
 
+    /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
+    pub(super) fn long(&self) -> Option<usize> {
+        (self.pending > TURN).then_some(self.pending)
+    }
+
     /// All of a message has been read; so many bytes of it have not been dealt with.
     pub(super) fn complete(&mut self, left: usize) {
         self.is_complete = true;

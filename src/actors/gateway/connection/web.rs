@@ -6,7 +6,6 @@
 //!
 //! **Invariant:** over WebSocket no status is sent before the client has asked for such.
 
-use std::cell::{Cell, RefCell};
 use std::future::poll_fn;
 use std::io;
 use std::pin::Pin;
@@ -14,25 +13,20 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use bytes::{Buf, Bytes, BytesMut};
-use futures_util::{SinkExt, StreamExt};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::{Instant, sleep_until};
-use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::error::{CapacityError, Error};
 use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, OpCode};
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
-use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
+use super::link::{FRAGMENT, Link};
 use super::reception::Reception;
 use super::shared::{Ending, HELD_MOST, Shared};
 use super::transport::{CHUNK, Inbound, Outbound, read_some};
 use super::unfinished::{First, Unfinished};
-use super::watched::{READ_BUFFER, Watched};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::Request;
-use crate::actors::resources::budget::Share;
-use crate::protocol::limits::MAX_FRAME;
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::protocol::wire::frame::FrameReader;
@@ -44,13 +38,6 @@ pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
 /// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong: that can
 /// be a long way behind in a full pipe.
 pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
-/// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
-/// seen to take it.
-const FRAGMENT: usize = 64 * 1024;
-/// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
-/// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
-const WRITE_BUFFER: usize = 2 * FRAGMENT;
-
 impl Reception {
     /// Does what a client has asked for over HTTP; `behind` came after its request.
     pub(super) async fn serve_web<S>(
@@ -98,62 +85,6 @@ impl Reception {
         };
         let reader = self.reader(id, FrameReader::of_messages(), behind.unfinished);
         self.talk(reader, input, output, BytesMut::new()).await;
-    }
-}
-
-/// Both halves share this; one thread, so plain cells do.
-struct Link<S> {
-    socket: RefCell<WebSocketStream<Watched<S>>>,
-    /// When the peer last sent or took a byte.
-    life: Rc<Cell<Instant>>,
-    /// The peer is to be asked for a sign of life.
-    ping_is_due: Cell<bool>,
-    /// Why the connection ends, for the peer to know.
-    farewell: Cell<(CloseCode, &'static str)>,
-}
-
-impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
-    /// Takes a stream on which the handshake has been made; `behind` came after it.
-    async fn open(stream: S, behind: &[u8], unfinished: Unfinished, unsent: Share) -> Rc<Self> {
-        let life = Rc::new(Cell::new(Instant::now()));
-        let watched = Watched::new(stream, Rc::clone(&life), unfinished, unsent);
-        let config = WebSocketConfig::default()
-            .read_buffer_size(READ_BUFFER)
-            .write_buffer_size(FRAGMENT)
-            .max_write_buffer_size(WRITE_BUFFER)
-            .max_message_size(Some(MAX_FRAME))
-            .max_frame_size(Some(MAX_FRAME));
-        let role = Role::Server;
-        let socket =
-            WebSocketStream::from_partially_read(watched, behind.to_vec(), role, Some(config));
-        Rc::new(Self {
-            socket: RefCell::new(socket.await),
-            life,
-            ping_is_due: Cell::new(false),
-            farewell: Cell::new((CloseCode::Away, "shutting down")),
-        })
-    }
-
-    /// The next message; `None` once the connection is closed.
-    async fn next(&self) -> Option<Result<Message, Error>> {
-        poll_fn(|cx| {
-            let mut socket = self.socket.borrow_mut();
-            socket.get_mut().begin_turn();
-            socket.poll_next_unpin(cx)
-        })
-        .await
-    }
-
-    /// Puts a message where [`Link::flush`] finds it; `None` if the peer is gone.
-    fn put(&self, message: Message) -> Option<()> {
-        self.socket.borrow_mut().start_send_unpin(message).ok()
-    }
-
-    /// Waits until all that was put there has been written; `None` if the peer is gone.
-    async fn flush(&self) -> Option<()> {
-        poll_fn(|cx| self.socket.borrow_mut().poll_flush_unpin(cx))
-            .await
-            .ok()
     }
 }
 
