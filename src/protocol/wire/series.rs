@@ -39,7 +39,7 @@ pub struct Series {
 /// The series that `bytes` begin with: its topic, and how long it is. `None` where they do not begin with a whole
 /// message of one.
 pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
-    // What is longer is none, and is not looked at to find that out.
+    // A longer line is no series: no more is looked at to find that out.
     let bytes = bytes.get(..MAX_SERIES).unwrap_or(bytes);
     let name = bytes.strip_prefix(HEAD)?;
     let end = name
