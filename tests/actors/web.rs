@@ -3,7 +3,9 @@
 //! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
 
 #![cfg(feature = "web")]
+use std::cell::Cell;
 use std::net::SocketAddr;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -103,6 +105,58 @@ fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
         drop(socket);
         sleep(Duration::from_secs(60)).await;
         assert_eq!(memory.held(), 0);
+    });
+}
+
+/// It has come up to its last byte, so that only what is done with a whole message is counted, not its coming.
+#[test]
+fn a_long_message_is_looked_at_in_turns() {
+    const LONG: usize = 4 << 20;
+    /// Bytes of a turn.
+    const TURN: usize = 64 * 1024;
+    in_virtual_time(async {
+        let mut nodes = Nodes::default();
+        let node = Node {
+            on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
+            ..Node::default()
+        };
+        node.attach(&mut nodes, &[Service::Pause], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let light = json!({"op": "call_service", "service": "/arm_sim/pause", "id": 1});
+        let call = light.to_string();
+        let lines = "\n".repeat(LONG - call.len());
+        let numbers = "1,\n".repeat(LONG / 3 - 3);
+        for message in [
+            format!("{lines}{call}"),
+            format!("{call}{lines}"),
+            format!("[{numbers}"),
+            // No frame: that would be read by another thread, however many turns others have meanwhile.
+            format!("{{\"d\":[{numbers}}}"),
+        ] {
+            let mut socket = open(&gateway, WIDE).await;
+            let mut bytes = Vec::new();
+            append(&mut bytes, LAST | opcode::TEXT, [0; 4], message.as_bytes());
+            let last = bytes.pop().unwrap();
+            socket.stream().write_all(&bytes).await.unwrap();
+            settle().await;
+            let turns = Rc::new(Cell::new(0));
+            let counted = Rc::clone(&turns);
+            let others = actix_rt::spawn(async move {
+                loop {
+                    counted.set(counted.get() + 1);
+                    tokio::task::yield_now().await;
+                }
+            });
+            socket.stream().write_all(&[last]).await.unwrap();
+            if !message.contains(&call) {
+                send(&mut socket, light.clone()).await;
+            }
+            let answer = receive_text(&mut socket).await;
+            others.abort();
+            assert!(answer.contains(r#""result":true"#), "{answer}");
+            let turns = turns.get();
+            assert!(turns >= message.len() / TURN, "{turns} turns");
+        }
     });
 }
 

@@ -577,6 +577,50 @@ fn a_message_holds_one_object() {
     }
 }
 
+/// A message is read as it comes: what stands behind its object, however late that comes, makes it none.
+#[test]
+fn what_is_behind_the_object_of_a_message_may_come_late() {
+    let mut reader = FrameReader::of_messages();
+    for (pieces, objects) in [
+        (["{\"a\":1}", " \t", "\r\n"], 1),
+        (["{\"a\":1}", " ", "{}\n"], 0),
+        (["{\"a\":1}", ",", "{}\n"], 0),
+        (["{\"a\":1", "} ", "x\n"], 0),
+    ] {
+        let mut found = Vec::new();
+        for piece in pieces {
+            assert_eq!(found, [], "{pieces:?}: before it has ended");
+            reader.push(piece.as_bytes());
+            found.extend(reader.by_ref());
+            let has_ended = piece.ends_with('\n') || !found.is_empty();
+            assert_eq!(reader.is_unfinished(), !piece.ends_with('\n'), "{piece:?}");
+            if has_ended {
+                break;
+            }
+        }
+        reader.push(b"\n");
+        assert_eq!(reader.next(), None);
+        assert!(!reader.is_unfinished());
+        let frames = found.iter().filter(|frame| frame.is_ok()).count();
+        assert_eq!((found.len(), frames), (1, objects), "{pieces:?}: {found:?}");
+    }
+}
+
+/// One error is all that comes of a message.
+#[test]
+fn nothing_is_done_of_a_message_whose_first_object_is_refused() {
+    let too_deep = nested(MAX_NESTING + 1);
+    let mut reader = FrameReader::of_messages();
+    for refused in ["]", "{]", &too_deep] {
+        reader.push(format!("{refused} {{\"a\":1}}\n{{}}\n").as_bytes());
+        let found: Vec<_> = reader.by_ref().collect();
+        assert!(
+            matches!(&found[..], [Err(_), Ok(frame)] if frame.text == "{}"),
+            "{found:?}"
+        );
+    }
+}
+
 /// Streams in which what matters to the reader is frequent.
 fn stream() -> impl Strategy<Value = Vec<u8>> {
     let bits = prop_oneof![
@@ -613,6 +657,23 @@ proptest! {
         cuts in proptest::collection::vec(any::<prop::sample::Index>(), 0..12),
     ) {
         prop_assert_eq!(read(cut(&stream, &cuts)), read([&stream[..]]));
+    }
+
+    #[test]
+    fn any_split_gives_the_same_frames_of_messages(
+        stream in stream(),
+        cuts in proptest::collection::vec(any::<prop::sample::Index>(), 0..12),
+    ) {
+        let messages = |pieces: Vec<&[u8]>| {
+            let mut reader = FrameReader::of_messages();
+            let mut found = Vec::new();
+            for piece in pieces {
+                reader.push(piece);
+                found.extend(reader.by_ref());
+            }
+            (found, reader.finish())
+        };
+        prop_assert_eq!(messages(cut(&stream, &cuts)), messages(vec![&stream]));
     }
 
     /// `N` and `I` occur only as random bytes in the streams, so that no text is changed.

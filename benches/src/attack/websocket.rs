@@ -1,7 +1,7 @@
 //! Aimed at what WebSocket adds: pings, fragments of messages, masks, closes.
 
 use super::Attack;
-use super::script::{Client, light, web_frame};
+use super::script::{Client, light, publish, web_frame};
 use pendularm_client::websocket::opcode::{CLOSE, CONTINUATION, PING, PONG, TEXT};
 
 const MIB: usize = 1024 * 1024;
@@ -42,6 +42,11 @@ pub const ATTACKS: &[Attack] = &[
         "unfinished-messages",
         "100 clients begin a message of 4 MiB and do not end it",
         unfinished,
+    ),
+    Attack::new(
+        "long-messages",
+        "20 clients send messages of 4 MiB, each over a million lines",
+        long_messages,
     ),
     Attack::new(
         "pings-in-pieces",
@@ -144,6 +149,17 @@ fn unfinished() -> Vec<Client> {
     Client::web()
         .says_bytes(&web_frame(TEXT, false, &vec![b' '; 4 * MIB - 1024]))
         .times(100)
+}
+
+fn long_messages() -> Vec<Client> {
+    let numbers = "1,\n".repeat((4 * MIB - 1024) / 3);
+    Client::web()
+        .advertises("/attack/long")
+        .repeats(&publish(
+            "/attack/long",
+            &format!(r#"{{"data":[{numbers}1]}}"#),
+        ))
+        .times(20)
 }
 
 fn masks() -> Vec<Client> {

@@ -94,13 +94,18 @@ thread_local! {
 
 /// Waits until it is this reader's turn.
 pub(super) async fn read() {
-    read_after(0).await;
+    read_bytes(0).await;
 }
 
 /// The same where the reader's last message went to so many subscribers, as its next may.
 pub(super) async fn read_after(deliveries: usize) {
+    read_bytes(deliveries * DELIVERY).await;
+}
+
+/// The same where what the reader reads next may be the end of so many bytes, all of which are looked at then.
+pub(super) async fn read_bytes(bytes: usize) {
     let (go, goes) = oneshot::channel();
-    READERS.with(|queue| queue.join(deliveries * DELIVERY, go));
+    READERS.with(|queue| queue.join(bytes, go));
     // Where the task has ended before its time, the runtime that it ran in is ending too.
     let _ = goes.await;
 }
@@ -185,7 +190,7 @@ impl<W: Waits> TurnQueueTask<W> {
             let is_late = || work_clock::now().saturating_duration_since(began) >= WRITING_TIME;
             while going < queue.at_a_time && bytes < WRITE_BYTES && (going == 0 || !is_late()) {
                 let Some((wanted, next)) = queue.waiting.borrow_mut().pop_front() else {
-                    return;
+                    break;
                 };
                 // One that has ended meanwhile takes no turn.
                 if next.go_on() {
@@ -193,6 +198,10 @@ impl<W: Waits> TurnQueueTask<W> {
                     bytes += wanted;
                 }
             }
+            if going == 0 {
+                return;
+            }
+            // One who was the last in the queue, and is in it again at once, goes on the next time around.
             tokio::task::yield_now().await;
         }
     }

@@ -5,7 +5,7 @@
 pub mod fragments;
 pub mod frame;
 pub mod json;
-mod nesting;
+pub(crate) mod nesting;
 pub mod opening;
 pub mod payload;
 pub mod series;

@@ -108,7 +108,7 @@ impl Nesting {
 }
 
 /// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
-fn plain_in_string(bytes: &[u8]) -> usize {
+pub(crate) fn plain_in_string(bytes: &[u8]) -> usize {
     /// Most strings are keys and names: they end before a block would pay.
     const SHORT: usize = 16;
     /// Bytes that the compiler compares with a few vector instructions.

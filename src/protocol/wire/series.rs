@@ -39,6 +39,8 @@ pub struct Series {
 /// The series that `bytes` begin with: its topic, and how long it is. `None` where they do not begin with a whole
 /// message of one.
 pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
+    // A longer line is no series: no more is looked at to find that out.
+    let bytes = bytes.get(..MAX_SERIES).unwrap_or(bytes);
     let name = bytes.strip_prefix(HEAD)?;
     let end = name
         .iter()
@@ -56,9 +58,6 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
     }
     let mut length = 0;
     while let Some(whole) = bytes.get(length..).and_then(|rest| message(rest, head)) {
-        if length + whole > MAX_SERIES {
-            break;
-        }
         length += whole;
     }
     (length > 0).then_some((topic, length))

@@ -13,6 +13,8 @@ mod admission;
 mod encoding;
 pub mod gate;
 mod guesses;
+#[cfg(feature = "web")]
+mod link;
 mod outgoing;
 mod perform;
 mod places;

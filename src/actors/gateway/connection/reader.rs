@@ -95,10 +95,6 @@ impl Reader {
             let full = chunk.len() >= CHUNK / 2;
             self.frames.push(&chunk);
             chunk.clear();
-            if chunk.capacity() > 4 * CHUNK {
-                // A long message is no reason to keep as much for the next.
-                chunk = BytesMut::new();
-            }
             let mut in_a_row = 0;
             while let Some(cut) = self.next(input, &mut chunk).await? {
                 in_a_row += 1;

@@ -31,14 +31,14 @@ pub(super) struct Watched<S> {
     /// The last write found no room: the next that does shows that there is somebody.
     is_blocked: bool,
     unfinished: Unfinished,
-    /// Bytes that belong to no complete message yet.
+    /// Bytes that belong to no complete message yet, or to one that has just been read.
     pending: usize,
     /// The longest message so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to
     /// it, or to the longest frame of it, and stays so.
     longest: usize,
     /// When the first of them came, later by the time that nothing was read.
     began: Option<Instant>,
-    /// They do now.
+    /// They belong to one that has just been read.
     is_complete: bool,
     /// Bytes that wait to be written, and their buffer, which may be twice as long.
     unsent: Share,
@@ -76,9 +76,15 @@ impl<S> Watched<S> {
         self.turn = TURN;
     }
 
-    /// A message is complete.
-    pub(super) const fn complete(&mut self) {
+    /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
+    pub(super) fn long(&self) -> Option<usize> {
+        (self.pending > TURN).then_some(self.pending)
+    }
+
+    /// All of a message has been read; so many bytes of it have not been dealt with.
+    pub(super) fn complete(&mut self, left: usize) {
         self.is_complete = true;
+        self.settle(left);
     }
 
     /// Reading goes on after so long a time: what was complete has been dealt with.

@@ -6,7 +6,6 @@
 //!
 //! **Invariant:** over WebSocket no status is sent before the client has asked for such.
 
-use std::cell::{Cell, RefCell};
 use std::future::poll_fn;
 use std::io;
 use std::pin::Pin;
@@ -14,42 +13,31 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use bytes::{Buf, Bytes, BytesMut};
-use futures_util::{SinkExt, StreamExt};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::time::{Instant, sleep_until};
-use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message;
 use tokio_tungstenite::tungstenite::error::{CapacityError, Error};
 use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, OpCode};
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
-use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
+use super::link::{FRAGMENT, Link};
 use super::reception::Reception;
 use super::shared::{Ending, HELD_MOST, Shared};
-use super::transport::{Inbound, Outbound, read_some};
+use super::transport::{CHUNK, Inbound, Outbound, read_some};
 use super::unfinished::{First, Unfinished};
-use super::watched::{READ_BUFFER, Watched};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::Request;
-use crate::actors::resources::budget::Share;
-use crate::protocol::limits::MAX_FRAME;
 use crate::protocol::messages::ErrorForm;
 use crate::protocol::op::{Op, Verbosity};
 use crate::protocol::wire::frame::FrameReader;
-use crate::web::{message, serve};
+use crate::web::message::OneLine;
+use crate::web::serve;
 
 /// How often a peer is asked for a sign of life: often enough for whatever between us forgets silent connections.
 pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
 /// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong: that can
 /// be a long way behind in a full pipe.
 pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
-/// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
-/// seen to take it.
-const FRAGMENT: usize = 64 * 1024;
-/// Most bytes that wait to be written: a write of ours with its heads, and pongs. Where a pong finds no room, one
-/// answers all the pings up to the last that has come, as RFC 6455 has it (section 5.5.3).
-const WRITE_BUFFER: usize = 2 * FRAGMENT;
-
 impl Reception {
     /// Does what a client has asked for over HTTP; `behind` came after its request.
     pub(super) async fn serve_web<S>(
@@ -100,62 +88,6 @@ impl Reception {
     }
 }
 
-/// Both halves share this; one thread, so plain cells do.
-struct Link<S> {
-    socket: RefCell<WebSocketStream<Watched<S>>>,
-    /// When the peer last sent or took a byte.
-    life: Rc<Cell<Instant>>,
-    /// The peer is to be asked for a sign of life.
-    ping_is_due: Cell<bool>,
-    /// Why the connection ends, for the peer to know.
-    farewell: Cell<(CloseCode, &'static str)>,
-}
-
-impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
-    /// Takes a stream on which the handshake has been made; `behind` came after it.
-    async fn open(stream: S, behind: &[u8], unfinished: Unfinished, unsent: Share) -> Rc<Self> {
-        let life = Rc::new(Cell::new(Instant::now()));
-        let watched = Watched::new(stream, Rc::clone(&life), unfinished, unsent);
-        let config = WebSocketConfig::default()
-            .read_buffer_size(READ_BUFFER)
-            .write_buffer_size(FRAGMENT)
-            .max_write_buffer_size(WRITE_BUFFER)
-            .max_message_size(Some(MAX_FRAME))
-            .max_frame_size(Some(MAX_FRAME));
-        let role = Role::Server;
-        let socket =
-            WebSocketStream::from_partially_read(watched, behind.to_vec(), role, Some(config));
-        Rc::new(Self {
-            socket: RefCell::new(socket.await),
-            life,
-            ping_is_due: Cell::new(false),
-            farewell: Cell::new((CloseCode::Away, "shutting down")),
-        })
-    }
-
-    /// The next message; `None` once the connection is closed.
-    async fn next(&self) -> Option<Result<Message, Error>> {
-        poll_fn(|cx| {
-            let mut socket = self.socket.borrow_mut();
-            socket.get_mut().begin_turn();
-            socket.poll_next_unpin(cx)
-        })
-        .await
-    }
-
-    /// Puts a message where [`Link::flush`] finds it; `None` if the peer is gone.
-    fn put(&self, message: Message) -> Option<()> {
-        self.socket.borrow_mut().start_send_unpin(message).ok()
-    }
-
-    /// Waits until all that was put there has been written; `None` if the peer is gone.
-    async fn flush(&self) -> Option<()> {
-        poll_fn(|cx| self.socket.borrow_mut().poll_flush_unpin(cx))
-            .await
-            .ok()
-    }
-}
-
 /// The receiving half.
 struct Input<S> {
     link: Rc<Link<S>>,
@@ -165,6 +97,8 @@ struct Input<S> {
     asked: Option<Instant>,
     /// When the last read ended.
     read_until: Instant,
+    /// The message that has come, while some of it has not been read.
+    line: Option<OneLine>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
@@ -176,6 +110,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
             next_ping: now + PING_INTERVAL,
             asked: None,
             read_until: now,
+            line: None,
         }
     }
 
@@ -194,10 +129,15 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
         }
     }
 
-    /// A message is complete.
-    fn take(&self, message: &[u8], chunk: &mut BytesMut) {
-        message::append_line(message, chunk);
-        self.link.socket.borrow_mut().get_mut().complete();
+    /// Takes what is still to be read of a message: a long one as it would come over TCP, a chunk at a time.
+    fn take(&mut self, mut line: OneLine, chunk: &mut BytesMut) {
+        let before = chunk.len();
+        if line.append(CHUNK, chunk) {
+            let read = chunk.len() - before;
+            self.link.socket.borrow_mut().get_mut().complete(read);
+        } else {
+            self.line = Some(line);
+        }
     }
 
     fn look_for_life(&mut self) -> io::Result<()> {
@@ -234,10 +174,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
         self.asked = self.asked.map(|asked| asked + unread);
         self.link.socket.borrow_mut().get_mut().read_on(unread);
         let before = chunk.len();
+        if let Some(line) = self.line.take() {
+            self.take(line, chunk);
+        }
         while chunk.len() == before {
             match self.next().await? {
-                Some(Ok(Message::Text(text))) => self.take(text.as_bytes(), chunk),
-                Some(Ok(Message::Binary(bytes))) => self.take(&bytes, chunk),
+                Some(Ok(Message::Text(text))) => self.take(OneLine::new(text.into()), chunk),
+                Some(Ok(Message::Binary(bytes))) => self.take(OneLine::new(bytes), chunk),
                 // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
                 // it.
                 Some(Ok(control)) => {

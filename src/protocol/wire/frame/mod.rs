@@ -33,6 +33,8 @@ enum Within {
     Object,
     /// In an object that has been reported already: on to where it would have ended.
     SkippedObject,
+    /// Behind the object of a message, which has not ended.
+    Behind,
     /// In a line that is no object; its beginning is being collected.
     Line,
     /// In a line that has been reported already: on to the newline.
@@ -56,6 +58,8 @@ pub struct FrameReader {
     limit: usize,
     /// Whether every line is a message, which holds one object.
     of_messages: bool,
+    /// The object of a message that has not ended.
+    held: Option<RawFrame>,
 }
 
 impl Default for FrameReader {
@@ -82,11 +86,12 @@ impl FrameReader {
             nesting: Nesting::new(),
             limit,
             of_messages: false,
+            held: None,
         }
     }
 
-    /// The same where every line is a message: behind its object only white space may stand. Lines have to be pushed
-    /// whole.
+    /// The same where every line is a message: behind its object only white space may stand, and nothing is done of
+    /// one that holds anything else.
     #[must_use]
     pub const fn of_messages() -> Self {
         let mut reader = Self::new();
@@ -138,8 +143,9 @@ impl FrameReader {
 
     /// How much memory the reader holds, in bytes.
     #[must_use]
-    pub const fn buffered(&self) -> usize {
-        self.buffer.capacity()
+    pub fn buffered(&self) -> usize {
+        let held = self.held.as_ref().map_or(0, |frame| frame.bytes.capacity());
+        self.buffer.capacity() + held
     }
 
     /// Whether a frame has begun and not ended, one that is being skipped included.
@@ -151,7 +157,7 @@ impl FrameReader {
     /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {
-            Within::Object => Some(FrameError::StreamEnded),
+            Within::Object | Within::Behind => Some(FrameError::StreamEnded),
             Within::Line => Some(self.not_an_object()),
             Within::Between | Within::SkippedObject | Within::SkippedLine => None,
         };
@@ -251,11 +257,16 @@ impl FrameReader {
         // A newline stays unscanned: it belongs to the white space after the frame and counts for no frame's length.
         let limit = self.limit;
         let too_long = self.at - self.start > limit;
+        let (on, behind) = if self.of_messages {
+            (Within::SkippedLine, Within::SkippedLine)
+        } else {
+            (Within::SkippedObject, Within::Between)
+        };
         let (state, error) = match event {
             None if !too_long => return None,
-            None => (Within::SkippedObject, FrameError::TooLong(limit)),
-            Some(Event::Balanced) if kept && !too_long => return Some(self.take_frame()),
-            Some(Event::Balanced) => (Within::Between, FrameError::TooLong(limit)),
+            None => (on, FrameError::TooLong(limit)),
+            Some(Event::Balanced) if kept && !too_long => return self.take_frame().map(Ok),
+            Some(Event::Balanced) => (behind, FrameError::TooLong(limit)),
             Some(Event::Newline { in_string: true }) => {
                 (Within::Between, FrameError::LineEndedInString)
             }
@@ -263,7 +274,7 @@ impl FrameReader {
             Some(Event::Mismatch { opener, found }) => {
                 (Within::SkippedLine, FrameError::Mismatch { opener, found })
             }
-            Some(Event::TooDeep) => (Within::SkippedObject, FrameError::TooDeep),
+            Some(Event::TooDeep) => (on, FrameError::TooDeep),
         };
         self.state = state;
         self.start = self.at;
@@ -274,19 +285,13 @@ impl FrameReader {
         }))
     }
 
-    /// The frame that has just balanced.
-    fn take_frame(&mut self) -> Result<RawFrame, FrameError> {
+    /// The frame that has just balanced; of a message only once that has ended.
+    fn take_frame(&mut self) -> Option<RawFrame> {
         let rest = self.rest();
         let behind = rest
             .iter()
             .find(|byte| !matches!(byte, b' ' | b'\t' | b'\r'));
         let newline = behind == Some(&b'\n');
-        let is_last = newline || behind.is_none();
-        if self.of_messages && !is_last {
-            self.start = self.at;
-            self.state = Within::SkippedLine;
-            return Err(FrameError::MoreBehind);
-        }
         let length = self.at - self.start;
         let bytes = if length > KEPT_BUFFER && length >= rest.len() {
             // The frame keeps the buffer; what is behind it is copied instead, which is less.
@@ -302,12 +307,37 @@ impl FrameReader {
             frame.unwrap_or_default().to_vec()
         };
         self.start = self.at;
-        self.state = Within::Between;
-        Ok(RawFrame {
+        let frame = RawFrame {
             bytes,
             has_literals: self.nesting.has_literals,
             newline,
-        })
+        };
+        if self.of_messages {
+            self.state = Within::Behind;
+            self.held = Some(frame);
+            return None;
+        }
+        self.state = Within::Between;
+        Some(frame)
+    }
+
+    /// Goes on behind the object of a message. `None` if that has not ended yet.
+    fn scan_behind(&mut self) -> Option<Result<RawFrame, FrameError>> {
+        let rest = self.rest();
+        let behind = rest
+            .iter()
+            .position(|byte| *byte == b'\n' || !is_space(*byte));
+        let newline = behind.and_then(|at| rest.get(at)) == Some(&b'\n');
+        self.at += behind.unwrap_or(rest.len());
+        self.start = self.at;
+        behind?;
+        let frame = self.held.take();
+        if newline {
+            self.state = Within::Between;
+            return frame.map(|frame| Ok(RawFrame { newline, ..frame }));
+        }
+        self.state = Within::SkippedLine;
+        Some(Err(FrameError::MoreBehind))
     }
 
     /// The next frame, still to be [decoded](RawFrame::decode). `None` means that more bytes are needed, not that the
@@ -320,6 +350,7 @@ impl FrameReader {
                     None
                 }
                 Within::Object | Within::SkippedObject => self.scan_object(),
+                Within::Behind => self.scan_behind(),
                 Within::Line | Within::SkippedLine => self.scan_line().map(Err),
             };
             if found.is_some() {
