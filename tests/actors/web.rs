@@ -444,6 +444,26 @@ fn a_client_that_takes_no_byte_while_responses_wait_is_disconnected() {
 }
 
 #[test]
+fn a_client_that_takes_a_little_at_a_time_is_borne_with() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut socket = open(&gateway, 1024).await;
+        let id = "x".repeat(60_000);
+        let unknown = json!({"op": "call_service", "service": "/nobody", "id": id});
+        send(&mut socket, unknown).await;
+        // For more than twice as long as one that takes nothing is borne with, within one write of ours.
+        let mut some = [0; 1024];
+        for _ in 0..50 {
+            sleep(Duration::from_secs(1)).await;
+            socket.stream().read_exact(&mut some).await.unwrap();
+        }
+        assert_eq!(gateway.gauges.connections(), 1);
+        sleep(STALL_LIMIT + Duration::from_secs(1)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+#[test]
 fn a_slow_client_loses_the_oldest_messages_and_no_response() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;

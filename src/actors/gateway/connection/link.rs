@@ -16,6 +16,7 @@ use tokio_tungstenite::tungstenite::error::Error;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
+use super::outgoing::Outgoing;
 use super::unfinished::Unfinished;
 use super::watched::{READ_BUFFER, Watched};
 use crate::actors::gateway::turns;
@@ -45,11 +46,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     pub(super) async fn open(
         stream: S,
         behind: &[u8],
+        outgoing: Rc<Outgoing>,
         unfinished: Unfinished,
         unsent: Share,
     ) -> Rc<Self> {
         let life = Rc::new(Cell::new(Instant::now()));
-        let watched = Watched::new(stream, Rc::clone(&life), unfinished, unsent);
+        let watched = Watched::new(stream, Rc::clone(&life), outgoing, unfinished, unsent);
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
             .write_buffer_size(FRAGMENT)

@@ -47,6 +47,8 @@ pub(super) struct Outgoing {
     singly: Cell<bool>,
     /// Since when responses have been waiting without a break.
     responses_since: Cell<Option<Instant>>,
+    /// When the client last took a byte of a write that goes on.
+    taken: Cell<Instant>,
     /// There is something for whoever waits for [`Outgoing::news`], and who that is.
     has_news: Cell<bool>,
     listener: RefCell<Waker>,
@@ -76,6 +78,7 @@ impl Outgoing {
             in_queue: Cell::new(false),
             singly: Cell::new(false),
             responses_since: Cell::new(None),
+            taken: Cell::new(Instant::now()),
             has_news: Cell::new(false),
             listener: RefCell::new(Waker::noop().clone()),
             since: Instant::now(),
@@ -199,9 +202,15 @@ impl Outgoing {
         self.outbox.borrow().topic_bytes()
     }
 
+    /// The client has taken some of what is being written.
+    pub(super) fn note_taken(&self) {
+        self.taken.set(Instant::now());
+    }
+
     /// Until when a client that has taken nothing since `last_byte` is borne with: while responses wait, or while it
     /// is finishing.
     pub(super) fn patience(&self, last_byte: Instant, is_finishing: bool) -> Option<Instant> {
+        let last_byte = last_byte.max(self.taken.get());
         match self.responses_since.get() {
             Some(since) => Some(since.max(last_byte) + STALL_LIMIT),
             None => is_finishing.then(|| last_byte + LINGER),

@@ -13,6 +13,7 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
+use super::outgoing::Outgoing;
 use super::unfinished::Unfinished;
 use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::budget::Share;
@@ -28,6 +29,8 @@ const TURN: usize = 32 * 1024;
 pub(super) struct Watched<S> {
     stream: S,
     life: Rc<Cell<Instant>>,
+    /// Hears of every byte that the other side takes.
+    outgoing: Rc<Outgoing>,
     /// The last write found no room: the next that does shows that there is somebody.
     is_blocked: bool,
     unfinished: Unfinished,
@@ -54,12 +57,14 @@ impl<S> Watched<S> {
     pub(super) fn new(
         stream: S,
         life: Rc<Cell<Instant>>,
+        outgoing: Rc<Outgoing>,
         unfinished: Unfinished,
         unsent: Share,
     ) -> Self {
         Self {
             stream,
             life,
+            outgoing,
             is_blocked: false,
             unfinished,
             pending: 0,
@@ -160,6 +165,9 @@ impl<S: AsyncWrite + Unpin> AsyncWrite for Watched<S> {
             Poll::Ready(Ok(taken)) => *taken,
             _ => 0,
         };
+        if taken > 0 {
+            self.outgoing.note_taken();
+        }
         let unsent = 2 * (bytes.len() - taken);
         if unsent != self.unsent.bytes() {
             self.unsent.resize(unsent);

@@ -76,7 +76,8 @@ impl Reception {
         let _ = self.shared.registry.send(quiet).await;
         let unfinished = Unfinished::new(&self.shared.account);
         let unsent = self.shared.account.take(0);
-        let link = Link::open(stream, &behind.bytes, unfinished, unsent).await;
+        let outgoing = Rc::clone(&self.shared.outgoing);
+        let link = Link::open(stream, &behind.bytes, outgoing, unfinished, unsent).await;
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,

@@ -117,7 +117,12 @@ async fn stalled(shared: &Shared) {
             None => changed.await,
             Some(limit) => tokio::select! {
                 biased;
-                () = sleep_until(limit) => return,
+                () = sleep_until(limit) => {
+                    // It may have taken some of what is being written.
+                    if patience() == Some(limit) {
+                        return;
+                    }
+                }
                 () = changed => {}
             },
         }
