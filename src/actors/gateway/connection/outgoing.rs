@@ -202,7 +202,8 @@ impl Outgoing {
         self.outbox.borrow().topic_bytes()
     }
 
-    /// The client has taken some of what is being written.
+    /// The client has taken some of what is being written. Over TCP a write is over then.
+    #[cfg(feature = "web")]
     pub(super) fn note_taken(&self) {
         self.taken.set(Instant::now());
     }
