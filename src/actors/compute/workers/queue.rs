@@ -3,7 +3,7 @@
 //! **Invariant:** a computation is advanced, refused and dropped outside the lock.
 
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::computation::{Computation, Progress, SLICE};
 use super::turns::{Ticket, Turns};
@@ -28,6 +28,8 @@ pub(super) struct Queue {
     pub(super) turns: Turns<Job>,
     /// Computations that can't begin yet.
     waiting: Vec<(Ticket, Job)>,
+    /// When they last tried.
+    tried: Option<Instant>,
     pub(super) closed: Option<&'static str>,
 }
 
@@ -40,6 +42,7 @@ impl Queue {
 
     /// Has those that could not begin try again.
     pub(super) fn retry(&mut self) {
+        self.tried = Some(Instant::now());
         for (place, job) in self.waiting.drain(..) {
             self.turns.wait(place, job);
         }
@@ -79,6 +82,11 @@ impl PoolState {
     fn take(&self) -> Option<(Ticket, Job)> {
         let mut queue = self.lock();
         loop {
+            // Others may be computing for minutes.
+            let is_time = |tried: Instant| tried.elapsed() >= TRY_AGAIN;
+            if !queue.waiting.is_empty() && queue.tried.is_none_or(is_time) {
+                queue.retry();
+            }
             if let Some(job) = queue.turns.next() {
                 return Some(job);
             }
@@ -91,11 +99,7 @@ impl PoolState {
                 continue;
             }
             let waited = self.changed.wait_timeout(queue, TRY_AGAIN);
-            let end;
-            (queue, end) = waited.unwrap_or_else(PoisonError::into_inner);
-            if end.timed_out() {
-                queue.retry();
-            }
+            (queue, _) = waited.unwrap_or_else(PoisonError::into_inner);
         }
     }
 

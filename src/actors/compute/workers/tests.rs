@@ -73,6 +73,54 @@ fn computations_take_turns() {
     }
 }
 
+/// Finds no room a few times.
+struct Hesitating {
+    tries: usize,
+    began: mpsc::Sender<()>,
+}
+
+impl Computation for Hesitating {
+    fn advance(&mut self, _deadline: Instant) -> Progress {
+        if self.tries > 0 {
+            self.tries -= 1;
+            return Progress::Waiting;
+        }
+        let _ = self.began.send(());
+        Progress::Finished
+    }
+
+    fn refuse(&mut self, _why: &'static str) {}
+}
+
+/// Goes on until it is told that others are done.
+struct Endless(mpsc::Receiver<()>);
+
+impl Computation for Endless {
+    fn advance(&mut self, _deadline: Instant) -> Progress {
+        match self.0.try_recv() {
+            Err(mpsc::TryRecvError::Empty) => Progress::Unfinished,
+            _ => Progress::Finished,
+        }
+    }
+
+    fn refuse(&mut self, _why: &'static str) {}
+}
+
+#[test]
+fn what_waits_for_room_tries_again_while_others_compute_without_end() {
+    let pool = WorkerPool::start(1).unwrap();
+    let (done, endless) = mpsc::channel();
+    let (began, seen) = mpsc::channel();
+    pool.submit(ConnectionId(1), Box::new(Endless(endless)));
+    pool.submit(ConnectionId(2), Box::new(Hesitating { tries: 3, began }));
+    seen.recv_timeout(Duration::from_secs(60))
+        .expect("room is looked for again");
+    drop(done);
+    while !pool.is_idle() {
+        thread::yield_now();
+    }
+}
+
 /// Has turns of five milliseconds, in which it computes or waits for another thread that does.
 struct TimedTurn {
     waits: bool,
