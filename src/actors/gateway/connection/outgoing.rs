@@ -352,9 +352,11 @@ impl Outgoing {
 impl Drop for Outgoing {
     fn drop(&mut self) {
         let outbox = std::mem::take(self.outbox.get_mut());
-        if outbox.response_cost() + outbox.topic_bytes() > FEW_BYTES {
-            let freed = self.account.freeing();
-            self.account.queue(0, 0, 0);
+        let is_long = outbox.response_cost() + outbox.topic_bytes() > FEW_BYTES;
+        let freed = is_long.then(|| self.account.freeing());
+        // A share may outlive the connection, and keep its account: nothing waits for it any more.
+        self.account.queue(0, 0, 0);
+        if is_long {
             free_elsewhere((outbox, freed));
         }
     }
