@@ -4,22 +4,27 @@
 //! anybody else have a turn.
 
 use std::any::Any;
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
+use std::task::Poll;
 use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use actix::prelude::*;
+use glam::DVec2;
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSettings, ArmSim, Disturb, Enable, EndGoal, MAX_STEPS, Pause, Reset,
-    STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, SimulationTime, Step, Stepped,
-    StepsEnd, TURN_MESSAGES, TakeSnapshot,
+    ArmPose, ArmSettings, ArmSim, CommandGoal, Disturb, Enable, EndGoal, GoalJudged, MAX_STEPS,
+    Pause, Reset, STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, SimulationTime,
+    Step, Stepped, StepsEnd, TURN_MESSAGES, TakeSnapshot, TrackGoal,
 };
 use pendularm::actors::node::{
     Ask, Asker, Call, Done, Interest, Publish, Reply, ShutDown, Unserved,
 };
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::math::arm::Arm;
+use pendularm::math::goal::Criteria;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
@@ -365,6 +370,81 @@ fn the_tick_comes_while_clients_step_without_end() {
             advance(Duration::from_millis(1)).await;
         }
         bench.assert_ticks(1000, "steps without end");
+    });
+}
+
+/// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
+struct Owner {
+    turns: Rc<Cell<u64>>,
+    heard: Rc<RefCell<Vec<(f64, u64)>>>,
+}
+
+impl Actor for Owner {
+    type Context = Context<Self>;
+}
+
+impl Handler<GoalJudged<3>> for Owner {
+    type Result = ();
+
+    fn handle(&mut self, judged: GoalJudged<3>, _: &mut Context<Self>) {
+        let heard = (judged.elapsed, self.turns.get());
+        self.heard.borrow_mut().push(heard);
+    }
+}
+
+/// A step of a second is told by itself: ten thousand of them are not told at once, and each is.
+#[test]
+fn progress_of_a_goal_is_told_a_few_at_a_time_however_many_step_the_arm() {
+    in_virtual_time(async {
+        let bench = Bench::paused().await;
+        let (turns, heard) = (Rc::new(Cell::new(0)), Rc::default());
+        let others = Rc::clone(&turns);
+        // Somebody else who always has something to do.
+        actix_rt::spawn(std::future::poll_fn(move |cx| {
+            others.set(others.get() + 1);
+            cx.waker().wake_by_ref();
+            Poll::<()>::Pending
+        }));
+        let owner = Owner {
+            turns,
+            heard: Rc::clone(&heard),
+        };
+        let long = SetIntegrator {
+            timestep: Some(1.0),
+            ..SetIntegrator::default()
+        };
+        let weightless = SetParams {
+            gravity: Some(0.0),
+            ..SetParams::default()
+        };
+        bench.ask(0, long);
+        bench.ask(0, weightless);
+        let rest = [0.0; 3];
+        let goal = TrackGoal {
+            number: 1,
+            target: DVec2::new(0.0, 1.0),
+            criteria: Criteria::default(),
+            solution: rest,
+            owner: owner.start().recipient(),
+        };
+        bench.arm.send(goal).await.unwrap();
+        let (number, positions) = (1, rest);
+        let command = CommandGoal { number, positions };
+        bench.arm.send(command).await.unwrap();
+        for client in 1..=5 {
+            bench.step(client, 1000);
+        }
+        while bench.answered() < 7 {
+            advance(Duration::from_millis(1)).await;
+        }
+        // The last are on their way.
+        advance(Duration::from_millis(1)).await;
+        let heard = heard.borrow();
+        assert_eq!(heard.len(), 5000);
+        assert!(heard.is_sorted());
+        let most = heard.chunk_by(|(_, one), (_, other)| one == other);
+        let most = most.map(<[_]>::len).max().unwrap();
+        assert!((1..=16).contains(&most), "{most} in a turn");
     });
 }
 

@@ -341,6 +341,7 @@ impl Handler<ArmPose<2>> for SilentArm {
         Pose {
             lengths: [1.0, 1.0],
             positions: [0.0, 0.0],
+            resets: 0,
             simulated: 0.0,
         }
     }

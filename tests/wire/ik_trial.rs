@@ -95,3 +95,36 @@ fn envelopes_and_rejections_are_as_documented() {
     assert_eq!(client.ask("/ik_trial/stop", json!({})), json!({}));
     client.refusal("/ik_trial/stop", json!({}));
 }
+
+fn status_where(client: &mut Client, wanted: impl Fn(&Value) -> bool) -> Value {
+    loop {
+        let status = client.message(STATUS);
+        if wanted(&status) {
+            return status;
+        }
+    }
+}
+
+/// A step by hand may be longer than any clock can tell; a reset makes all good again.
+#[test]
+fn a_trial_after_steps_of_ages_and_a_reset_lasts_as_long_as_ever() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    for timestep in [1e17, 1e308] {
+        client.ask("/arm_sim/pause", json!({"data": true}));
+        client.ask("/arm_sim/set_params", json!({"gravity": 0}));
+        client.ask("/arm_sim/set_integrator", json!({"timestep": timestep}));
+        client.ask("/arm_sim/step", json!({"steps": 3}));
+        client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
+        client.ask("/arm_sim/reset", json!({}));
+        client.subscribe(STATUS);
+        client.ask(START, json!({"duration": 0.5}));
+        client.ask("/arm_sim/step", json!({"steps": 400}));
+        let status = status_where(&mut client, |status| status["elapsed"] != 0.0);
+        assert_eq!(status["running"], true, "{timestep}: {status}");
+        client.ask("/arm_sim/step", json!({"steps": 200}));
+        let status = status_where(&mut client, |status| status["running"] == false);
+        assert_eq!(status["elapsed"], 0.5, "{timestep}: {status}");
+        client.send(&json!({"op": "unsubscribe", "topic": STATUS}));
+    }
+}

@@ -13,6 +13,12 @@ pub const ATTACKS: &[Attack] = &[
     .moves(),
     Attack::new("step-16", "16 clients do so with two links", step_16).moves(),
     Attack::new(
+        "long-steps",
+        "150 clients take steps of a second by hand, while a goal is pursued whose feedback 20 hear",
+        long_steps,
+    )
+    .moves(),
+    Attack::new(
         "timestep",
         "the arm steps a microsecond at a time, with three links",
         timestep,
@@ -104,6 +110,17 @@ fn step_4() -> Vec<Client> {
 
 fn step_16() -> Vec<Client> {
     steps().times(16)
+}
+
+fn long_steps() -> Vec<Client> {
+    let weightless = call("/arm_sim/set_params", "1", r#"{"gravity":0}"#);
+    let long = call("/arm_sim/set_integrator", "2", r#"{"timestep":1}"#);
+    let goal = r#"{"x":0.5,"y":0.5,"epsilon":1e-6}"#;
+    let goal = call("/ik_action/send_goal", "3", goal);
+    let hear = Client::tcp().says(&subscribe("/ik_action/feedback", ""));
+    let begin = Client::tcp().says(&weightless).says(&long).says(&goal);
+    let step = steps().after(300).times(150);
+    [begin.times(1), hear.times(20), step].concat()
 }
 
 fn timestep() -> Vec<Client> {

@@ -80,7 +80,7 @@ struct Move {
 fn moves(count: usize, seed: u64) -> Vec<Move> {
     let mut rng = fastrand::Rng::with_seed(seed);
     let one = |case: usize| {
-        let far = case % 2 == 0;
+        let far = case.is_multiple_of(2);
         let scale = if far { TAU } else { 1.5 };
         Move {
             swings: case % 4 / 2 == 1,

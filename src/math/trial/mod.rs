@@ -178,11 +178,11 @@ impl Trial {
             return Vec::new();
         };
         clock.tell(now);
-        if clock.elapsed() + rounding(now) >= self.settings.duration {
-            self.end()
-        } else {
-            Vec::new()
+        if clock.elapsed() + rounding(now) < self.settings.duration {
+            return Vec::new();
         }
+        // It is over, or the clock has run to where it tells nothing.
+        self.end()
     }
 
     /// Starts a trial at simulation time `now` \[s\], in place of one that may be running.

@@ -36,6 +36,7 @@ impl StandIn {
         Pose {
             lengths: self.script.borrow().lengths,
             positions: [0.0, 0.0],
+            resets: 0,
             simulated: self.born.elapsed().as_secs_f64(),
         }
     }
@@ -136,6 +137,7 @@ fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
             pose: Pose {
                 lengths: [1.0, 1.0],
                 positions: [0.0, 0.0],
+                resets: 0,
                 simulated: 0.101,
             },
             outcome: Some(Outcome::Reached),
@@ -168,6 +170,7 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
             pose: Pose {
                 lengths: [1.0, 1.0],
                 positions: [0.0, 0.0],
+                resets: 0,
                 simulated: born.elapsed().as_secs_f64(),
             },
             outcome: Some(Outcome::Reached),

@@ -66,8 +66,8 @@ struct ActivePath<const N: usize> {
     client: ActionClient,
     /// Simulation time of its start \[s\], since the reset before it.
     began: f64,
-    /// Simulation time up to that reset \[s\].
-    before_reset: f64,
+    /// Resets of the arm before it.
+    resets: u64,
     /// The setpoint as this node knows it.
     setpoint: Setpoint<N>,
     feedback: Cadence,
@@ -165,7 +165,7 @@ impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
 impl<const N: usize> ActivePath<N> {
     /// Whether the arm has been reset since the goal began.
     fn is_before_reset(&self, motion: &JointMotion<N>) -> bool {
-        motion.before_reset.to_bits() != self.before_reset.to_bits()
+        motion.resets != self.resets
     }
 
     fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
@@ -198,7 +198,7 @@ impl<const N: usize> PathFollower<N> {
             },
             client: goal.client,
             began: motion.time,
-            before_reset: motion.before_reset,
+            resets: motion.resets,
             setpoint: motion.setpoint,
             feedback: Cadence::default(),
         });

@@ -45,8 +45,8 @@ pub struct IkTrial<const N: usize> {
     rng: fastrand::Rng,
     /// Lengths as last heard \[m\].
     lengths: [f64; N],
-    /// Simulation time as last heard \[s\].
-    simulated: f64,
+    /// Resets of the arm, and simulation time through all of them \[s\], as last heard.
+    clock: (u64, f64),
     status_wanted: bool,
     /// A timer for `/ik_trial/status`, while somebody watches.
     status_timer: Option<SpawnHandle>,
@@ -72,7 +72,7 @@ impl<const N: usize> IkTrial<N> {
             trial: Trial::default(),
             rng,
             lengths: [1.0; N],
-            simulated: 0.0,
+            clock: (0, 0.0),
             status_wanted: false,
             status_timer: None,
             status_asked: false,
@@ -161,7 +161,7 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
         let target = || sample(&self.lengths, || self.rng.f64());
         let (decided, pending) = match known.intent {
             Intent::Start(changes, reply) => {
-                let decided = self.trial.start(self.simulated, changes, target);
+                let decided = self.trial.start(self.clock.1, changes, target);
                 if decided.is_ok() {
                     self.cancel_deadline(ctx);
                 }
@@ -255,8 +255,11 @@ impl<const N: usize> IkTrial<N> {
     /// Takes note of lengths and time. Two questions may be answered in either order: the later time counts.
     fn hear(&mut self, pose: &Pose<N>) -> Vec<Action> {
         self.lengths = pose.lengths;
-        self.simulated = self.simulated.max(pose.simulated);
-        self.trial.tick(self.simulated)
+        let heard = (pose.resets, pose.simulated);
+        if heard > self.clock {
+            self.clock = heard;
+        }
+        self.trial.tick(self.clock.1)
     }
 
     /// Does what the trial wants done, then answers the call that led to it.

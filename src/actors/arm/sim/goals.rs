@@ -18,6 +18,10 @@ use crate::math::kinematics::nearest_turn;
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 
+/// How often the owner of a goal is told of progress before it has heard what was told: each step by hand may be longer
+/// than a sixtieth of a second, and each is told to as many as subscribe.
+const PROGRESS_IN_A_ROW: u32 = 8;
+
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Handler<ArmPose<N>> for ArmSim<N> {
@@ -25,7 +29,7 @@ impl<const N: usize> Handler<ArmPose<N>> for ArmSim<N> {
 
     fn handle(&mut self, _: ArmPose<N>, ctx: &mut Context<Self>) -> Pose<N> {
         self.attend(ctx);
-        pose(&self.simulation, self.goals.before_reset)
+        pose(&self.simulation, self.goals.past)
     }
 }
 
@@ -81,27 +85,48 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// Takes up to `steps` steps; fewer where a goal is reached on the way, or the simulation diverges.
+    /// Takes up to `steps` steps; fewer where a goal is reached on the way, much is to be told of it, or the simulation
+    /// diverges. The latest progress is left in `unsent`.
     pub(super) fn advance(&mut self, steps: u64) -> u64 {
-        let before_reset = self.goals.before_reset;
+        let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {
             return self.simulation.advance(steps);
         };
-        let mut reached = None;
+        let (mut unsent, mut reached) = (None, None);
+        let mut due = 0;
         let taken = self.simulation.advance_with(steps, |simulation| {
-            reached = tracked.judge(simulation, before_reset);
-            match reached {
-                Some(_) => ControlFlow::Break(()),
-                None => ControlFlow::Continue(()),
+            let progress;
+            (progress, reached) = tracked.judge(simulation, past);
+            if let Some(progress) = progress {
+                due += 1;
+                if let Some(before) = unsent.replace(progress) {
+                    tracked.owner.do_send(before);
+                }
+            }
+            if reached.is_some() || due == PROGRESS_IN_A_ROW {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
             }
         });
+        self.goals.unsent = unsent.map(|progress| (tracked.owner.clone(), progress));
         if let Some(reached) = reached {
+            self.send_progress();
+            let Some(tracked) = self.goals.tracked.take() else {
+                return taken;
+            };
             tracked.owner.do_send(reached);
-            self.goals.tracked = None;
             self.goals.latest = Some(reached);
         }
         taken
+    }
+
+    /// Tells the owner of the goal how it goes, if that is due.
+    pub(super) fn send_progress(&mut self) {
+        if let Some((owner, progress)) = self.goals.unsent.take() {
+            owner.do_send(progress);
+        }
     }
 
     /// To be called before the simulation is reset: the goal is preempted. Gives the news and who is to hear it.
@@ -109,7 +134,7 @@ impl<const N: usize> ArmSim<N> {
         &mut self,
     ) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
         let ended = self.goals.preempt(&self.simulation);
-        self.goals.before_reset += self.simulation.time();
+        self.goals.past.end(self.simulation.time());
         let (tracked, judged) = ended?;
         Some((tracked.owner, judged))
     }

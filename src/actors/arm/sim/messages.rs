@@ -67,7 +67,10 @@ pub struct Pose<const N: usize> {
     pub lengths: [f64; N],
     /// Joint positions \[rad\].
     pub positions: [f64; N],
-    /// Simulation time that has passed since the arm was started, through all resets \[s\]; never runs backwards.
+    /// Resets of the arm so far.
+    pub resets: u64,
+    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It runs backwards only with
+    /// a reset, where it had become longer than a clock can tell.
     pub simulated: f64,
 }
 

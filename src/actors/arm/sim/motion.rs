@@ -23,8 +23,8 @@ pub struct JointMotion<const N: usize> {
     pub setpoint: Setpoint<N>,
     /// Simulation time since the last reset \[s\].
     pub time: f64,
-    /// Simulation time up to the last reset \[s\]: another one says that there was a reset.
-    pub before_reset: f64,
+    /// Resets of the arm so far.
+    pub resets: u64,
 }
 
 /// The setpoint is moved on, if it is still the one that is known. The answer is whether it was. From
@@ -47,7 +47,7 @@ impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
             state: *self.simulation.state(),
             setpoint: *self.simulation.pid().setpoint(),
             time: self.simulation.time(),
-            before_reset: self.goals.before_reset,
+            resets: self.goals.past.resets,
         }
     }
 }

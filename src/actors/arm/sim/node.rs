@@ -69,6 +69,10 @@ pub struct ArmSim<const N: usize> {
     /// Steps that were asked for and are yet to be taken, one request per client at most. While there are any, the next
     /// turn is on its way.
     pub(super) steps: VecDeque<Steps>,
+    /// They are being taken.
+    pub(super) is_stepping: bool,
+    /// The owner of the goal is to hear how it goes before more of them are.
+    pub(super) is_owner_behind: bool,
     /// Who hears of everything that the steps depend on, if anybody does.
     pub(super) journal: Option<Journal<N>>,
 }
@@ -96,6 +100,8 @@ impl<const N: usize> ArmSim<N> {
             limit: LimitWatch::default(),
             turn: Turn::new(),
             steps: VecDeque::new(),
+            is_stepping: false,
+            is_owner_behind: false,
             journal: None,
         }
     }
@@ -220,6 +226,7 @@ impl<const N: usize> ArmSim<N> {
         let mut taken = 0;
         while taken < due && spent() < WAKE_UP_BUDGET {
             taken += self.advance(STEPS_BETWEEN_LOOKS.min(due - taken));
+            self.send_progress();
             if self.simulation.divergence().is_some() {
                 break;
             }

@@ -71,26 +71,38 @@ impl<const N: usize> Handler<Call<Step>> for ArmSim<N> {
         let Some(asked) = ask.steps.filter(|_| rejected.is_empty()) else {
             return reply.conclude(Err(rejected));
         };
-        let nobody_steps = self.steps.is_empty();
-        self.take_row(Steps {
+        let steps = Steps {
             asked,
             taken: 0,
             reply,
-        });
-        if nobody_steps {
+        };
+        if self.is_owner_behind {
+            return self.steps.push_back(steps);
+        }
+        self.take_row(steps);
+        if !self.is_stepping {
             self.go_on_stepping(ctx);
         }
     }
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Lets everybody else have a turn, and then those whose steps are not all taken, one after the other.
+    /// Lets everybody else have a turn, and the owner of the goal hear how it goes; then those whose steps are not all
+    /// taken, one after the other.
     fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
-        if self.steps.is_empty() {
+        let unsent = self.goals.unsent.take();
+        self.is_owner_behind = unsent.is_some();
+        self.is_stepping = self.is_owner_behind || !self.steps.is_empty();
+        if !self.is_stepping {
             return;
         }
-        let others = tokio::task::yield_now().into_actor(self);
-        ctx.spawn(others.map(|(), arm, ctx| {
+        let others = async move {
+            match unsent {
+                Some((owner, progress)) => drop(owner.send(progress).await),
+                None => tokio::task::yield_now().await,
+            }
+        };
+        ctx.spawn(others.into_actor(self).map(|(), arm, ctx| {
             if let Some(next) = arm.steps.pop_front() {
                 arm.take_row(next);
             }
@@ -108,8 +120,11 @@ impl<const N: usize> ArmSim<N> {
         }
         let has_diverged = self.simulation.divergence().is_some();
         let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
-        // A goal that is reached on the way ends an advance, not the steps.
-        while steps.taken < row_end && self.simulation.divergence().is_none() {
+        // A goal that is reached on the way ends an advance, not the steps; much that is to be told of it ends the row.
+        while steps.taken < row_end
+            && self.goals.unsent.is_none()
+            && self.simulation.divergence().is_none()
+        {
             steps.taken += self.advance(row_end - steps.taken);
         }
         if self.simulation.divergence().is_some() {

@@ -16,8 +16,32 @@ pub(crate) struct Goals<const N: usize> {
     pub(crate) tracked: Option<Tracked<N>>,
     /// How the latest goal ended, for a question that crossed the news on its way.
     pub(crate) latest: Option<GoalJudged<N>>,
-    /// Simulation time up to the last reset \[s\].
-    pub(crate) before_reset: f64,
+    /// Everything before the last reset.
+    pub(crate) past: Past,
+    /// Progress that is still to be told, and who is to hear it; what was due before has been sent.
+    pub(crate) unsent: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
+}
+
+/// Everything before the last reset.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Past {
+    /// Resets so far.
+    pub(crate) resets: u64,
+    /// Simulation time up to the last \[s\].
+    time: f64,
+}
+
+impl Past {
+    /// A longer past is forgotten \[s\]: in thirty years and more no clock tells parts of a second. Long steps by hand
+    /// come to that soon, and to infinity.
+    const LONGEST: f64 = 1e9;
+
+    /// A reset comes, so long after the one before \[s\].
+    pub(crate) fn end(&mut self, time: f64) {
+        let time = self.time + time;
+        self.time = if time < Self::LONGEST { time } else { 0.0 };
+        self.resets += 1;
+    }
 }
 
 /// A goal that has not ended.
@@ -43,7 +67,7 @@ impl<const N: usize> Goals<N> {
         simulation: &Simulation<N>,
     ) -> Option<(Tracked<N>, GoalJudged<N>)> {
         let tracked = self.tracked.take()?;
-        let mut judged = tracked.stands(simulation, self.before_reset);
+        let mut judged = tracked.stands(simulation, self.past);
         judged.outcome = Some(Outcome::Preempted);
         self.latest = Some(judged);
         Some((tracked, judged))
@@ -51,34 +75,32 @@ impl<const N: usize> Goals<N> {
 }
 
 impl<const N: usize> Tracked<N> {
-    /// Judges the step that was just made; tells the owner of progress when that is due. The news, once reached.
+    /// Judges the step that was just made: progress that is to be told, and the news that it is reached.
     pub(crate) fn judge(
         &mut self,
         simulation: &Simulation<N>,
-        before_reset: f64,
-    ) -> Option<GoalJudged<N>> {
+        past: Past,
+    ) -> (Option<GoalJudged<N>>, Option<GoalJudged<N>>) {
         let time = simulation.time();
         let reached = self.goal.judge(time, end_effector(simulation));
         let due = self.feedback.due(time);
         if !reached && !due {
-            return None;
+            return (None, None);
         }
-        let judged = self.stands(simulation, before_reset);
-        if due {
-            self.owner.do_send(judged);
-        }
-        reached.then_some(GoalJudged {
+        let progress = self.stands(simulation, past);
+        let end = GoalJudged {
             outcome: Some(Outcome::Reached),
-            ..judged
-        })
+            ..progress
+        };
+        (due.then_some(progress), reached.then_some(end))
     }
 
-    pub(crate) fn stands(&self, simulation: &Simulation<N>, before_reset: f64) -> GoalJudged<N> {
+    pub(crate) fn stands(&self, simulation: &Simulation<N>, past: Past) -> GoalJudged<N> {
         GoalJudged {
             number: self.number,
             distance: self.goal.distance(end_effector(simulation)),
             elapsed: self.goal.elapsed(simulation.time()),
-            pose: pose(simulation, before_reset),
+            pose: pose(simulation, past),
             outcome: None,
         }
     }
@@ -90,10 +112,11 @@ fn end_effector<const N: usize>(simulation: &Simulation<N>) -> DVec2 {
 }
 
 /// The arm at this instant.
-pub(crate) fn pose<const N: usize>(simulation: &Simulation<N>, before_reset: f64) -> Pose<N> {
+pub(crate) fn pose<const N: usize>(simulation: &Simulation<N>, past: Past) -> Pose<N> {
     Pose {
         lengths: *simulation.arm().lengths(),
         positions: simulation.state().position,
-        simulated: before_reset + simulation.time(),
+        resets: past.resets,
+        simulated: past.time + simulation.time(),
     }
 }
