@@ -71,8 +71,6 @@ pub struct ArmSim<const N: usize> {
     pub(super) steps: VecDeque<Steps>,
     /// They are being taken.
     pub(super) is_stepping: bool,
-    /// The owner of the goal is to hear how it goes before more of them are.
-    pub(super) is_owner_behind: bool,
     /// Who hears of everything that the steps depend on, if anybody does.
     pub(super) journal: Option<Journal<N>>,
 }
@@ -101,7 +99,6 @@ impl<const N: usize> ArmSim<N> {
             turn: Turn::new(),
             steps: VecDeque::new(),
             is_stepping: false,
-            is_owner_behind: false,
             journal: None,
         }
     }

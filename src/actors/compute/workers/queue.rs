@@ -10,8 +10,10 @@ use super::turns::{Ticket, Turns};
 use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
 
-/// How often those that can't begin try again while nothing else is computed.
+/// How often those that can't begin try again.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
+/// How many of them do at a time: each looks at what every client holds.
+const FEW: usize = 32;
 
 /// The queue, and the news that it has changed.
 #[derive(Default)]
@@ -42,8 +44,14 @@ impl Queue {
 
     /// Has those that could not begin try again.
     pub(super) fn retry(&mut self) {
+        self.retry_first(self.waiting.len());
+    }
+
+    /// The same for so many of them, those first that have waited longest since they tried.
+    fn retry_first(&mut self, most: usize) {
         self.tried = Some(Instant::now());
-        for (place, job) in self.waiting.drain(..) {
+        let few = self.waiting.len().min(most);
+        for (place, job) in self.waiting.drain(..few) {
             self.turns.wait(place, job);
         }
     }
@@ -85,7 +93,10 @@ impl PoolState {
             // Others may be computing for minutes.
             let is_time = |tried: Instant| tried.elapsed() >= TRY_AGAIN;
             if !queue.waiting.is_empty() && queue.tried.is_none_or(is_time) {
-                queue.retry();
+                queue.retry_first(FEW);
+                if queue.turns.waiting() > 1 {
+                    self.changed.notify_all();
+                }
             }
             if let Some(job) = queue.turns.next() {
                 return Some(job);

@@ -76,7 +76,7 @@ impl<const N: usize> Handler<Call<Step>> for ArmSim<N> {
             taken: 0,
             reply,
         };
-        if self.is_owner_behind {
+        if self.is_stepping && self.goals.is_judged() {
             return self.steps.push_back(steps);
         }
         self.take_row(steps);
@@ -90,15 +90,14 @@ impl<const N: usize> ArmSim<N> {
     /// Lets everybody else have a turn, and the owner of the goal hear how it goes; then those whose steps are not all
     /// taken, one after the other.
     fn go_on_stepping(&mut self, ctx: &mut Context<Self>) {
-        let unsent = self.goals.unsent.take();
-        self.is_owner_behind = unsent.is_some();
-        self.is_stepping = self.is_owner_behind || !self.steps.is_empty();
+        let underway = self.goals.underway.take();
+        self.is_stepping = underway.is_some() || !self.steps.is_empty();
         if !self.is_stepping {
             return;
         }
         let others = async move {
-            match unsent {
-                Some((owner, progress)) => drop(owner.send(progress).await),
+            match underway {
+                Some(progress) => drop(progress.await),
                 None => tokio::task::yield_now().await,
             }
         };
@@ -127,6 +126,9 @@ impl<const N: usize> ArmSim<N> {
         {
             steps.taken += self.advance(row_end - steps.taken);
         }
+        // Before the answer to the steps, and before whatever comes after it.
+        let unsent = self.goals.unsent.take();
+        self.goals.underway = unsent.map(|(owner, progress)| Box::pin(owner.send(progress)));
         if self.simulation.divergence().is_some() {
             if !has_diverged {
                 self.note_divergence();

@@ -2,6 +2,8 @@
 //!
 //! **Invariant:** every goal ends once, and whoever asks about the latest end hears the same.
 
+use std::pin::Pin;
+
 use actix::prelude::*;
 use glam::DVec2;
 
@@ -20,6 +22,8 @@ pub(crate) struct Goals<const N: usize> {
     pub(crate) past: Past,
     /// Progress that is still to be told, and who is to hear it; what was due before has been sent.
     pub(crate) unsent: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
+    /// Progress on its way, whose arrival is to be waited for.
+    pub(crate) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }
 
 /// Everything before the last reset.
@@ -59,6 +63,11 @@ impl<const N: usize> Goals<N> {
         self.tracked
             .as_ref()
             .is_some_and(|goal| goal.number == number)
+    }
+
+    /// Whether each step is judged.
+    pub(crate) fn is_judged(&self) -> bool {
+        self.tracked.as_ref().is_some_and(|goal| goal.commanded)
     }
 
     /// Ends the goal, if there is one, where the arm is now.
