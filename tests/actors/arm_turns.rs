@@ -394,7 +394,7 @@ impl Handler<GoalJudged<3>> for Owner {
 
 /// A step of a second is told by itself: ten thousand of them are not told at once, and each is.
 #[test]
-fn progress_of_a_goal_is_told_a_few_at_a_time_however_many_step_the_arm() {
+fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
     in_virtual_time(async {
         let bench = Bench::paused().await;
         let (turns, heard) = (Rc::new(Cell::new(0)), Rc::default());
@@ -444,7 +444,7 @@ fn progress_of_a_goal_is_told_a_few_at_a_time_however_many_step_the_arm() {
         assert!(heard.is_sorted());
         let most = heard.chunk_by(|(_, one), (_, other)| one == other);
         let most = most.map(<[_]>::len).max().unwrap();
-        assert!((1..=16).contains(&most), "{most} in a turn");
+        assert_eq!(most, 1, "in a turn");
     });
 }
 

@@ -18,10 +18,6 @@ use crate::math::kinematics::nearest_turn;
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 
-/// How often the owner of a goal is told of progress before it has heard what was told: each step by hand may be longer
-/// than a sixtieth of a second, and each is told to as many as subscribe.
-const PROGRESS_IN_A_ROW: u32 = 8;
-
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Handler<ArmPose<N>> for ArmSim<N> {
@@ -85,26 +81,22 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> ArmSim<N> {
-    /// Takes up to `steps` steps; fewer where a goal is reached on the way, much is to be told of it, or the simulation
-    /// diverges. The latest progress is left in `unsent`.
-    pub(super) fn advance(&mut self, steps: u64) -> u64 {
+    /// Takes up to `steps` steps; fewer where a goal is reached on the way, or the simulation diverges. Whoever
+    /// `waits` has them end at progress too, which is left in `unsent`: a step by hand may be longer than a sixtieth of
+    /// a second, and each is told to as many as subscribe.
+    pub(super) fn advance(&mut self, steps: u64, waits: bool) -> u64 {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {
             return self.simulation.advance(steps);
         };
         let (mut unsent, mut reached) = (None, None);
-        let mut due = 0;
         let taken = self.simulation.advance_with(steps, |simulation| {
-            let progress;
-            (progress, reached) = tracked.judge(simulation, past);
-            if let Some(progress) = progress {
-                due += 1;
-                if let Some(before) = unsent.replace(progress) {
-                    tracked.owner.do_send(before);
-                }
+            (unsent, reached) = tracked.judge(simulation, past);
+            if !waits && let Some(progress) = unsent.take() {
+                tracked.owner.do_send(progress);
             }
-            if reached.is_some() || due == PROGRESS_IN_A_ROW {
+            if unsent.is_some() || reached.is_some() {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
@@ -112,7 +104,9 @@ impl<const N: usize> ArmSim<N> {
         });
         self.goals.unsent = unsent.map(|progress| (tracked.owner.clone(), progress));
         if let Some(reached) = reached {
-            self.send_progress();
+            if let Some((owner, progress)) = self.goals.unsent.take() {
+                owner.do_send(progress);
+            }
             let Some(tracked) = self.goals.tracked.take() else {
                 return taken;
             };
@@ -120,13 +114,6 @@ impl<const N: usize> ArmSim<N> {
             self.goals.latest = Some(reached);
         }
         taken
-    }
-
-    /// Tells the owner of the goal how it goes, if that is due.
-    pub(super) fn send_progress(&mut self) {
-        if let Some((owner, progress)) = self.goals.unsent.take() {
-            owner.do_send(progress);
-        }
     }
 
     /// To be called before the simulation is reset: the goal is preempted. Gives the news and who is to hear it.

@@ -222,8 +222,7 @@ impl<const N: usize> ArmSim<N> {
         let spent = || work_clock::now().saturating_duration_since(started);
         let mut taken = 0;
         while taken < due && spent() < WAKE_UP_BUDGET {
-            taken += self.advance(STEPS_BETWEEN_LOOKS.min(due - taken));
-            self.send_progress();
+            taken += self.advance(STEPS_BETWEEN_LOOKS.min(due - taken), false);
             if self.simulation.divergence().is_some() {
                 break;
             }
