@@ -121,26 +121,22 @@ fn deaf_tiny() -> Vec<Client> {
 }
 
 fn deaf_topics() -> Vec<Client> {
-    let msg = format!(r#"{{"data":"{}"}}"#, filler(MIB));
-    each(0..200, |k| {
-        let topic = format!("/attack/deaf/{k}");
-        Client::tcp()
-            .says(&subscribe(&topic, ""))
-            .advertises(&topic)
-            .repeats(&publish(&topic, &msg))
-            .deaf()
-    })
+    deaf_publishers(MIB, Client::repeats)
 }
 
 fn deaf_halfway() -> Vec<Client> {
-    let msg = format!(r#"{{"data":"{}"}}"#, filler(LONG));
+    deaf_publishers(LONG, Client::says)
+}
+
+/// Clients who read nothing of what they publish to themselves in this way.
+fn deaf_publishers(bytes: usize, publishes: fn(Client, &str) -> Client) -> Vec<Client> {
+    let msg = format!(r#"{{"data":"{}"}}"#, filler(bytes));
     each(0..200, |k| {
-        let topic = format!("/attack/halfway/{k}");
-        Client::tcp()
+        let topic = format!("/attack/deaf/{k}");
+        let client = Client::tcp()
             .says(&subscribe(&topic, ""))
-            .advertises(&topic)
-            .says(&publish(&topic, &msg))
-            .deaf()
+            .advertises(&topic);
+        publishes(client, &publish(&topic, &msg)).deaf()
     })
 }
 

@@ -82,7 +82,7 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     /// Takes up to `steps` steps; fewer where a goal is reached on the way, or the simulation diverges. Whoever
-    /// `waits` has them end at progress too, which is left in `unsent`: a step by hand may be longer than a sixtieth of
+    /// `waits` has them end at progress too, which is `underway` then: a step by hand may be longer than a sixtieth of
     /// a second, and each is told to as many as subscribe.
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> u64 {
         let past = self.goals.past;
@@ -90,27 +90,26 @@ impl<const N: usize> ArmSim<N> {
         let Some(tracked) = tracked.filter(|goal| goal.commanded) else {
             return self.simulation.advance(steps);
         };
-        let (mut unsent, mut reached) = (None, None);
+        let (mut progress, mut reached) = (None, None);
         let taken = self.simulation.advance_with(steps, |simulation| {
-            (unsent, reached) = tracked.judge(simulation, past);
-            if !waits && let Some(progress) = unsent.take() {
+            (progress, reached) = tracked.judge(simulation, past);
+            if (!waits || reached.is_some())
+                && let Some(progress) = progress.take()
+            {
                 tracked.owner.do_send(progress);
             }
-            if unsent.is_some() || reached.is_some() {
+            if progress.is_some() || reached.is_some() {
                 ControlFlow::Break(())
             } else {
                 ControlFlow::Continue(())
             }
         });
-        self.goals.unsent = unsent.map(|progress| (tracked.owner.clone(), progress));
+        if let Some(progress) = progress {
+            self.goals.underway = Some(Box::pin(tracked.owner.clone().send(progress)));
+        }
         if let Some(reached) = reached {
-            if let Some((owner, progress)) = self.goals.unsent.take() {
-                owner.do_send(progress);
-            }
-            let Some(tracked) = self.goals.tracked.take() else {
-                return taken;
-            };
             tracked.owner.do_send(reached);
+            self.goals.tracked = None;
             self.goals.latest = Some(reached);
         }
         taken

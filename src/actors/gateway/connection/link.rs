@@ -16,11 +16,10 @@ use tokio_tungstenite::tungstenite::error::Error;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::outgoing::Outgoing;
+use super::shared::Shared;
 use super::unfinished::Unfinished;
 use super::watched::{READ_BUFFER, Watched};
 use crate::actors::gateway::turns;
-use crate::actors::resources::budget::Share;
 use crate::protocol::limits::MAX_FRAME;
 
 /// Bytes of payload in one WebSocket frame and in one write; a longer message goes in fragments, so that a client is
@@ -43,15 +42,15 @@ pub(super) struct Link<S> {
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     /// Takes a stream on which the handshake has been made; `behind` came after it.
-    pub(super) async fn open(
-        stream: S,
-        behind: &[u8],
-        outgoing: Rc<Outgoing>,
-        unfinished: Unfinished,
-        unsent: Share,
-    ) -> Rc<Self> {
+    pub(super) async fn open(stream: S, behind: &[u8], shared: &Shared) -> Rc<Self> {
         let life = Rc::new(Cell::new(Instant::now()));
-        let watched = Watched::new(stream, Rc::clone(&life), outgoing, unfinished, unsent);
+        let watched = Watched::new(
+            stream,
+            Rc::clone(&life),
+            Rc::clone(&shared.outgoing),
+            Unfinished::new(&shared.account),
+            shared.account.take(0),
+        );
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
             .write_buffer_size(FRAGMENT)

@@ -24,7 +24,7 @@ use super::link::{FRAGMENT, Link};
 use super::reception::Reception;
 use super::shared::{Ending, HELD_MOST, Shared};
 use super::transport::{CHUNK, Inbound, Outbound, read_some};
-use super::unfinished::{First, Unfinished};
+use super::unfinished::First;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::Request;
 use crate::protocol::messages::ErrorForm;
@@ -74,10 +74,7 @@ impl Reception {
             },
         };
         let _ = self.shared.registry.send(quiet).await;
-        let unfinished = Unfinished::new(&self.shared.account);
-        let unsent = self.shared.account.take(0);
-        let outgoing = Rc::clone(&self.shared.outgoing);
-        let link = Link::open(stream, &behind.bytes, outgoing, unfinished, unsent).await;
+        let link = Link::open(stream, &behind.bytes, &self.shared).await;
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,

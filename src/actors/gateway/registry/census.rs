@@ -97,9 +97,12 @@ impl Tally {
 
     /// A client that uses a topic already has named its type; true if that stays with the topic.
     pub(super) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
-        self.taken = None;
         let users = self.topics.get_mut(topic);
-        users.is_some_and(|users| users.note(type_name))
+        let is_noted = users.is_some_and(|users| users.note(type_name));
+        if is_noted {
+            self.taken = None;
+        }
+        is_noted
     }
 
     /// A client has ceased to use a topic in this way.

@@ -121,14 +121,11 @@ impl<const N: usize> ArmSim<N> {
         let row_end = steps.asked.min(steps.taken + STEPS_IN_A_ROW);
         // A goal that is reached on the way ends an advance, not the steps; what is to be told of it ends the row.
         while steps.taken < row_end
-            && self.goals.unsent.is_none()
+            && self.goals.underway.is_none()
             && self.simulation.divergence().is_none()
         {
             steps.taken += self.advance(row_end - steps.taken, true);
         }
-        // Before the answer to the steps, and before whatever comes after it.
-        let unsent = self.goals.unsent.take();
-        self.goals.underway = unsent.map(|(owner, progress)| Box::pin(owner.send(progress)));
         if self.simulation.divergence().is_some() {
             if !has_diverged {
                 self.note_divergence();

@@ -20,8 +20,6 @@ pub(crate) struct Goals<const N: usize> {
     pub(crate) latest: Option<GoalJudged<N>>,
     /// Everything before the last reset.
     pub(crate) past: Past,
-    /// Progress that is still to be told, and who is to hear it.
-    pub(crate) unsent: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
     /// Progress on its way, whose arrival is to be waited for.
     pub(crate) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }
