@@ -9,7 +9,10 @@ use std::process::Command;
 
 use crate::papers::{table, text};
 use crate::tree::rust_files;
+use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic, types};
 use pendularm::protocol::op;
 
@@ -234,6 +237,42 @@ fn the_papers_list_every_service_of_the_player_with_its_fields_in_order() {
         let values = names(service.response_fields());
         assert_eq!(codes(&row[2]), values, "{one:?}");
     }
+}
+
+/// The column of an arm of `N` links in the table of what it begins with.
+fn defaults<const N: usize>() -> Vec<String>
+where
+    Gains<N>: Default,
+{
+    let gains = Gains::<N>::default();
+    let simulation = Simulation::new(Arm::<N>::default(), gains);
+    let arm = simulation.arm();
+    let list = |values: &[f64]| {
+        values
+            .iter()
+            .map(f64::to_string)
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
+    let [masses, lengths] = [arm.masses(), arm.lengths()].map(|values| {
+        assert!(values.iter().all(|value| *value == values[0]));
+        values[0]
+    });
+    vec![
+        list(&[arm.gravity(), masses, lengths]),
+        format!("`{}`, {}", simulation.method(), simulation.timestep()),
+        list(&gains.kp),
+        list(&gains.ki),
+        list(&gains.kd),
+    ]
+}
+
+#[test]
+fn the_papers_list_what_the_arm_begins_with() {
+    let rows = table(&text("docs/protocol.md"), "default");
+    let column = |k: usize| rows.iter().map(|row| row[k].clone()).collect::<Vec<_>>();
+    assert_eq!(column(1), defaults::<2>());
+    assert_eq!(column(2), defaults::<3>());
 }
 
 #[test]
