@@ -15,6 +15,7 @@
 //!
 //! **Invariant:** pure: no clock, no I/O, no JSON, no threads; every computation is bounded when it is made.
 
+mod beside;
 pub mod continuous;
 pub mod control_loop;
 mod critical;
@@ -33,4 +34,3 @@ pub mod rollout;
 mod slow_modes;
 pub mod stability;
 mod symmetric;
-mod track;

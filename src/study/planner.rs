@@ -6,10 +6,10 @@
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //!
 //! The truth is followed with ever smaller steps, that of an arm left to itself within ever smaller tolerances, until
-//! two of them agree to a part of the allowed error. Then each method is run as the live arm runs it, with ever smaller
-//! steps until it stays within the rest at all samples, and a little larger again by bisection. The cheapest run, in
-//! evaluations of the dynamics, is the plan: it has been run, and its error is that which was seen. A run that could
-//! only be dearer than another is not made.
+//! two of them agree to a part of the allowed error. Then each method is run beside it as the live arm runs it, with
+//! ever smaller steps until it is within the rest after each of them, and a little larger again by bisection. The
+//! cheapest run, in evaluations of the dynamics, is the plan: it has been run, and its error is that which was seen. A
+//! run that could only be dearer than another is not made.
 //!
 //! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
 //! every pose, since the error of one move says nothing about the next.
@@ -18,33 +18,28 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec2;
-
+use super::beside::{Beside, FreeMotion, Truth};
 use super::continuous::ContinuousLoop;
 use super::control_loop::ControlLoop;
 use super::follower::ROUNDING;
 use super::limits::LimitSearch;
-use super::track::{Followed, FreeMotion, apart};
 use crate::math::arm::State;
 use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::math::shown::Shown;
 use crate::math::simulation::Simulation;
 
-/// Longest time between two looks at the end effector \[s\]; also the longest timestep that is planned.
-const SPACING: f64 = 0.05;
+/// Longest timestep that is planned \[s\].
+const LONGEST: f64 = 0.05;
 
-/// Fewest samples of a plan.
-const FEWEST_SAMPLES: f64 = 16.0;
+/// Fewest steps of a run.
+const FEWEST_STEPS: f64 = 16.0;
 
 /// Longest duration that is planned \[s\].
 pub const MAX_DURATION: f64 = 1000.0;
 
 /// Most steps of the truth, and of one run.
 const MAX_STEPS: u64 = 4_000_000;
-
-/// Most samples of a plan, a few more than [`MAX_DURATION`] has.
-const MAX_SAMPLES: usize = 20_001;
 
 /// The part of the allowed error that the truth itself may be off by.
 const PART_OF_TRUTH: f64 = 0.05;
@@ -74,7 +69,7 @@ pub struct Candidate {
     pub timestep: f64,
     /// Evaluations of the dynamics that it made.
     pub evaluations: u64,
-    /// How far the end effector was off at most \[m\], with what it may have risen by between two samples.
+    /// How far the end effector was off at most, after any of its steps \[m\].
     pub error: f64,
 }
 
@@ -122,10 +117,12 @@ pub enum PlanError {
 #[derive(Debug, Clone)]
 pub struct Planning<const N: usize> {
     task: Task<N>,
-    samples: u64,
-    spacing: f64,
-    /// End effector at the samples, as the finest of the truths has it.
-    truth: Vec<DVec2>,
+    /// The longest timestep \[s\], a whole part of the duration; others are whole parts of it.
+    longest: f64,
+    /// Steps of that length.
+    fewest: u64,
+    /// Of the truth.
+    fineness: Fineness,
     uncertainty: f64,
     /// Methods that have not been tried, the next one last.
     methods: Vec<Method>,
@@ -136,22 +133,31 @@ pub struct Planning<const N: usize> {
 /// How finely a truth is followed.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
-    /// With so many steps between two samples.
+    /// With so many steps in the longest.
     Steps(u64),
     /// Within a tolerance.
     Tolerance(f64),
 }
 
+impl Fineness {
+    fn finer(self) -> Self {
+        match self {
+            Self::Steps(steps) => Self::Steps(2 * steps),
+            Self::Tolerance(tolerance) => Self::Tolerance(FINER * tolerance),
+        }
+    }
+}
+
 #[derive(Debug, Clone)]
 enum PlanStage<const N: usize> {
-    Truth(Box<Followed<ContinuousLoop<N>>>),
-    FreeTruth(Box<FreeMotion<N>>),
+    Comparing(Box<Beside<Truth<N>, N>>),
     Limiting(Method, Box<LimitSearch<N>>),
-    Running(Bracket, Box<Followed<Simulation<N>>>),
+    /// With so many steps in the longest.
+    Running(Bracket, u64, Box<Beside<Simulation<N>, N>>),
     Done(Result<Planned, PlanError>),
 }
 
-/// Steps per sample: too few, and enough once they are known.
+/// Steps in the longest: too few, and enough once they are known.
 #[derive(Debug, Clone, Copy)]
 struct Bracket {
     method: Method,
@@ -160,12 +166,11 @@ struct Bracket {
 }
 
 impl<const N: usize> Planning<N> {
-    /// The most memory that a plan takes, in bytes: two tracks, each of which may have grown to twice its length, and
-    /// their differences.
+    /// The most memory that a plan takes, in bytes.
     pub const MOST_BYTES: usize = size_of::<Self>()
-        + size_of::<FreeMotion<N>>()
-        + LimitSearch::<N>::MOST_BYTES
-        + 5 * MAX_SAMPLES * size_of::<DVec2>();
+        + size_of::<Beside<Truth<N>, N>>()
+        + size_of::<Beside<Simulation<N>, N>>()
+        + LimitSearch::<N>::MOST_BYTES;
 
     /// A plan about to be made.
     ///
@@ -176,13 +181,19 @@ impl<const N: usize> Planning<N> {
         if duration.is_nan() || duration > MAX_DURATION {
             return Err(PlanError::TooLong { duration });
         }
-        let samples = whole(duration / SPACING).max(whole(FEWEST_SAMPLES));
-        let spacing = duration / in_f64(samples);
+        let fewest = whole(duration / LONGEST).max(whole(FEWEST_STEPS));
+        let fineness = if task.control.is_free() {
+            // So much of half a turn moves the end effector of the stretched arm by the part of the error.
+            let reach = task.control.arm.reach();
+            Fineness::Tolerance(PART_OF_TRUTH * task.error / (PI * reach))
+        } else {
+            Fineness::Steps(4)
+        };
         let mut planning = Self {
             task,
-            samples,
-            spacing,
-            truth: Vec::new(),
+            longest: duration / in_f64(fewest),
+            fewest,
+            fineness,
             uncertainty: f64::INFINITY,
             methods: Method::ALL.to_vec(),
             candidates: Vec::new(),
@@ -190,13 +201,7 @@ impl<const N: usize> Planning<N> {
                 uncertainty: f64::INFINITY,
             })),
         };
-        planning.follow(if task.control.is_free() {
-            // So much of half a turn moves the end effector of the stretched arm by the part of the error.
-            let reach = task.control.arm.reach();
-            Fineness::Tolerance(PART_OF_TRUTH * task.error / (PI * reach))
-        } else {
-            Fineness::Steps(4)
-        });
+        planning.compare_truths();
         Ok(planning)
     }
 
@@ -204,18 +209,9 @@ impl<const N: usize> Planning<N> {
     pub fn advance(&mut self) -> Option<Result<Planned, PlanError>> {
         match &mut self.stage {
             PlanStage::Done(answer) => return Some(answer.clone()),
-            PlanStage::Truth(run) => {
-                if let Some(finite) = run.advance(self.samples) {
-                    let track = std::mem::take(&mut run.track);
-                    let fineness = Fineness::Steps(run.per_sample);
-                    self.compare(finite.then_some(track), fineness);
-                }
-            }
-            PlanStage::FreeTruth(motion) => {
-                if let Some(followed) = motion.advance(self.samples) {
-                    let track = std::mem::take(&mut motion.track);
-                    let fineness = Fineness::Tolerance(motion.tolerance);
-                    self.compare(followed.then_some(track), fineness);
+            PlanStage::Comparing(truths) => {
+                if let Some(apart) = truths.advance() {
+                    self.judge_truths(apart);
                 }
             }
             PlanStage::Limiting(method, search) => {
@@ -225,61 +221,64 @@ impl<const N: usize> Planning<N> {
                     self.begin(method, most);
                 }
             }
-            PlanStage::Running(bracket, run) => {
-                if let Some(finite) = run.advance(self.samples) {
-                    let (bracket, per_sample) = (*bracket, run.per_sample);
-                    let error = if finite {
-                        apart(&run.track, &self.truth)
-                    } else {
-                        f64::INFINITY
-                    };
-                    self.narrow(bracket, per_sample, error);
+            PlanStage::Running(bracket, steps, run) => {
+                if let Some(error) = run.advance() {
+                    let (bracket, steps) = (*bracket, *steps);
+                    self.narrow(bracket, steps, error);
                 }
             }
         }
         None
     }
 
-    fn follow(&mut self, fineness: Fineness) {
+    /// The truth so finely followed, and its steps in one of a run that takes so many `steps` in the longest.
+    fn truth(&self, fineness: Fineness, steps: u64) -> (Truth<N>, u64) {
         let Task { control, start, .. } = self.task;
-        self.stage = match fineness {
-            Fineness::Steps(per_sample) => {
-                let timestep = self.spacing / in_f64(per_sample);
-                let truth = ContinuousLoop {
+        match fineness {
+            Fineness::Steps(finest) => {
+                let each = finest.div_ceil(steps);
+                let timestep = self.longest / in_f64(steps * each);
+                let law = ContinuousLoop {
                     control: control.with_method(Method::Rk4).with_timestep(timestep),
                     state: start,
                     integral: [0.0; N],
                 };
-                PlanStage::Truth(Box::new(Followed::new(truth, per_sample)))
+                (Truth::Law(law), each)
             }
             Fineness::Tolerance(tolerance) => {
-                let motion = FreeMotion::new(control.arm, start, self.spacing, tolerance);
-                PlanStage::FreeTruth(Box::new(motion))
+                let timestep = self.longest / in_f64(steps);
+                let motion = FreeMotion::new(control.arm, start, timestep, tolerance);
+                (Truth::Free(motion), 1)
             }
-        };
+        }
     }
 
-    /// Compares a truth, if it could be followed, with the one before, which was followed less finely.
-    fn compare(&mut self, track: Option<Vec<DVec2>>, fineness: Fineness) {
-        let followed = track.is_some();
-        if let Some(track) = track {
-            if self.truth.len() == track.len() {
-                self.uncertainty = apart(&track, &self.truth);
-            }
-            self.truth = track;
-        }
-        let finer = match fineness {
-            Fineness::Steps(steps) => {
-                (2 * steps * self.samples <= MAX_STEPS).then_some(Fineness::Steps(2 * steps))
-            }
-            Fineness::Tolerance(tolerance) => {
-                (followed && tolerance > ROUNDING).then_some(Fineness::Tolerance(FINER * tolerance))
-            }
+    /// Begins to compare the truth with the one that is followed more finely.
+    fn compare_truths(&mut self) {
+        let steps = match self.fineness {
+            Fineness::Steps(steps) => steps,
+            Fineness::Tolerance(_) => 1,
         };
-        if self.uncertainty <= PART_OF_TRUTH * self.task.error {
+        let (coarse, _) = self.truth(self.fineness, steps);
+        let (fine, each) = self.truth(self.fineness.finer(), steps);
+        let truths = Beside::new(coarse, steps * self.fewest, fine, each, f64::INFINITY);
+        self.stage = PlanStage::Comparing(Box::new(truths));
+    }
+
+    /// Goes on with the finer of two truths that came so far apart \[m\], if that is near enough or can't be nearer.
+    fn judge_truths(&mut self, apart: f64) {
+        if apart.is_finite() {
+            self.uncertainty = apart;
+        }
+        self.fineness = self.fineness.finer();
+        let can_be_finer = match self.fineness {
+            Fineness::Steps(steps) => 2 * steps * self.fewest <= MAX_STEPS,
+            Fineness::Tolerance(tolerance) => apart.is_finite() && tolerance > ROUNDING,
+        };
+        if apart <= PART_OF_TRUTH * self.task.error {
             self.next_method();
-        } else if let Some(finer) = finer {
-            self.follow(finer);
+        } else if can_be_finer {
+            self.compare_truths();
         } else {
             let uncertainty = self.uncertainty;
             self.stage = PlanStage::Done(Err(PlanError::Unknown { uncertainty }));
@@ -311,52 +310,58 @@ impl<const N: usize> Planning<N> {
 
     /// Begins with the longest timestep, `most` \[s\] at most.
     fn begin(&mut self, method: Method, most: f64) {
-        let fewest = whole(self.spacing / most).max(1);
+        let steps = whole(self.longest / most).max(1);
         let bracket = Bracket {
             method,
-            too_few: fewest - 1,
+            too_few: steps - 1,
             enough: None,
         };
-        self.run(bracket, fewest);
+        self.run(bracket, steps);
     }
 
-    /// Runs a method with so many steps between two samples, unless there is a cheaper candidate already.
-    fn run(&mut self, bracket: Bracket, per_sample: u64) {
-        let steps = per_sample.saturating_mul(self.samples);
+    /// Runs a method with so many steps in the longest, unless there is a cheaper candidate already.
+    fn run(&mut self, bracket: Bracket, steps: u64) {
         let Bracket { method, .. } = bracket;
-        let cost = steps.saturating_mul(u64::from(method.evaluations()));
-        if steps > MAX_STEPS || self.candidates.iter().any(|one| one.evaluations <= cost) {
+        let all = steps.saturating_mul(self.fewest);
+        let cost = all.saturating_mul(u64::from(method.evaluations()));
+        if all > MAX_STEPS || self.candidates.iter().any(|one| one.evaluations <= cost) {
             return self.next_method();
         }
-        let control = self.task.control.with_method(method);
-        let timestep = self.spacing / in_f64(per_sample);
-        let live = control.with_timestep(timestep).simulation(self.task.start);
-        self.stage = PlanStage::Running(bracket, Box::new(Followed::new(live, per_sample)));
+        let timestep = self.longest / in_f64(steps);
+        let control = self
+            .task
+            .control
+            .with_method(method)
+            .with_timestep(timestep);
+        let live = control.simulation(self.task.start);
+        let (truth, each) = self.truth(self.fineness, steps);
+        let allowed = self.task.error - self.uncertainty;
+        let run = Beside::new(live, all, truth, each, allowed);
+        self.stage = PlanStage::Running(bracket, steps, Box::new(run));
     }
 
-    fn narrow(&mut self, bracket: Bracket, per_sample: u64, error: f64) {
+    fn narrow(&mut self, bracket: Bracket, steps: u64, error: f64) {
         let Bracket { method, .. } = bracket;
         let bracket = if error + self.uncertainty <= self.task.error {
             self.candidates.retain(|one| one.method != method);
-            let steps = per_sample * self.samples;
             self.candidates.push(Candidate {
                 method,
-                timestep: self.spacing / in_f64(per_sample),
-                evaluations: steps * u64::from(method.evaluations()),
+                timestep: self.longest / in_f64(steps),
+                evaluations: steps * self.fewest * u64::from(method.evaluations()),
                 error,
             });
             Bracket {
-                enough: Some(per_sample),
+                enough: Some(steps),
                 ..bracket
             }
         } else {
             Bracket {
-                too_few: per_sample,
+                too_few: steps,
                 ..bracket
             }
         };
         let next = match bracket.enough {
-            None => 2 * per_sample,
+            None => 2 * steps,
             Some(enough) => bracket.too_few + (enough - bracket.too_few) / 2,
         };
         if next == bracket.too_few || bracket.enough == Some(next) {

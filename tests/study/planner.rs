@@ -1,5 +1,7 @@
 //! Plans, against references of twice the digits: the error that was allowed is kept.
 
+use std::f64::consts::PI;
+
 use glam::DVec2;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
@@ -29,7 +31,17 @@ fn swing(duration: f64, error: f64) -> Task<2> {
 
 /// The largest distance of the end effector from the reference, at fifty instants.
 fn error_of<const N: usize>(task: &Task<N>, law: &Law<N>, candidate: &Candidate) -> f64 {
-    let steps = (task.duration / candidate.timestep).round() as usize;
+    error_within(task.duration, task, law, candidate)
+}
+
+/// The same within the first seconds.
+fn error_within<const N: usize>(
+    span: f64,
+    task: &Task<N>,
+    law: &Law<N>,
+    candidate: &Candidate,
+) -> f64 {
+    let steps = (span / candidate.timestep).round() as usize;
     let every = (steps / 50).max(1);
     let count = steps / every;
     let spacing = candidate.timestep * every as f64;
@@ -96,6 +108,49 @@ fn a_planned_servo_keeps_within_its_error_of_the_law_that_acts_at_every_instant(
             .candidates
             .is_sorted_by(|one, other| one.evaluations >= other.evaluations)
     );
+}
+
+/// A stiff loop is farthest off in its first milliseconds, a fast link somewhere on every turn: the planned run is
+/// looked at after each of its steps.
+#[test]
+fn no_peak_is_overlooked() {
+    let stiff = |kp, kd, error| {
+        let (gains, setpoint) = (
+            Gains {
+                kp,
+                ki: [0.0; 2],
+                kd,
+            },
+            Setpoint::at([0.5, 0.5]),
+        );
+        let task = Task {
+            control: ControlLoop::new(Arm::<2>::default(), gains, setpoint),
+            start: State::rest(),
+            duration: 4.0,
+            error,
+        };
+        (task, Law::Continuous(gains, setpoint), 0.05)
+    };
+    let turning = Task {
+        control: ControlLoop::free(Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap()),
+        start: State {
+            position: [0.0; 2],
+            // A turn in 50 ms.
+            velocity: [0.0, 40.0 * PI],
+        },
+        ..swing(1.0, 0.02)
+    };
+    for (task, law, span) in [
+        stiff([20000.0, 5000.0], [300.0, 60.0], 0.01),
+        stiff([20000.0, 9000.0], [1000.0, 100.0], 0.003),
+        (turning, Law::FREE, 1.0),
+    ] {
+        let planned = plan(task).unwrap();
+        for candidate in &planned.candidates {
+            let seen = error_within(span, &task, &law, candidate);
+            assert!(seen <= task.error, "{candidate:?}: {seen:e}");
+        }
+    }
 }
 
 #[test]

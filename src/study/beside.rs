@@ -1,0 +1,142 @@
+//! Two runs of one motion beside each other: how far their end effectors come apart.
+//!
+//! They are compared after every step of the first. Looks in even intervals would miss what comes and goes between
+//! them: the first milliseconds of a stiff loop, or a whole turn of a fast link.
+//!
+//! **Invariant:** a comparison goes on by pieces, and a piece takes a millisecond at most (optimised build).
+
+use glam::DVec2;
+
+use super::continuous::ContinuousLoop;
+use super::follower::Follower;
+use crate::math::arm::{Arm, State};
+use crate::math::kinematics::forward;
+use crate::math::simulation::Simulation;
+
+/// Evaluations of the dynamics between two returns to the caller, and a step's more.
+const WORK_PER_PIECE: u64 = 2000;
+
+/// Most coefficients of a followed arm: some seconds of one core.
+const MAX_COEFFICIENTS: u64 = 40_000_000;
+
+/// A run that can be stepped and seen.
+pub(super) trait Steppable {
+    /// One step: the evaluations of the dynamics that it took, or what takes as long; none if numbers have ended.
+    fn step(&mut self) -> Option<u64>;
+    fn end_effector(&self) -> DVec2;
+}
+
+impl<const N: usize> Steppable for Simulation<N> {
+    fn step(&mut self) -> Option<u64> {
+        Simulation::step(self).then(|| self.method().evaluations().into())
+    }
+
+    fn end_effector(&self) -> DVec2 {
+        forward(self.arm().lengths(), &self.state().position).position
+    }
+}
+
+/// The motion that others are compared with.
+#[derive(Debug, Clone)]
+pub(super) enum Truth<const N: usize> {
+    /// Of an arm under a law that acts at every instant.
+    Law(ContinuousLoop<N>),
+    /// Of an arm left to itself.
+    Free(FreeMotion<N>),
+}
+
+/// An arm left to itself, followed within a tolerance.
+#[derive(Debug, Clone)]
+pub(super) struct FreeMotion<const N: usize> {
+    arm: Arm<N>,
+    follower: Follower<N>,
+    timestep: f64,
+}
+
+impl<const N: usize> FreeMotion<N> {
+    pub(super) fn new(arm: Arm<N>, start: State<N>, timestep: f64, tolerance: f64) -> Self {
+        Self {
+            arm,
+            follower: Follower::within(start, tolerance),
+            timestep,
+        }
+    }
+}
+
+impl<const N: usize> Steppable for Truth<N> {
+    fn step(&mut self) -> Option<u64> {
+        match self {
+            Self::Law(law) => law.step().then(|| law.control.method.evaluations().into()),
+            Self::Free(free) => {
+                let before = free.follower.coefficients();
+                let is_followed = free.follower.follow(&free.arm, &[0.0; N], free.timestep);
+                let after = free.follower.coefficients();
+                (is_followed && after <= MAX_COEFFICIENTS).then_some(after - before)
+            }
+        }
+    }
+
+    fn end_effector(&self) -> DVec2 {
+        let (arm, state) = match self {
+            Self::Law(law) => (&law.control.arm, &law.state),
+            Self::Free(free) => (&free.arm, free.follower.state()),
+        };
+        forward(arm.lengths(), &state.position).position
+    }
+}
+
+/// A run on its way beside the truth.
+#[derive(Debug, Clone)]
+pub(super) struct Beside<R, const N: usize> {
+    run: R,
+    truth: Truth<N>,
+    /// Steps of the truth in one of the run.
+    truth_steps: u64,
+    /// Steps of the run that are still to be taken.
+    left: u64,
+    /// How far the end effectors may come apart \[m\]; beyond that nobody asks.
+    allowed: f64,
+    apart: f64,
+}
+
+impl<R: Steppable, const N: usize> Beside<R, N> {
+    pub(super) fn new(run: R, steps: u64, truth: Truth<N>, truth_steps: u64, allowed: f64) -> Self {
+        Self {
+            run,
+            truth,
+            truth_steps,
+            left: steps,
+            allowed,
+            apart: 0.0,
+        }
+    }
+
+    /// Goes on by a piece: the largest distance \[m\] once it is known, or known to be too large; infinite where numbers
+    /// have ended.
+    pub(super) fn advance(&mut self) -> Option<f64> {
+        let mut work = 0;
+        while self.left > 0 && self.apart <= self.allowed {
+            if work >= WORK_PER_PIECE {
+                return None;
+            }
+            match self.step() {
+                Some(more) => work += more,
+                None => self.apart = f64::INFINITY,
+            }
+            self.left -= 1;
+        }
+        Some(self.apart)
+    }
+
+    fn step(&mut self) -> Option<u64> {
+        let mut work = self.run.step()?;
+        for _ in 0..self.truth_steps {
+            work += self.truth.step()?;
+        }
+        let apart = self.run.end_effector().distance(self.truth.end_effector());
+        self.apart = self
+            .apart
+            .max(if apart.is_nan() { f64::INFINITY } else { apart });
+        Some(work)
+    }
+}
