@@ -45,7 +45,7 @@
 //! - [`ArmSettings`], from `study`: method, timestep, arm, gains and setpoint, asked for at every call.
 //! - [`TrackGoal`], [`CommandGoal`], [`EndGoal`], from `ik_action`: a goal; its setpoint, from which on it is judged at
 //!   every step; its end.
-//! - [`SimulationTime`], from `rosapi`, `rosout` and `tf_web`: the time.
+//! - [`SimulationTime`], from `rosapi` and `rosout`: the time.
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
 //! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
@@ -67,6 +67,7 @@
 //!   trial, and its end.
 //! - [`CancelFollowed`], from the registry: the end of a goal of the action.
 //! - [`GoalJudged`], from `arm_sim`: how a goal goes, or how it ended.
+//! - [`Settle`], from `arm_sim` and `ik_trial`: whether all that came before has been dealt with.
 //!
 //! To `ik_trial`: [`node::Call`] of [`StartTrial`], [`SkipTarget`], [`StopTrial`], from the registry; [`GoalNews`],
 //! from `ik_action`: how a goal goes, or how it ended, for the node that sent it.
@@ -121,6 +122,7 @@
 //! [`Tell`]: arm::sim::Tell
 //! [`Consult`]: arm::sim::Consult
 //! [`GoalJudged`]: arm::sim::GoalJudged
+//! [`Settle`]: arm::sim::Settle
 //! [`HeldLimit`]: arm::sim::HeldLimit
 //! [`Solve`]: arm::ik::Solve
 //! [`SendGoal`]: arm::ik_action::SendGoal

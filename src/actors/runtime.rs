@@ -250,11 +250,7 @@ where
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
 
-    let frames = TfRepublisher::new(
-        arm.clone().recipient(),
-        arm.clone().recipient(),
-        registry.clone().recipient(),
-    );
+    let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient());
     let frames = frames.start();
     TfRepublisher::attach(&frames, nodes);
 

@@ -68,6 +68,7 @@ impl<const N: usize> Bench<N> {
         let pose = Rc::new(Cell::new(Pose {
             lengths,
             positions,
+            time: 0.0,
             resets: 0,
             simulated: 0.0,
         }));

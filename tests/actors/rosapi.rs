@@ -89,8 +89,7 @@ fn every_service_that_is_listed_is_served() {
         Parameters::attach(&Parameters::new(parameters.clone()).start(), &mut nodes);
         let rosapi = Rosapi::new(gateway.registry.clone().recipient(), parameters).start();
         Rosapi::attach(&rosapi, &mut nodes);
-        let (pose, time) = (arm.clone().recipient(), arm.clone().recipient());
-        let frames = TfRepublisher::new(pose, time, publish()).start();
+        let frames = TfRepublisher::new(arm.clone().recipient(), publish()).start();
         TfRepublisher::attach(&frames, &mut nodes);
         #[cfg(feature = "record")]
         {
@@ -148,7 +147,7 @@ fn the_list_is_made_once_there_is_a_place_to_write_it() {
         let held = std::sync::Arc::new(std::sync::Mutex::new(held));
         for _ in 0..PLACES {
             let held = std::sync::Arc::clone(&held);
-            actix_rt::spawn(aside(Errand::Writing, move || held.lock().unwrap().recv()));
+            actix_rt::spawn(aside(Errand::Listing, move || held.lock().unwrap().recv()));
         }
         turns().await;
         let question = json!({"op": "call_service", "service": "/rosapi/topics"});

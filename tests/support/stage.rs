@@ -73,11 +73,7 @@ where
         .start();
         ArmSim::attach(&arm, &mut nodes);
         PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), &mut nodes);
-        let frames = TfRepublisher::new(
-            arm.clone().recipient(),
-            arm.clone().recipient(),
-            registry.clone().recipient(),
-        );
+        let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient());
         TfRepublisher::attach(&frames.start(), &mut nodes);
         let tracker = GoalTracker {
             track: arm.clone().recipient(),
@@ -341,6 +337,7 @@ impl Handler<ArmPose<2>> for SilentArm {
         Pose {
             lengths: [1.0, 1.0],
             positions: [0.0, 0.0],
+            time: 0.0,
             resets: 0,
             simulated: 0.0,
         }

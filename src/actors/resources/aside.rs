@@ -24,13 +24,16 @@ pub const PLACES: usize = 2;
 pub enum Errand {
     /// Reads a client's input.
     Reading,
-    /// Writes messages for clients.
+    /// Writes messages in the forms that clients ask for.
     Writing,
+    /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
+    Listing,
 }
 
 thread_local! {
     static READING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
     static WRITING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
+    static LISTING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
 }
 
 /// A place among those who are at work on one kind of errand.
@@ -42,6 +45,7 @@ impl PlaceAside {
         let free = match errand {
             Errand::Reading => READING.with(Arc::clone),
             Errand::Writing => WRITING.with(Arc::clone),
+            Errand::Listing => LISTING.with(Arc::clone),
         };
         free.acquire_owned().await.ok().map(Self)
     }

@@ -44,6 +44,24 @@ fn feedback_comes_60_times_per_second_of_simulation_progress() {
     });
 }
 
+/// The pause itself takes the steps that are due, and their feedback goes by way of another node.
+#[test]
+fn none_comes_after_the_answer_to_a_pause() {
+    in_virtual_time(async {
+        let (stage, mut client) = Stage::<2>::with_a_floating_arm().await;
+        client.subscribe(FEEDBACK).await;
+        stage.send_goal(elsewhere()).await;
+        for k in 0..40 {
+            stage.pause(false).await;
+            pass(Duration::from_micros(16_100 + 137 * k)).await;
+            client.heard.clear();
+            client.ask("/arm_sim/pause", json!({"data": true})).await;
+            client.settle().await;
+            assert_eq!(client.story().last().unwrap(), "/arm_sim/pause", "{k}");
+        }
+    });
+}
+
 #[test]
 fn where_steps_are_longer_there_is_one_feedback_per_step() {
     in_virtual_time(async {

@@ -22,7 +22,7 @@ use pendularm::actors::arm::ik_action::{
     CancelGoal, CancelRejected, GoalRejected, GoalTracker, IkAction, SendGoal,
 };
 use pendularm::actors::arm::sim::{
-    ArmPose, CommandGoal, GoalJudged, SetIntegrator, TrackGoal, Tracking,
+    ArmPose, CommandGoal, GoalJudged, SetIntegrator, Settle, TrackGoal, Tracking,
 };
 use pendularm::actors::node::{Interest, Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};

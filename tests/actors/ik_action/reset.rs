@@ -49,6 +49,12 @@ impl Handler<GoalJudged<2>> for Owner {
     }
 }
 
+impl Handler<Settle> for Owner {
+    type Result = ();
+
+    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
+}
+
 /// Between the announcement of a goal and its setpoint another client's reset may come. Then the reset counts as the
 /// later of the two, and the setpoint must not pull the arm out of its starting pose.
 #[test]
@@ -64,6 +70,7 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
                 criteria: Criteria::default(),
                 solution: [0.0, 1.5],
                 owner: owner.clone().recipient(),
+                settle: owner.clone().recipient(),
             })
         };
         let command = |number| CommandGoal {
@@ -90,6 +97,7 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
     in_virtual_time(async {
         let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
         let (sender, mut news) = unbounded_channel();
+        let owner = Owner(sender).start();
         let tracking = stage
             .arm
             .send(TrackGoal {
@@ -100,7 +108,8 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
                     success_hold: 0.0,
                 },
                 solution: [0.0, 0.0],
-                owner: Owner(sender).start().recipient(),
+                owner: owner.clone().recipient(),
+                settle: owner.recipient(),
             })
             .await
             .unwrap();

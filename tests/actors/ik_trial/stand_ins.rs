@@ -5,8 +5,8 @@ use std::rc::Rc;
 
 use pendularm::actors::arm::ik::SolveError;
 use pendularm::actors::arm::ik_action::{CancelGoal, CancelRejected, GoalNews, GoalRejected};
-use pendularm::actors::arm::ik_action::{GoalOwner, SendGoal, Settle};
-use pendularm::actors::arm::sim::{ArmPose, Pose};
+use pendularm::actors::arm::ik_action::{GoalOwner, SendGoal};
+use pendularm::actors::arm::sim::{ArmPose, Pose, Settle};
 use pendularm::actors::node::Call;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
@@ -36,6 +36,7 @@ impl StandIn {
         Pose {
             lengths: self.script.borrow().lengths,
             positions: [0.0, 0.0],
+            time: self.born.elapsed().as_secs_f64(),
             resets: 0,
             simulated: self.born.elapsed().as_secs_f64(),
         }
@@ -137,6 +138,7 @@ fn what_the_arm_said_before_it_told_the_time_is_heard_before_the_time() {
             pose: Pose {
                 lengths: [1.0, 1.0],
                 positions: [0.0, 0.0],
+                time: 0.101,
                 resets: 0,
                 simulated: 0.101,
             },
@@ -170,6 +172,7 @@ fn after_a_refusal_another_target_is_sampled_for_the_lengths_of_that_moment() {
             pose: Pose {
                 lengths: [1.0, 1.0],
                 positions: [0.0, 0.0],
+                time: born.elapsed().as_secs_f64(),
                 resets: 0,
                 simulated: born.elapsed().as_secs_f64(),
             },

@@ -16,10 +16,12 @@ use actix::prelude::*;
 use self::active::ActiveGoal;
 use self::services::requests;
 pub use self::services::{
-    CancelFollowed, CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, SendGoal, Settle,
+    CancelFollowed, CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, SendGoal,
 };
 use crate::actors::arm::ik::Solve;
-use crate::actors::arm::sim::{CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names};
+use crate::actors::arm::sim::{
+    CommandGoal, EndGoal, GoalJudged, Settle, TrackGoal, Tracking, joint_names,
+};
 use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
 use crate::math::goal::Outcome;
@@ -193,7 +195,8 @@ impl<const N: usize> IkAction<N> {
                 target: target.position,
                 criteria,
                 solution,
-                owner: own.recipient(),
+                owner: own.clone().recipient(),
+                settle: own.recipient(),
             })
             .await
             .map_err(|_| GoalRejected::NoAnswer(Node::ArmSim.name()))

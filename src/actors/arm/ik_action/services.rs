@@ -114,12 +114,6 @@ pub struct GoalNews<const N: usize> {
     pub outcome: Option<Outcome>,
 }
 
-/// Answered when all that reached this node before has been dealt with. From `ik_trial`, which so hears all that the
-/// arm had said about goals before it gave the time.
-#[derive(Message, Debug, Clone, Copy)]
-#[rtype(result = "()")]
-pub struct Settle;
-
 /// The action's goals and cancellations on their way to the node.
 pub(super) fn requests<const N: usize>(
     send: Recipient<Call<SendGoal<N>>>,

@@ -4,8 +4,8 @@
 
 use actix::prelude::*;
 
-use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, SendGoal, Settle};
-use crate::actors::arm::sim::ArmPose;
+use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, SendGoal};
+use crate::actors::arm::sim::{ArmPose, Settle};
 use crate::actors::node::{Call, ask};
 use crate::math::trial::Action;
 

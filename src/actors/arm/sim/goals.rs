@@ -36,6 +36,7 @@ impl<const N: usize> Handler<TrackGoal<N>> for ArmSim<N> {
         self.attend(ctx);
         self.goals.preempt(&self.simulation);
         let before = self.goals.latest;
+        self.goals.settle = Some(message.settle);
         self.goals.tracked = Some(Tracked {
             number: message.number,
             goal: Goal::new(message.target, message.criteria, self.simulation.time()),

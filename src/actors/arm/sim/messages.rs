@@ -13,7 +13,7 @@ use crate::study::control_loop::ControlLoop;
 
 // ---- time and settings ----------------------------------------------------------------------------------------------
 
-/// Asks for simulation time \[s\]. From `rosapi`, `rosout` and the republisher of frames.
+/// Asks for simulation time \[s\]. From `rosapi` and `rosout`.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "f64")]
 pub struct SimulationTime;
@@ -67,6 +67,8 @@ pub struct Pose<const N: usize> {
     pub lengths: [f64; N],
     /// Joint positions \[rad\].
     pub positions: [f64; N],
+    /// Simulation time \[s\].
+    pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
     /// Simulation time that has passed since the arm was started, through all resets \[s\]. It runs backwards only with
@@ -89,7 +91,16 @@ pub struct TrackGoal<const N: usize> {
     pub solution: [f64; N],
     /// Hears of progress and of the end, unless that is the answer to its own message.
     pub owner: Recipient<GoalJudged<N>>,
+    /// The same, to be asked whether it has.
+    pub settle: Recipient<Settle>,
 }
+
+/// Answered by the owner of goals when all that reached it before has been dealt with. From the arm, before it says
+/// that it stands still, and from `ik_trial`, which so hears all that the arm had said about goals before it gave the
+/// time.
+#[derive(Message, Debug, Clone, Copy)]
+#[rtype(result = "()")]
+pub struct Settle;
 
 /// The goal has begun.
 #[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]

@@ -80,7 +80,7 @@ impl Drop for EncodingTask {
 impl EncodingTask {
     async fn run(self) {
         while let Some(outgoing) = self.0.upgrade() {
-            let next = outgoing.unencoded.borrow_mut().pop();
+            let next = outgoing.unencoded.borrow_mut().begin();
             let Some(message) = next else {
                 return;
             };
@@ -96,7 +96,9 @@ impl EncodingTask {
                 }
             }
             if let Some(outgoing) = self.0.upgrade() {
-                let _ = outgoing.pass(message);
+                if outgoing.unencoded.borrow_mut().end() {
+                    let _ = outgoing.pass(message);
+                }
                 outgoing.wake_writer();
             }
             tokio::task::yield_now().await;

@@ -64,6 +64,9 @@ const ARM_STATE: [&str; 8] = [
     Topic::Tf.short_name(),
 ];
 
+/// One more that a pause and a reset make old: no goal is on its way any more.
+const PROGRESS: [&str; 2] = [Topic::IkFeedback.name(), Topic::IkFeedback.short_name()];
+
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The actor of one client.
@@ -151,8 +154,13 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Response> for Connecti
             let shared = &connection.shared;
             let service = response.service;
             let of_arm = service.is_some_and(|one| one.owner() == Node::ArmSim);
-            let superseded: &[&str] = if of_arm { &ARM_STATE } else { &[] };
-            shared.outgoing.push_response(response.frame, superseded);
+            let stops = matches!(service, Some(Service::Pause | Service::Reset));
+            let superseded = match (of_arm, stops) {
+                (_, true) => [&ARM_STATE[..], &PROGRESS].concat(),
+                (true, false) => ARM_STATE.to_vec(),
+                (false, false) => Vec::new(),
+            };
+            shared.outgoing.push_response(response.frame, &superseded);
             if service.is_some_and(Service::is_computation) {
                 shared.end_computation();
             }

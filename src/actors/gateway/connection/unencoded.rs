@@ -3,6 +3,7 @@
 //! **Invariant:** at most [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use crate::actors::gateway::messages::Deliver;
 use crate::protocol::outbox::{MAX_TOPIC_BYTES, PLACE_BYTES};
@@ -14,6 +15,8 @@ pub(super) struct Unencoded {
     waiting: VecDeque<Deliver>,
     /// Their bytes, as they came.
     bytes: usize,
+    /// The topic of the message that is being encoded, unless that has become too old meanwhile.
+    underway: Option<Arc<str>>,
     /// Whether there is a task at work.
     pub(super) at_work: bool,
 }
@@ -43,7 +46,28 @@ impl Unencoded {
         (self.waiting.len(), self.bytes)
     }
 
-    pub(super) fn pop(&mut self) -> Option<Deliver> {
+    /// Discards the messages of these topics, which have become too old, the one that is being encoded too.
+    pub(super) fn discard(&mut self, topics: &[&str]) {
+        let is_old = |topic: &Arc<str>| topics.contains(&&**topic);
+        self.waiting.retain(|message| !is_old(&message.topic));
+        let lengths = self.waiting.iter().map(|one| one.frames.plain().len());
+        self.bytes = lengths.sum();
+        self.underway.take_if(|topic| is_old(topic));
+    }
+
+    /// The next message to be encoded.
+    pub(super) fn begin(&mut self) -> Option<Deliver> {
+        let next = self.pop();
+        self.underway = next.as_ref().map(|message| Arc::clone(&message.topic));
+        next
+    }
+
+    /// The message has been encoded; whether it is still to be sent.
+    pub(super) fn end(&mut self) -> bool {
+        self.underway.take().is_some()
+    }
+
+    fn pop(&mut self) -> Option<Deliver> {
         let message = self.waiting.pop_front()?;
         self.bytes -= message.frames.plain().len();
         Some(message)

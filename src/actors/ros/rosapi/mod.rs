@@ -116,7 +116,7 @@ impl<const N: usize> Handler<Call<Look>> for Rosapi<N> {
                 return answer(census);
             }
             // However many wait, a census is kept alive by those alone who are at work.
-            let Some(place) = PlaceAside::take(Errand::Writing).await else {
+            let Some(place) = PlaceAside::take(Errand::Listing).await else {
                 return;
             };
             let whole = TakeCensus {

@@ -15,7 +15,7 @@ use std::time::Duration;
 use actix::prelude::*;
 use tokio::time::Instant;
 
-use crate::actors::arm::sim::{ArmPose, Pose, SimulationTime};
+use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, Canceller};
 use crate::protocol::catalog::Topic;
@@ -88,7 +88,6 @@ pub enum ForgetFrames {
 /// The node `tf2_web_republisher` for an arm of `N` links.
 pub struct TfRepublisher<const N: usize> {
     arm: Recipient<ArmPose<N>>,
-    time: Recipient<SimulationTime>,
     publish: Recipient<Publish>,
     /// Oldest first.
     wishes: VecDeque<(WishFrames, Instant)>,
@@ -102,14 +101,9 @@ pub struct TfRepublisher<const N: usize> {
 impl<const N: usize> TfRepublisher<N> {
     /// A node that nobody has asked yet.
     #[must_use]
-    pub const fn new(
-        arm: Recipient<ArmPose<N>>,
-        time: Recipient<SimulationTime>,
-        publish: Recipient<Publish>,
-    ) -> Self {
+    pub const fn new(arm: Recipient<ArmPose<N>>, publish: Recipient<Publish>) -> Self {
         Self {
             arm,
-            time,
             publish,
             wishes: VecDeque::new(),
             topic: None,
@@ -243,20 +237,16 @@ impl<const N: usize> TfRepublisher<N> {
     fn look(&mut self, ctx: &mut Context<Self>) {
         self.wishes.retain(|(wish, _)| !wish.is_gone());
         self.keep_timer(ctx);
-        let (arm, time) = (self.arm.clone(), self.time.clone());
-        let asked = async move {
-            let time = time.send(SimulationTime).await.ok()?;
-            Some((time, arm.send(ArmPose).await.ok()?))
-        };
-        ctx.wait(asked.into_actor(self).map(|known, node, _| {
-            if let Some((time, pose)) = known {
-                node.tell(Stamp::from_seconds(time), &pose);
+        let asked = self.arm.send(ArmPose).into_actor(self);
+        ctx.wait(asked.map(|pose, node, _| {
+            if let Ok(pose) = pose {
+                node.tell(&pose);
             }
         }));
     }
 
-    fn tell(&mut self, stamp: Stamp, pose: &Pose<N>) {
-        let now = Instant::now();
+    fn tell(&mut self, pose: &Pose<N>) {
+        let (now, stamp) = (Instant::now(), Stamp::from_seconds(pose.time));
         let seen = |target: &str, sources: &[String]| {
             let sources = sources.iter().map(String::as_str);
             seen_from(stamp, target, sources, &pose.lengths, &pose.positions)

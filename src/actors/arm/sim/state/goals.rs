@@ -7,7 +7,7 @@ use std::pin::Pin;
 use actix::prelude::*;
 use glam::DVec2;
 
-use crate::actors::arm::sim::messages::{GoalJudged, Pose};
+use crate::actors::arm::sim::messages::{GoalJudged, Pose, Settle};
 use crate::math::goal::{Cadence, Goal, Outcome};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
@@ -20,6 +20,8 @@ pub(crate) struct Goals<const N: usize> {
     pub(crate) latest: Option<GoalJudged<N>>,
     /// Everything before the last reset.
     pub(crate) past: Past,
+    /// Who owns the goals, to be asked whether all news have been heard; none before the first.
+    pub(crate) settle: Option<Recipient<Settle>>,
     /// Progress on its way, whose arrival is to be waited for.
     pub(crate) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }
@@ -123,6 +125,7 @@ pub(crate) fn pose<const N: usize>(simulation: &Simulation<N>, past: Past) -> Po
     Pose {
         lengths: *simulation.arm().lengths(),
         positions: simulation.state().position,
+        time: simulation.time(),
         resets: past.resets,
         simulated: past.time + simulation.time(),
     }
