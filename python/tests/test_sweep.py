@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -181,6 +182,43 @@ def test_two_processes_may_share_a_folder(tmp_path):
     said = [one.communicate(timeout=60)[0] for one in both]
     assert [one.returncode for one in both] == [0, 0]
     assert said[0] == said[1]
+
+
+@pytest.mark.parametrize("linking", [True, False], ids=["hard links", "no hard links"])
+def test_of_two_sweeps_that_begin_in_a_folder_one_has_it(tmp_path, monkeypatch, linking):
+    exists, looked = Path.exists, threading.Barrier(2)
+
+    def look(path, **how):
+        found = exists(path, **how)
+        if path.name == "sweep.json":
+            # Neither goes on before both have seen that there is none.
+            looked.wait(60)
+        return found
+
+    def link(*_):
+        raise PermissionError("this file system has no hard links")
+
+    def begin(kp):
+        try:
+            return pendularm.sweep({"kp": [kp, 2 * kp]}, "final_error", folder=tmp_path, **small)["final_error"]
+        except ValueError as refusal:
+            return refusal
+
+    small = {**FIXED, "duration": 0.1}
+    if not linking:
+        monkeypatch.setattr(os, "link", link)
+    monkeypatch.setattr(Path, "exists", look)
+    with ThreadPoolExecutor(2) as threads:
+        answers = dict(zip([100.0, 900.0], threads.map(begin, [100.0, 900.0]), strict=True))
+    monkeypatch.undo()
+    (refusal,) = [answer for answer in answers.values() if isinstance(answer, ValueError)]
+    assert str(refusal).startswith(f"folder {tmp_path} holds a")
+    assert not list(tmp_path.glob("part-*"))
+    for kp, answer in answers.items():
+        if answer is not refusal:
+            assert np.array_equal(begin(kp), answer)
+        else:
+            assert str(begin(kp)) == f"folder {tmp_path} holds another sweep: it differs in grid"
 
 
 def test_a_folder_knows_the_code_of_a_metric(tmp_path):

@@ -8,10 +8,12 @@ import json
 import math
 import operator
 import os
+import secrets
 import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
@@ -453,6 +455,18 @@ class _Bar:
             self._bar.close()
 
 
+def _publish(part: Path, file: Path) -> None:
+    """Puts a file there that is written whole, unless there is one already, which stays."""
+    try:
+        os.link(part, file)
+    except FileExistsError:
+        pass
+    except OSError:
+        # Without hard links, another process may see the file half written, and then says that it cannot be read.
+        with suppress(FileExistsError), file.open("xb") as new:
+            new.write(part.read_bytes())
+
+
 class _Folder:
     """The finished pieces of one sweep, each in a file of its own that is there whole or not at all."""
 
@@ -468,11 +482,13 @@ class _Folder:
         # Through JSON, so that it can be compared with what is read.
         told = json.loads(json.dumps({**question.told(), "piece": piece}))
         file = path / "sweep.json"
+        # Looked for first: another process may be at the same sweep, whose pieces come after its sweep.json.
+        pieces = any(path.glob("[0-9]*.npz"))
         if not file.exists():
-            if any(path.glob("[0-9]*.npz")):
+            if pieces:
                 raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
-            self._write("sweep.json", lambda part: part.write_text(json.dumps(told)))
-            return
+            self._write("sweep.json", lambda part: part.write_text(json.dumps(told)), _publish)
+        # Read also where it was just written: another sweep may have come first.
         try:
             kept = dict(json.loads(file.read_bytes()))
         except (TypeError, ValueError):
@@ -481,11 +497,14 @@ class _Folder:
         if other:
             raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
 
-    def _write(self, name: str, write: Callable[[Path], Any]) -> None:
-        # Another process may be at the same sweep.
-        part = self._path / f"part-{os.getpid()}-{name}"
-        write(part)
-        part.replace(self._path / name)
+    def _write(self, name: str, write: Callable[[Path], Any], put: Callable[[Path, Path], Any] = Path.replace) -> None:
+        # Others may write the same at once, from hosts or containers that number their processes alike.
+        part = self._path / f"part-{secrets.token_hex(8)}-{name}"
+        try:
+            write(part)
+            put(part, self._path / name)
+        finally:
+            part.unlink(missing_ok=True)
 
     def keep(self, start: int, values: Mapping[str, NDArray[Any]]) -> None:
         self._write(f"{start:012}.npz", lambda part: np.savez(part, allow_pickle=False, **values))
