@@ -348,6 +348,11 @@ def test_a_function_may_be_the_metric():
             "duration / timestep must be at most 10000000 steps, got 1e+08",
         ),
         (
+            lambda: pendularm.sweep({"timestep": [0.1, 9]}, duration=4),
+            "duration must be at least the timestep 9.0, got 4.0",
+        ),
+        (lambda: pendularm.sweep({"kp": [1]}, duration=1e-4), "duration must be at least the timestep 0.001, got 0"),
+        (
             lambda: pendularm.sweep({"kp": range(4000), "kd": range(4000)}),
             "grid must have at most 10000000 combinations, got 16000000",
         ),
@@ -357,6 +362,12 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     with pytest.raises(ValueError) as refusal:
         wrong()
     assert str(refusal.value).startswith(said)
+
+
+def test_one_step_is_a_run():
+    # Three times 0.1 s is longer than 0.3 s by rounding alone.
+    found = pendularm.sweep({"timestep": [3 * 0.1, 0.3, 0.1]}, lambda run: run.times[-1], duration=0.3, samples=2)
+    assert found["metric"].tolist() == [3 * 0.1, 0.3, 3 * 0.1]
 
 
 FOREVER = """

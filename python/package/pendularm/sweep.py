@@ -153,8 +153,8 @@ def sweep(
     Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
     `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and
     `method`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
-    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s] and has `samples`,
-    start and end among them.
+    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s], a timestep at least,
+    and has `samples`, start and end among them.
 
     `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of
     a `Run`, which an executor has to be able to send.
@@ -256,7 +256,12 @@ class _Question:
         settings = {**self.axes, **self.fixed}
         for name, values in settings.items():
             _begin({name: values}, len(values), self.links)
-        steps = self.duration / float(min(settings.get("timestep", [TIMESTEP])))
+        timesteps = settings.get("timestep", [TIMESTEP])
+        longest = float(max(timesteps))
+        # A quotient that falls short of 1 by rounding alone counts as that, as in a rollout.
+        if self.duration / longest * (1 + 4 * sys.float_info.epsilon) < 1:
+            raise ValueError(f"duration must be at least the timestep {longest}, got {self.duration}")
+        steps = self.duration / float(min(timesteps))
         if steps > MOST_STEPS:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
