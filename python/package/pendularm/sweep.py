@@ -386,9 +386,8 @@ def _solve(
     found = metric(run)
     values = {key: np.asarray(one) for key, one in (found if isinstance(found, Mapping) else {name: found}).items()}
     for key, one in values.items():
-        if not isinstance(key, str) or key in ("file", "allow_pickle"):
-            # These two NumPy takes as its own where it keeps arrays by names.
-            raise ValueError(f"metric must name its numbers by text, other than 'file' and 'allow_pickle', got {key!r}")
+        if not isinstance(key, str):
+            raise ValueError(f"metric must name its numbers by text, got {key!r}")
         if one.dtype.hasobject:
             raise ValueError(f"metric must answer numbers or text, got {key} of objects")
         if one.shape != (arms,):
@@ -512,7 +511,8 @@ class _Folder:
             part.unlink(missing_ok=True)
 
     def keep(self, start: int, values: Mapping[str, NDArray[Any]]) -> None:
-        self._write(f"{start:012}.npz", lambda part: np.savez(part, allow_pickle=False, **values))
+        # The names come first, as an array of their own: NumPy and zip files alter some, or take them for others.
+        self._write(f"{start:012}.npz", lambda part: np.savez(part, json.dumps(list(values)), *values.values()))
 
     def read(self, starts: Iterable[int]) -> dict[int, dict[str, NDArray[Any]]]:
         found = {}
@@ -521,7 +521,8 @@ class _Folder:
                 # In memory, since NumPy leaves a file open that it cannot read.
                 kept = BytesIO((self._path / f"{start:012}.npz").read_bytes())
                 with np.load(kept, allow_pickle=False) as file:
-                    values = dict(file)
+                    names, *arrays = (file[f"arr_{place}"] for place in range(len(file.files)))
+                values = dict(zip(json.loads(str(names)), arrays, strict=True))
             except Exception:
                 # A piece that is not there or damaged, in whatever way, is done again.
                 continue
