@@ -207,7 +207,7 @@ pub(crate) type Held<'py, T> = pyo3::Bound<'py, T>;
 pub(crate) type Object<'py> = pyo3::Bound<'py, PyAny>;
 
 /// An object as an error shows it: not all of a long array.
-fn shown(value: &Object<'_>) -> String {
+pub(crate) fn shown(value: &Object<'_>) -> String {
     let text = value
         .repr()
         .map(|text| text.to_string())

@@ -276,11 +276,18 @@ pub(crate) fn plan<'py>(
     })
 }
 
+/// The loop under `gains`; without them nothing controls the arm, and a setpoint would count for nothing.
 fn read_loop<const N: usize>(
     arm: Rods<N>,
     gains: Option<&Object<'_>>,
     setpoint: Option<&Object<'_>>,
 ) -> PyResult<ControlLoop<N>> {
+    if let (None, Some(setpoint)) = (gains, setpoint) {
+        return Err(refused(format_args!(
+            "setpoint must be left out without gains, got {}",
+            fields::shown(setpoint)
+        )));
+    }
     let gains = fields::gains(gains, no_control())?;
     let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
     Ok(ControlLoop::new(arm, gains, setpoint))

@@ -67,6 +67,25 @@ def test_an_arm_is_the_same_among_few_and_among_many(name):
         assert np.array_equal(found[1], among[1][:4])
 
 
+def test_the_action_of_an_arm_that_has_ended_is_ignored(name):
+    one, other = (gymnasium.make_vec(name, 3, max_episode_steps=2) for _ in range(2))
+    for env in (one, other):
+        env.reset(seed=1)
+        env.step(np.ones((3, 2), np.float32))
+        # From here on the arm in the middle ends a step before the others.
+        env.reset(options={"reset_mask": np.array([True, False, True])})
+        assert env.step(np.ones((3, 2), np.float32))[3].tolist() == [False, True, False]
+    actions = np.ones((3, 2), np.float32)
+    expected = other.step(actions)
+    actions[1] = np.nan
+    for found, known in zip(one.step(actions)[:4], expected[:4], strict=True):
+        assert np.array_equal(found, known)
+        assert found.dtype == known.dtype
+    # Now the others have ended, and the one in the middle goes on.
+    with pytest.raises(ValueError, match=r"effort\[1\]\[0\] must be finite, got NaN"):
+        one.step(np.full((3, 2), np.nan, np.float32))
+
+
 def test_some_of_the_arms_can_be_reset_alone(name):
     env = gymnasium.make_vec(name, 3)
     env.reset(seed=1)

@@ -112,6 +112,8 @@ def test_suggested_gains_are_the_services(runtime, links):
         (lambda: pendularm.stability(gains=[1]), "gains must be a mapping with kp, ki and kd, got [1]"),
         (lambda: pendularm.rollout(samples=1), "samples must be between 2 and 100000, got 1"),
         (lambda: pendularm.rollout(gains={"kp": [1, -1]}), "gains.kp[1] must be finite and at least 0, got -1"),
+        (lambda: pendularm.rollout(setpoint=[1, 1]), "setpoint must be left out without gains, got [1, 1]"),
+        (lambda: pendularm.plan(0.01, setpoint=[1, 1]), "setpoint must be left out without gains, got [1, 1]"),
         (lambda: pendularm.rollout(q0=[1]), "q0 must be an array of 2 numbers, got [1]"),
         (
             lambda: pendularm.stability(integrator="ab2"),

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -183,6 +184,60 @@ def test_two_processes_may_share_a_folder(tmp_path):
     assert said[0] == said[1]
 
 
+@pytest.mark.parametrize("linking", [True, False], ids=["hard links", "no hard links"])
+def test_of_two_sweeps_that_begin_in_a_folder_one_has_it(tmp_path, monkeypatch, linking):
+    exists, looked = Path.exists, threading.Barrier(2)
+
+    def look(path, **how):
+        found = exists(path, **how)
+        if path.name == "sweep.json":
+            # Neither goes on before both have seen that there is none.
+            looked.wait(60)
+        return found
+
+    def link(*_):
+        raise PermissionError("this file system has no hard links")
+
+    def begin(kp):
+        try:
+            return pendularm.sweep({"kp": [kp, 2 * kp]}, "final_error", folder=tmp_path, **small)["final_error"]
+        except ValueError as refusal:
+            return refusal
+
+    small = {**FIXED, "duration": 0.1}
+    if not linking:
+        monkeypatch.setattr(os, "link", link)
+    monkeypatch.setattr(Path, "exists", look)
+    with ThreadPoolExecutor(2) as threads:
+        answers = dict(zip([100.0, 900.0], threads.map(begin, [100.0, 900.0]), strict=True))
+    monkeypatch.undo()
+    (refusal,) = [answer for answer in answers.values() if isinstance(answer, ValueError)]
+    assert str(refusal).startswith(f"folder {tmp_path} holds a")
+    assert not list(tmp_path.glob("part-*"))
+    for kp, answer in answers.items():
+        if answer is not refusal:
+            assert np.array_equal(begin(kp), answer)
+        else:
+            assert str(begin(kp)) == f"folder {tmp_path} holds another sweep: it differs in grid"
+
+
+def test_a_folder_keeps_numbers_under_any_names(tmp_path):
+    # NumPy and zip files have uses of their own for most of these.
+    names = ["a", "a.npy", "arr_0", "arr_1", "file", "allow_pickle", "", "/", "b\0c", "b\0d", "é\ud800"]
+
+    def many(run):
+        return {name: run.energy[-1] + place for place, name in enumerate(names)}
+
+    ask = {"grid": {"kp": [1.0, 2.0]}, "metric": many, "q0": 0.5, "duration": 0.1, "folder": tmp_path}
+    expected = pendularm.sweep(**ask).values
+    with Counting(1) as executor:
+        found = pendularm.sweep(executor=executor, **ask).values
+        assert executor.given == 0
+    assert list(found) == list(expected) == names
+    for name in names:
+        assert np.array_equal(found[name], expected[name]), name
+
+
 def test_a_folder_knows_the_code_of_a_metric(tmp_path):
     def last(factor, kind="position"):
         return lambda run: [factor * run.positions[-1, :, 0] for _ in (0, 1) if kind in {"position", "first"}][0]
@@ -277,11 +332,7 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"kp": [1]}, duration="1"), "duration must be a number, got '1'"),
         (
             lambda: pendularm.sweep({"kp": [1]}, lambda run: {1: run.energy[-1]}, duration=0.1),
-            "metric must name its numbers by text, other than 'file' and 'allow_pickle', got 1",
-        ),
-        (
-            lambda: pendularm.sweep({"kp": [1]}, lambda run: {"file": run.energy[-1]}, duration=0.1),
-            "metric must name its numbers by text, other than 'file' and 'allow_pickle', got 'file'",
+            "metric must name its numbers by text, got 1",
         ),
         (
             lambda: pendularm.sweep({"kp": [1]}, lambda run: [None], duration=0.1),
@@ -310,6 +361,11 @@ def test_a_function_may_be_the_metric():
             "duration / timestep must be at most 10000000 steps, got 1e+08",
         ),
         (
+            lambda: pendularm.sweep({"timestep": [0.1, 9]}, duration=4),
+            "duration must be at least the timestep 9.0, got 4.0",
+        ),
+        (lambda: pendularm.sweep({"kp": [1]}, duration=1e-4), "duration must be at least the timestep 0.001, got 0"),
+        (
             lambda: pendularm.sweep({"kp": range(4000), "kd": range(4000)}),
             "grid must have at most 10000000 combinations, got 16000000",
         ),
@@ -319,6 +375,12 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     with pytest.raises(ValueError) as refusal:
         wrong()
     assert str(refusal.value).startswith(said)
+
+
+def test_one_step_is_a_run():
+    # Three times 0.1 s is longer than 0.3 s by rounding alone.
+    found = pendularm.sweep({"timestep": [3 * 0.1, 0.3, 0.1]}, lambda run: run.times[-1], duration=0.3, samples=2)
+    assert found["metric"].tolist() == [3 * 0.1, 0.3, 3 * 0.1]
 
 
 FOREVER = """

@@ -230,9 +230,9 @@ class _Vector(VectorEnv[Observation, Action, Any]):
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
         if not self._random:
             raise gymnasium.error.ResetNeeded("reset has to come before the first step")
-        # Arms that have ended are stepped with the others, and begin anew wherever that leads.
+        # Arms that have ended are stepped with the others, by no effort, and begin anew wherever that leads.
         again = self._ended
-        self._task.go_on(_checked("actions", actions, self.action_space))
+        self._task.go_on(np.where(again[:, None], 0, _checked("actions", actions, self.action_space)))
         self._elapsed += 1
         rewards, lost = self._task.reward(), self._task.lost()
         if again.any():

@@ -4,18 +4,16 @@ A sweep is cut into pieces, each a `Batch`. Neither the number of workers nor th
 results.
 """
 
-import json
 import math
 import operator
 import os
 import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -24,6 +22,7 @@ from numpy.typing import NDArray
 
 from ._code import fingerprint
 from ._native import Batch
+from ._pieces import Folder, Numbers, hand_out
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
@@ -34,9 +33,6 @@ TIMESTEP = 0.001
 
 SETTLED = 0.02
 """Largest distance of a joint from its setpoint at which an arm counts as settled [rad]."""
-
-IN_FLIGHT = 256
-"""Pieces that are handed to an executor before the first of them is done."""
 
 MOST_SETTINGS = 10_000_000
 """Combinations of one sweep: their results are kept in memory, some 100 MB a metric."""
@@ -151,8 +147,8 @@ def sweep(
     Settings are `lengths` [m], `masses` [kg], `kp` [N m/rad], `ki` [N m/(rad s)], `kd` [N m s/rad], `setpoint` [rad],
     `q0` [rad] and `qdot0` [rad/s], a number for all joints or one for each; `gravity` [m/s²], `timestep` [s] and
     `method`. `grid` has a sequence of each that varies; those that do not are given by name, and what is left out is
-    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s] and has `samples`,
-    start and end among them.
+    as in a fresh runtime. Without `servo` the controller is off. Every run lasts `duration` [s], a timestep at least,
+    and has `samples`, start and end among them.
 
     `metric` is `settling_time` [s], `final_error` [rad], `largest_effort` [N m], `energy_drift` [J], or a function of
     a `Run`, which an executor has to be able to send.
@@ -206,17 +202,19 @@ def sweep(
         servo=bool(servo),
     )
     question.check()
-    kept = None if folder is None else _Folder(Path(folder), question, piece)
+    kept = None
+    if folder is not None:
+        kept = Folder(Path(folder), question.told(), total, piece, metric if isinstance(metric, str) else None)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     left = [start for start in starts if start not in done]
     if executor is not None:
-        _run(question, left, piece, executor, _solve, done, kept, progress)
+        hand_out(question, total, left, piece, executor, _solve, done, kept, progress)
     else:
         stopped = threading.Event()
         with ThreadPoolExecutor(_cores()) as threads:
             try:
-                _run(question, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
+                hand_out(question, total, left, piece, threads, partial(_solve, stopped=stopped), done, kept, progress)
             finally:
                 # Who leaves early, by Ctrl-C say, does not wait for the pieces that are under way.
                 stopped.set()
@@ -254,7 +252,12 @@ class _Question:
         settings = {**self.axes, **self.fixed}
         for name, values in settings.items():
             _begin({name: values}, len(values), self.links)
-        steps = self.duration / float(min(settings.get("timestep", [TIMESTEP])))
+        timesteps = settings.get("timestep", [TIMESTEP])
+        longest = float(max(timesteps))
+        # A quotient that falls short of 1 by rounding alone counts as that, as in a rollout.
+        if self.duration / longest * (1 + 4 * sys.float_info.epsilon) < 1:
+            raise ValueError(f"duration must be at least the timestep {longest}, got {self.duration}")
+        steps = self.duration / float(min(timesteps))
         if steps > MOST_STEPS:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
@@ -351,9 +354,7 @@ def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | 
             return
 
 
-def _solve(
-    question: _Question, start: int, stop: int, stopped: threading.Event | None = None
-) -> dict[str, NDArray[Any]]:
+def _solve(question: _Question, start: int, stop: int, stopped: threading.Event | None = None) -> Numbers:
     """One piece, wherever it is done; one that is done in this process is over soon after it was `stopped`."""
     places = np.unravel_index(np.arange(start, stop), question.shape)
     arms = stop - start
@@ -379,130 +380,10 @@ def _solve(
     found = metric(run)
     values = {key: np.asarray(one) for key, one in (found if isinstance(found, Mapping) else {name: found}).items()}
     for key, one in values.items():
-        if not isinstance(key, str) or key in ("file", "allow_pickle"):
-            # These two NumPy takes as its own where it keeps arrays by names.
-            raise ValueError(f"metric must name its numbers by text, other than 'file' and 'allow_pickle', got {key!r}")
+        if not isinstance(key, str):
+            raise ValueError(f"metric must name its numbers by text, got {key!r}")
         if one.dtype.hasobject:
             raise ValueError(f"metric must answer numbers or text, got {key} of objects")
         if one.shape != (arms,):
             raise ValueError(f"metric must answer one number for each of {arms} arms, got {key} of shape {one.shape}")
     return values
-
-
-def _run(
-    question: _Question,
-    starts: Sequence[int],
-    piece: int,
-    executor: Any,
-    solve: Callable[..., dict[str, NDArray[Any]]],
-    done: dict[int, dict[str, NDArray[Any]]],
-    kept: "_Folder | None",
-    progress: bool,
-) -> None:
-    """Has the pieces done that are left, and takes in each as it comes."""
-    total = math.prod(question.shape)
-    left = iter(starts)
-    under_way: dict[Future[Any], int] = {}
-    with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:
-        try:
-            while True:
-                while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
-                    under_way[executor.submit(solve, question, start, min(start + piece, total))] = start
-                if not under_way:
-                    return
-                ended = wait(under_way, return_when=FIRST_COMPLETED).done
-                # Failed ones come last, so that all that is finished is kept.
-                for future in sorted(ended, key=lambda one: one.cancelled() or one.exception() is not None):
-                    start = under_way.pop(future)
-                    done[start] = future.result()
-                    if kept is not None:
-                        kept.keep(start, done[start])
-                    bar.update(min(piece, total - start))
-        finally:
-            for future in under_way:
-                future.cancel()
-
-
-def _in_notebook() -> bool:
-    """Whether a kernel of Jupyter runs this, whose output is no terminal and is looked at all the same."""
-    interactive = sys.modules.get("IPython")
-    return interactive is not None and hasattr(interactive.get_ipython(), "kernel")
-
-
-class _Bar:
-    """A progress bar where tqdm is installed and somebody is watching."""
-
-    def __init__(self, total: int, already: int, wanted: bool) -> None:
-        try:
-            from tqdm.auto import tqdm
-        except ImportError:
-            wanted = False
-        # `None`: only on a terminal.
-        hidden = False if _in_notebook() else None
-        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=hidden) if wanted else None
-
-    def __enter__(self) -> "_Bar":
-        return self
-
-    def update(self, settings: int) -> None:
-        if self._bar is not None:
-            self._bar.update(settings)
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.close()
-
-
-class _Folder:
-    """The finished pieces of one sweep, each in a file of its own that is there whole or not at all."""
-
-    def __init__(self, path: Path, question: _Question, piece: int) -> None:
-        self._path = path
-        self._piece = piece
-        self._total = math.prod(question.shape)
-        self._name = question.metric if isinstance(question.metric, str) else None
-        try:
-            path.mkdir(parents=True, exist_ok=True)
-        except (FileExistsError, NotADirectoryError):
-            raise ValueError(f"folder {path} must be a folder") from None
-        # Through JSON, so that it can be compared with what is read.
-        told = json.loads(json.dumps({**question.told(), "piece": piece}))
-        file = path / "sweep.json"
-        if not file.exists():
-            if any(path.glob("[0-9]*.npz")):
-                raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
-            self._write("sweep.json", lambda part: part.write_text(json.dumps(told)))
-            return
-        try:
-            kept = dict(json.loads(file.read_bytes()))
-        except (TypeError, ValueError):
-            raise ValueError(f"folder {path} holds a sweep.json that cannot be read") from None
-        other = [name for name, value in told.items() if kept.get(name) != value]
-        if other:
-            raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
-
-    def _write(self, name: str, write: Callable[[Path], Any]) -> None:
-        # Another process may be at the same sweep.
-        part = self._path / f"part-{os.getpid()}-{name}"
-        write(part)
-        part.replace(self._path / name)
-
-    def keep(self, start: int, values: Mapping[str, NDArray[Any]]) -> None:
-        self._write(f"{start:012}.npz", lambda part: np.savez(part, allow_pickle=False, **values))
-
-    def read(self, starts: Iterable[int]) -> dict[int, dict[str, NDArray[Any]]]:
-        found = {}
-        for start in starts:
-            try:
-                # In memory, since NumPy leaves a file open that it cannot read.
-                kept = BytesIO((self._path / f"{start:012}.npz").read_bytes())
-                with np.load(kept, allow_pickle=False) as file:
-                    values = dict(file)
-            except Exception:
-                # A piece that is not there or damaged, in whatever way, is done again.
-                continue
-            arms = min(self._piece, self._total - start)
-            known = self._name is None or list(values) == [self._name]
-            if known and values and all(one.shape == (arms,) for one in values.values()):
-                found[start] = values
-        return found

@@ -1,0 +1,164 @@
+"""The pieces of a sweep: how they are handed out, shown while they are done, and kept in a folder."""
+
+import json
+import os
+import secrets
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, wait
+from contextlib import suppress
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Folder", "Numbers", "hand_out"]
+
+Numbers = dict[str, NDArray[Any]]
+"""Those of a piece by the metrics' names, each (arms,)."""
+
+IN_FLIGHT = 256
+"""Pieces that are handed to an executor before the first of them is done."""
+
+
+def hand_out(
+    question: object,
+    total: int,
+    starts: Sequence[int],
+    piece: int,
+    executor: Any,
+    solve: Callable[..., Numbers],
+    done: dict[int, Numbers],
+    kept: "Folder | None",
+    progress: bool,
+) -> None:
+    """Has the pieces done that begin at `starts`, each a `solve` of the question from a setting to another, and takes
+    in each as it comes."""
+    left = iter(starts)
+    under_way: dict[Future[Any], int] = {}
+    with _Bar(total, total - sum(min(piece, total - start) for start in starts), progress) as bar:
+        try:
+            while True:
+                while len(under_way) < IN_FLIGHT and (start := next(left, None)) is not None:
+                    under_way[executor.submit(solve, question, start, min(start + piece, total))] = start
+                if not under_way:
+                    return
+                ended = wait(under_way, return_when=FIRST_COMPLETED).done
+                # Failed ones come last, so that all that is finished is kept.
+                for future in sorted(ended, key=lambda one: one.cancelled() or one.exception() is not None):
+                    start = under_way.pop(future)
+                    done[start] = future.result()
+                    if kept is not None:
+                        kept.keep(start, done[start])
+                    bar.update(min(piece, total - start))
+        finally:
+            for future in under_way:
+                future.cancel()
+
+
+def _in_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this, whose output is no terminal and is looked at all the same."""
+    interactive = sys.modules.get("IPython")
+    return interactive is not None and hasattr(interactive.get_ipython(), "kernel")
+
+
+class _Bar:
+    """A progress bar where tqdm is installed and somebody is watching."""
+
+    def __init__(self, total: int, already: int, wanted: bool) -> None:
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            wanted = False
+        # `None`: only on a terminal.
+        hidden = False if _in_notebook() else None
+        self._bar = tqdm(total=total, initial=already, unit=" settings", disable=hidden) if wanted else None
+
+    def __enter__(self) -> "_Bar":
+        return self
+
+    def update(self, settings: int) -> None:
+        if self._bar is not None:
+            self._bar.update(settings)
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+
+def _publish(part: Path, file: Path) -> None:
+    """Puts a file there that is written whole, unless there is one already, which stays."""
+    try:
+        os.link(part, file)
+    except FileExistsError:
+        pass
+    except OSError:
+        # Without hard links, another process may see the file half written, and then says that it cannot be read.
+        with suppress(FileExistsError), file.open("xb") as new:
+            new.write(part.read_bytes())
+
+
+class Folder:
+    """The finished pieces of one sweep, each in a file of its own that is there whole or not at all."""
+
+    def __init__(self, path: Path, told: Mapping[str, Any], total: int, piece: int, name: str | None) -> None:
+        """The question as it is `told`, of so many settings in all and in a piece, whose one metric has that name, if
+        it is known."""
+        self._path = path
+        self._total = total
+        self._piece = piece
+        self._name = name
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except (FileExistsError, NotADirectoryError):
+            raise ValueError(f"folder {path} must be a folder") from None
+        # Through JSON, so that it can be compared with what is read.
+        told = json.loads(json.dumps({**told, "piece": piece}))
+        file = path / "sweep.json"
+        # Looked for first: another process may be at the same sweep, whose pieces come after its sweep.json.
+        pieces = any(path.glob("[0-9]*.npz"))
+        if not file.exists():
+            if pieces:
+                raise ValueError(f"folder {path} holds pieces of a sweep without their sweep.json")
+            self._write("sweep.json", lambda part: part.write_text(json.dumps(told)), _publish)
+        # Read also where it was just written: another sweep may have come first.
+        try:
+            kept = dict(json.loads(file.read_bytes()))
+        except (TypeError, ValueError):
+            raise ValueError(f"folder {path} holds a sweep.json that cannot be read") from None
+        other = [name for name, value in told.items() if kept.get(name) != value]
+        if other:
+            raise ValueError(f"folder {path} holds another sweep: it differs in {', '.join(other)}")
+
+    def _write(self, name: str, write: Callable[[Path], Any], put: Callable[[Path, Path], Any] = Path.replace) -> None:
+        # Others may write the same at once, from hosts or containers that number their processes alike.
+        part = self._path / f"part-{secrets.token_hex(8)}-{name}"
+        try:
+            write(part)
+            put(part, self._path / name)
+        finally:
+            part.unlink(missing_ok=True)
+
+    def keep(self, start: int, values: Numbers) -> None:
+        # The names come first, as an array of their own: NumPy and zip files alter some, or take them for others.
+        self._write(f"{start:012}.npz", lambda part: np.savez(part, json.dumps(list(values)), *values.values()))
+
+    def read(self, starts: Iterable[int]) -> dict[int, Numbers]:
+        found = {}
+        for start in starts:
+            try:
+                # In memory, since NumPy leaves a file open that it cannot read.
+                kept = BytesIO((self._path / f"{start:012}.npz").read_bytes())
+                with np.load(kept, allow_pickle=False) as file:
+                    names, *arrays = (file[f"arr_{place}"] for place in range(len(file.files)))
+                values = dict(zip(json.loads(str(names)), arrays, strict=True))
+            except Exception:
+                # A piece that is not there or damaged, in whatever way, is done again.
+                continue
+            arms = min(self._piece, self._total - start)
+            known = self._name is None or list(values) == [self._name]
+            if known and values and all(one.shape == (arms,) for one in values.values()):
+                found[start] = values
+        return found
