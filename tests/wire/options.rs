@@ -554,26 +554,47 @@ fn help_and_version_go_to_standard_output_with_status_0() {
     }
 }
 
-/// Every write to `/dev/full` fails, as one to a pipe that nobody holds any more does.
+/// Every write to `/dev/full` fails.
+#[cfg(target_os = "linux")]
+fn full() -> Stdio {
+    let full = std::fs::File::options().write(true).open("/dev/full");
+    Stdio::from(full.unwrap())
+}
+
 #[cfg(target_os = "linux")]
 #[test]
-fn standard_streams_that_take_nothing_change_no_exit_status() {
-    let full = || {
-        Stdio::from(
-            std::fs::File::options()
-                .write(true)
-                .open("/dev/full")
-                .unwrap(),
-        )
-    };
+fn output_that_is_lost_is_a_failure() {
+    for arguments in [
+        &["--help"][..],
+        &["--version"],
+        &["plan", "--error", "0.1", "--duration", "0.1"],
+        #[cfg(feature = "cli")]
+        &["completions", "bash"],
+    ] {
+        let output = program(arguments).stdout(full()).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(said.starts_with("pendularm: standard output: "), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn a_reader_that_is_gone_is_no_failure() {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = program(&["--help"]).stdout(writer).output().unwrap();
+    assert_eq!((output.status.code(), output.stderr), (Some(0), vec![]));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_complaint_that_nobody_takes_changes_no_exit_status() {
     let status = |arguments: &[&str]| {
-        program(arguments)
-            .stdout(full())
-            .stderr(full())
-            .status()
-            .unwrap()
-            .code()
+        let mut program = program(arguments);
+        program.stdout(full()).stderr(full());
+        program.status().unwrap().code()
     };
-    assert_eq!(status(&["--help"]), Some(0));
+    assert_eq!(status(&["--help"]), Some(1));
     assert_eq!(status(&["--links", "4"]), Some(2));
 }
