@@ -6,6 +6,7 @@ use clap::{Arg, ArgMatches, Command};
 
 use super::links::Links;
 use super::usage::{Origin, UsageError};
+use crate::study::planner::MAX_DURATION;
 
 /// The plan that is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,6 +86,13 @@ pub(super) fn read(matches: &ArgMatches) -> Result<PlanOptions, UsageError> {
         None | Some("servo") => None,
         Some(text) => Some(positive("duration", text)?),
     };
+    if duration.is_some_and(|duration| duration > MAX_DURATION) {
+        return Err(UsageError::Value {
+            argument: "--duration".to_owned(),
+            needs: format!("must be at most {MAX_DURATION} s"),
+            value: given("duration").unwrap_or_default().to_owned(),
+        });
+    }
     Ok(PlanOptions {
         error: positive("error", given("error").unwrap_or_default())?,
         duration,

@@ -70,11 +70,15 @@ pub enum ReportError {
     },
 }
 
-/// The sections' names, in order, with commas between.
+/// The sections' names, in order.
+pub fn sections() -> impl Iterator<Item = &'static str> {
+    SECTIONS.iter().map(|section| section.name)
+}
+
+/// The same, with commas between.
 #[must_use]
 pub fn names() -> String {
-    let all: Vec<&str> = SECTIONS.iter().map(|section| section.name).collect();
-    all.join(", ")
+    sections().collect::<Vec<_>>().join(", ")
 }
 
 /// Makes the report and answers the page's path.

@@ -26,7 +26,7 @@ const FLOORS: [(&str, &[&str]); 14] = [
     ("command", &["protocol", "output"]),
     (
         "options",
-        &["protocol", "web", "report", "command", "logging"],
+        &["protocol", "study", "web", "report", "command", "logging"],
     ),
     ("plan", &["math", "study", "options"]),
     (

@@ -244,6 +244,22 @@ fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
     assert_eq!(all.only, ["error", "budget"]);
     assert!(refusal(&["--links", "2", "report"], &[]).starts_with("unknown argument \"--links\""));
     assert!(refusal(&["report", "--speed"], &[]).starts_with("unknown argument \"--speed\""));
+    for (names, wrong) in [("error,colour", "colour"), ("", "")] {
+        let refused = refusal(&["report", "--only", names], &[]);
+        let known = pendularm::report::names();
+        let expected = format!("--only <NAMES> must be one of {known}, got {wrong:?}");
+        assert_eq!(refused, expected);
+    }
+}
+
+#[test]
+fn a_plan_is_asked_for_with_what_can_be_planned() {
+    let plan = |more: &[&'static str]| [&["plan", "--error", "0.01"], more].concat();
+    assert!(parse(&plan(&["--duration", "1000"]), &[]).is_ok());
+    assert_eq!(
+        refusal(&plan(&["--duration", "5000"]), &[]),
+        "--duration must be at most 1000 s, got \"5000\""
+    );
 }
 
 #[test]
