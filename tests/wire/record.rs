@@ -221,6 +221,10 @@ fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
     let (status, said) = run(&["replay", text(&folder.join("nowhere.mcap"))]);
     assert_eq!(status, Some(1));
     assert!(said.contains("nowhere.mcap: "), "{said}");
+    let (status, said) = run(&["replay", text(&folder)]);
+    assert_eq!(status, Some(1));
+    let cause = format!("{}: Is a directory", folder.display());
+    assert!(said.contains(&cause), "{said}");
     let (status, _) = run(&["replay"]);
     assert_eq!(status, Some(2));
 }
