@@ -29,7 +29,8 @@ pub(super) const NAME: &str = "plan";
 /// The subcommand as `clap` is to read it.
 pub(super) fn command() -> Command {
     let option = |name: &'static str, value: &'static str, about: &'static str| {
-        Arg::new(name).long(name).value_name(value).help(about)
+        let arg = Arg::new(name).long(name).value_name(value).help(about);
+        arg.allow_negative_numbers(true)
     };
     Command::new(NAME)
         .about("Find the cheapest method and timestep for an allowed error, and run them against the truth")

@@ -60,6 +60,24 @@ fn without_a_runtime_the_status_is_3() {
     }
 }
 
+#[test]
+fn a_negative_number_is_refused_by_its_option() {
+    for (arguments, option) in [
+        (
+            &["topic", "list", "--timeout", "-1"][..],
+            "--timeout <SECONDS>",
+        ),
+        (&["topic", "echo", "/clock", "-n", "-1"], "--times <N>"),
+        (&["topic", "hz", "/clock", "-w", "-1"], "--window <N>"),
+        (&["topic", "pub", "/chatter", "-t", "-1"], "--times <N>"),
+        (&["topic", "pub", "/chatter", "-r", "-1.5"], "--rate <HZ>"),
+    ] {
+        let said = complaint(&output(arguments), 2);
+        assert!(said.contains(&format!("{option} must be ")), "{said}");
+        assert!(said.contains("got \"-1"), "{said}");
+    }
+}
+
 /// A server that says these bytes to whoever comes, and then closes or says nothing more.
 fn server(says: &'static [u8], closes: bool) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();

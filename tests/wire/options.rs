@@ -179,7 +179,11 @@ fn a_seed_is_any_number_of_64_bits() {
         );
         assert_eq!(refusal(&[], &[("ARM_SIM_SEED", value)]), expected);
     }
-    assert!(refusal(&["--seed=-1"], &[]).starts_with("--seed must be"));
+    for negative in [&["--seed=-1"][..], &["--seed", "-1"]] {
+        let refused = refusal(negative, &[]);
+        assert!(refused.starts_with("--seed must be"), "{refused}");
+        assert!(refused.ends_with("got \"-1\""), "{refused}");
+    }
 }
 
 #[test]
@@ -256,6 +260,10 @@ fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
 fn a_plan_is_asked_for_with_what_can_be_planned() {
     let plan = |more: &[&'static str]| [&["plan", "--error", "0.01"], more].concat();
     assert!(parse(&plan(&["--duration", "1000"]), &[]).is_ok());
+    assert_eq!(
+        refusal(&plan(&["--duration", "-1"]), &[]),
+        "--duration must be a number greater than 0, got \"-1\""
+    );
     assert_eq!(
         refusal(&plan(&["--duration", "5000"]), &[]),
         "--duration must be at most 1000 s, got \"5000\""
