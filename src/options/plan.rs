@@ -69,8 +69,15 @@ pub(super) fn read(matches: &ArgMatches) -> Result<PlanOptions, UsageError> {
             });
         }
     };
+    let is_servo = given("duration") == Some("servo");
     let mut setpoint = vec![0.8, -0.6, 0.0];
     if let Some(text) = given("setpoint") {
+        if !is_servo {
+            // A free arm has none: it would be left out of account.
+            return Err(UsageError::UnknownArgument {
+                argument: "--setpoint without --duration servo".to_owned(),
+            });
+        }
         let joints: Result<Vec<f64>, _> = text.split(',').map(|one| one.trim().parse()).collect();
         setpoint = joints
             .ok()
@@ -97,7 +104,7 @@ pub(super) fn read(matches: &ArgMatches) -> Result<PlanOptions, UsageError> {
     Ok(PlanOptions {
         error: positive("error", given("error").unwrap_or_default())?,
         duration,
-        is_servo: given("duration") == Some("servo"),
+        is_servo,
         links,
         setpoint,
     })

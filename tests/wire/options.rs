@@ -260,6 +260,15 @@ fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
 fn a_plan_is_asked_for_with_what_can_be_planned() {
     let plan = |more: &[&'static str]| [&["plan", "--error", "0.01"], more].concat();
     assert!(parse(&plan(&["--duration", "1000"]), &[]).is_ok());
+    assert!(parse(&plan(&["--duration=servo", "--setpoint", "-1,2"]), &[]).is_ok());
+    for free in [
+        &["--setpoint", "1,2"][..],
+        &["--setpoint=1,2", "--duration=2"],
+    ] {
+        let refused = refusal(&plan(free), &[]);
+        let expected = "unknown argument \"--setpoint without --duration servo\"";
+        assert!(refused.starts_with(expected), "{refused}");
+    }
     assert_eq!(
         refusal(&plan(&["--duration", "-1"]), &[]),
         "--duration must be a number greater than 0, got \"-1\""
