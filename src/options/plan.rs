@@ -40,7 +40,7 @@ pub(super) fn command() -> Command {
             "SECONDS",
             "How long the arm swings from its starting pose, or `servo` for a move under control [default: 10]",
         ))
-        .arg(option("links", "N", "Number of links of the arm, 2 or 3 [default: 2]"))
+        .arg(option("links", "N", "Number of links of the arm, 2 or 3, whatever ARM_SIM_LINKS says [default: 2]"))
         .arg(
             option("setpoint", "RADIANS", "Where a servo moves the joints, with commas between [default: 0.8,-0.6,0]")
                 .allow_hyphen_values(true),

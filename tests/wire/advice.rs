@@ -86,6 +86,12 @@ fn the_command_plans_and_refuses_like_the_service() {
     ]);
     assert_eq!(status, Some(0));
     assert!(out.contains("control period"), "{out}");
+    let (status, out, _) = run(&["--error", "1e300", "--duration", "0.1"]);
+    assert_eq!(status, Some(0));
+    assert!(
+        out.contains("for 0.1 s, end effector within 1e300 m:"),
+        "{out}"
+    );
     let (status, _, complaint) = run(&["--error", "0"]);
     assert_eq!(status, Some(2));
     assert!(
