@@ -26,12 +26,11 @@ fn suggested_gains_change_nothing_and_can_be_set() {
     let limits = client.ask("/study/stability", json!({}));
     assert_eq!(limits["minimum_over_poses_held"], found["timestep_limit"]);
 
-    let response = client.call("/study/gains", json!({"margin": 0.5}));
-    assert_eq!(response["result"], false);
-    assert!(
-        response["status"].as_str().unwrap().starts_with("margin"),
-        "{response}"
-    );
+    for margin in [0.5, 0.0, -1.0] {
+        let response = client.call("/study/gains", json!({"margin": margin}));
+        assert_eq!(response["result"], false);
+        assert_eq!(response["status"], "margin must be at least 1");
+    }
 }
 
 #[test]
