@@ -307,6 +307,16 @@ fn every_page_of_help_has_an_example_and_the_exit_statuses() {
     }
 }
 
+/// The controller is off at the start, and a goal would be waited for without end.
+#[test]
+fn the_examples_of_a_goal_begin_with_the_controller() {
+    let page = output(&["action", "send_goal", "--help"]);
+    let page = String::from_utf8(page.stdout).unwrap();
+    let examples = page.split_once("Examples:\n").unwrap().1;
+    let first = "  pendularm service call /pid_controller/enable '{data: true}'";
+    assert!(examples.starts_with(first), "{examples}");
+}
+
 #[test]
 fn completions_know_every_command_and_a_shell_can_read_them() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
