@@ -227,6 +227,10 @@ fn arguments_that_do_not_exist_are_refused_by_name() {
         let expected = format!("unknown argument {argument:?}; --help shows all of them");
         assert_eq!(refusal(&[argument], &[]), expected);
     }
+    for help in [&["help"][..], &["plan", "help"]] {
+        let expected = "help is an option, behind any command: use --help";
+        assert_eq!(refusal(help, &[]), expected);
+    }
     assert!(refusal(&["--speed=3"], &[]).starts_with("unknown argument \"--speed\""));
     assert!(refusal(&["--links", "2", "3"], &[]).starts_with("unknown argument \"3\""));
 }
