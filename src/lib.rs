@@ -8,7 +8,7 @@
 //!
 //! | feature | default | adds |
 //! | --- | --- | --- |
-//! | `runtime` | yes | `actors`, `protocol`, `options`, `logging`, `plan`, and the program |
+//! | `runtime` | yes | `actors`, `protocol`, `options`, `logging`, `output`, `plan`, and the program |
 //! | `web` | yes | `web`: HTTP, the WebSocket and the page |
 //! | `batch` | yes | `math::simulation::batch`: many arms in the lanes of the processor's registers |
 //! | `report` | yes | `report`, with its experiments |
@@ -39,6 +39,8 @@ pub mod logging;
 pub mod math;
 #[cfg(feature = "runtime")]
 pub mod options;
+#[cfg(feature = "runtime")]
+pub mod output;
 #[cfg(feature = "runtime")]
 pub mod plan;
 #[cfg(feature = "runtime")]

@@ -19,6 +19,7 @@ use pendularm::options;
 #[cfg(feature = "record")]
 use pendularm::options::ReplayOptions;
 use pendularm::options::{Options, Parsed};
+use pendularm::output;
 use pendularm::plan;
 #[cfg(feature = "record")]
 use pendularm::record;
@@ -80,9 +81,13 @@ fn main() -> ExitCode {
 
 /// Writes to standard output.
 fn show(text: &str) -> ExitCode {
-    // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
-    let _ = io::stdout().write_all(text.as_bytes());
-    ExitCode::SUCCESS
+    match output::print(text) {
+        Ok(_) => ExitCode::SUCCESS,
+        Err(error) => {
+            complain(&format_args!("standard output: {error}"));
+            ExitCode::FAILURE
+        }
+    }
 }
 
 /// How a command that asks a running one ends.
@@ -106,8 +111,11 @@ fn replay(options: &ReplayOptions) -> ExitCode {
         .and_then(|file| record::replay(BufReader::new(file)).map_err(|error| error.to_string()));
     match verdict {
         Ok(verdict) => {
-            show(&format!("{file}: {verdict}\n"));
-            ExitCode::from(u8::from(verdict.difference.is_some()))
+            let shown = show(&format!("{file}: {verdict}\n"));
+            match verdict.difference {
+                Some(_) => ExitCode::FAILURE,
+                None => shown,
+            }
         }
         Err(error) => {
             complain(&format_args!("{file}: {error}"));

@@ -6,6 +6,7 @@ use std::fmt::Write;
 
 use crate::math::arm::{Arm, State};
 use crate::math::pid::{Gains, Setpoint};
+use crate::math::shown::Shown;
 use crate::options::{Links, PlanOptions};
 use crate::study::control_loop::ControlLoop;
 use crate::study::planner::{PlanError, Planned, Planning, Task};
@@ -61,6 +62,7 @@ fn text<const N: usize>(task: &Task<N>, planned: &Planned) -> String {
     } else {
         format!("under control to {:?} rad", control.setpoint.position)
     };
+    let (duration, error) = (Shown(*duration), Shown(*error));
     let mut out = format!("{N} links {kind} for {duration} s, end effector within {error} m:\n");
     for one in planned.candidates.iter().rev() {
         // Writing to a string cannot fail.

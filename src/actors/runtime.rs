@@ -44,7 +44,7 @@ use crate::options::{Links, Options};
 #[cfg(feature = "record")]
 use crate::{
     actors::player::{self, NotReplayed},
-    actors::recorder::{EndRecord, NotRecorded, RecordTo, Recorder},
+    actors::recorder::{self, EndRecord, NotRecorded, RecordTo, Recorder},
 };
 #[cfg(feature = "web")]
 use crate::{
@@ -205,8 +205,10 @@ struct NodeEnds {
 
 #[cfg(feature = "record")]
 impl NodeEnds {
-    /// Begins the record that was asked for.
+    /// Begins the record that was asked for, and sees to it that clients can have theirs.
     async fn record(&self, options: &Options) -> Result<(), RunError> {
+        let folder = options.record.folder.as_deref();
+        folder.map(recorder::look_into).transpose()?;
         if let (Some(file), Some(recorder)) = (&options.record.file, &self.record) {
             // The recorder lives as long as the registry: it can't be gone.
             if let Ok(begun) = recorder.send(RecordTo(file.clone())).await {

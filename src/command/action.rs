@@ -33,7 +33,8 @@ pub(super) fn command() -> Command {
     let send = verb(
         "send_goal",
         "Send a goal, and wait for its end",
-        "Examples:\n  pendularm action send_goal /ik_action '{x: 1.2, y: 0.5}' --feedback\n  \
+        "Examples:\n  pendularm service call /pid_controller/enable '{data: true}'   # it moves the arm\n  \
+         pendularm action send_goal /ik_action '{x: 1.2, y: 0.5}' --feedback\n  \
          pendularm action send_goal --json /ik_action pendularm_interfaces/action/MoveTo '{\"x\": 1.2, \"y\": 0.5}'\n\n\
          It prints `result` and `status`, and before them each `feedback` if that is wanted. SIGINT cancels the goal \
          and waits for\nits end; the second ends at once. Status 0 is SUCCEEDED; CANCELED and ABORTED are 1.",

@@ -2,24 +2,24 @@
 //!
 //! **Invariant:** a reader that goes away ends the command quietly.
 
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, Write};
 
 use super::error::{CommandError, plain};
+use crate::output;
 
 /// Prints to standard output, at once.
 ///
 /// # Errors
 /// [`CommandError::Closed`] if nobody reads it any more, or the system's word.
 pub(super) fn print(text: &str) -> Result<(), CommandError> {
-    let mut out = io::stdout().lock();
-    let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
-    written.map_err(|why| match why.kind() {
-        ErrorKind::BrokenPipe => CommandError::Closed,
-        _ => CommandError::System {
+    match output::print(text) {
+        Ok(true) => Ok(()),
+        Ok(false) => Err(CommandError::Closed),
+        Err(why) => Err(CommandError::System {
             what: "standard output",
             why,
-        },
-    })
+        }),
+    }
 }
 
 /// A line on standard error. If that is broken there is nobody left to tell.

@@ -11,6 +11,7 @@ use super::asked::Asked;
 use super::error::{CommandError, plain};
 use super::output::print;
 use super::verbs::{required, subject, verb};
+use crate::protocol::ros::parameters::NO_SUCH;
 
 pub(super) fn command() -> Command {
     let node = || required("node", "NODE", "Whose parameter it is: /arm_sim");
@@ -102,8 +103,14 @@ fn call(asked: &Asked, service: &str, args: &Value) -> Result<ParameterAnswer, C
     let answer: ParameterAnswer = serde_json::from_str(values.get())
         .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))?;
     if answer.successful {
-        Ok(answer)
-    } else {
-        Err(CommandError::refused(&answer.reason))
+        return Ok(answer);
     }
+    Err(CommandError::refused(&match answer.reason.as_str() {
+        // In the words of a shell, and with the node.
+        NO_SUCH => format!(
+            "there is no parameter {}; `pendularm param list` has all",
+            args["name"]
+        ),
+        other => other.to_owned(),
+    }))
 }

@@ -15,7 +15,7 @@ use super::error::CommandError;
 use super::field::read_path;
 use super::output::print;
 use super::session::end_on_signal;
-use super::verbs::{flag, required, show_types, subject, typed_value, verb};
+use super::verbs::{flag, number, required, show_types, subject, typed_value, verb};
 
 /// How often `hz` says what it has measured.
 const REPORT: Duration = Duration::from_secs(1);
@@ -53,9 +53,9 @@ pub(super) fn command() -> Command {
          Once a second it prints the rate [1/s], and least, largest and standard deviation of the time between \
          two\nmessages [s].",
     );
-    let window = Arg::new("window").long("window").short('w');
+    let window = number("window", "N").short('w');
     let field = Arg::new("field").long("field").value_name("FIELD");
-    let times = Arg::new("times").long("times").short('n').value_name("N");
+    let times = number("times", "N").short('n');
     subject("topic", "Watch topics of a running pendularm, and publish").subcommands([
         list.arg(show_types()),
         echo.args([
@@ -73,7 +73,6 @@ pub(super) fn command() -> Command {
             topic(),
             type_name(),
             window
-                .value_name("N")
                 .value_parser(read_count)
                 .default_value("10000")
                 .help("How many of the last messages count"),
@@ -90,8 +89,8 @@ fn publisher() -> Command {
         Without --once or --times it publishes until SIGINT, and ends with status 0. MESSAGE is JSON or YAML; without \
         one it is {}.";
     let once = flag("once", "Publish one message and end").short('1');
-    let times = Arg::new("times").long("times").short('t').value_name("N");
-    let rate = Arg::new("rate").long("rate").short('r').value_name("HZ");
+    let times = number("times", "N").short('t');
+    let rate = number("rate", "HZ").short('r');
     verb("pub", "Publish a message, once or again and again", notes).args([
         once.conflicts_with("times"),
         times

@@ -24,8 +24,7 @@ pub(super) fn subject(name: &'static str, about: &'static str) -> Command {
 /// A command, with the options that all of them have. Its page ends with `notes`: examples, and how it behaves.
 pub(super) fn verb(name: &'static str, about: &'static str, notes: &str) -> Command {
     let option = |name: &'static str, value: &'static str, help: &'static str| {
-        let arg = Arg::new(name).long(name).value_name(value).help(help);
-        arg.help_heading("The runtime")
+        number(name, value).help(help).help_heading("The runtime")
     };
     let connect = option("connect", "HOST:PORT", "Where the runtime listens")
         .default_value("127.0.0.1:9095")
@@ -50,6 +49,12 @@ pub(super) fn verb(name: &'static str, about: &'static str, notes: &str) -> Comm
         .about(about)
         .after_help(format!("{notes}\n\n{STATUS}"))
         .args([json, connect, token, timeout])
+}
+
+/// An option whose value may begin with a hyphen if it is a number: its own refusal then says what is wrong with that.
+pub(super) fn number(name: &'static str, value: &'static str) -> Arg {
+    let arg = Arg::new(name).long(name).value_name(value);
+    arg.allow_negative_numbers(true)
 }
 
 /// A switch.

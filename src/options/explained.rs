@@ -27,6 +27,9 @@ pub(super) fn explained(error: &clap::Error) -> Result<String, UsageError> {
         ErrorKind::DisplayHelp | ErrorKind::DisplayVersion => {
             return Ok(error.to_string());
         }
+        ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand if argument == "help" => {
+            UsageError::Help
+        }
         ErrorKind::UnknownArgument | ErrorKind::InvalidSubcommand => {
             UsageError::UnknownArgument { argument }
         }

@@ -342,6 +342,7 @@ fn arguments(chosen: fn(&LaunchOption) -> bool) -> impl Iterator<Item = Arg> {
             .long(option)
             .value_name(value)
             .value_parser(OsStringValueParser::new())
+            .allow_negative_numbers(true)
             .help(StyledStr::from(format!(
                 "{about} [env: {variable}] [default: {default}]"
             )));

@@ -6,6 +6,7 @@ use clap::{Arg, ArgMatches, Command};
 
 use super::links::Links;
 use super::usage::{Origin, UsageError};
+use crate::study::planner::MAX_DURATION;
 
 /// The plan that is asked for.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,7 +29,8 @@ pub(super) const NAME: &str = "plan";
 /// The subcommand as `clap` is to read it.
 pub(super) fn command() -> Command {
     let option = |name: &'static str, value: &'static str, about: &'static str| {
-        Arg::new(name).long(name).value_name(value).help(about)
+        let arg = Arg::new(name).long(name).value_name(value).help(about);
+        arg.allow_negative_numbers(true)
     };
     Command::new(NAME)
         .about("Find the cheapest method and timestep for an allowed error, and run them against the truth")
@@ -38,7 +40,7 @@ pub(super) fn command() -> Command {
             "SECONDS",
             "How long the arm swings from its starting pose, or `servo` for a move under control [default: 10]",
         ))
-        .arg(option("links", "N", "Number of links of the arm, 2 or 3 [default: 2]"))
+        .arg(option("links", "N", "Number of links of the arm, 2 or 3, whatever ARM_SIM_LINKS says [default: 2]"))
         .arg(
             option("setpoint", "RADIANS", "Where a servo moves the joints, with commas between [default: 0.8,-0.6,0]")
                 .allow_hyphen_values(true),
@@ -67,8 +69,15 @@ pub(super) fn read(matches: &ArgMatches) -> Result<PlanOptions, UsageError> {
             });
         }
     };
+    let is_servo = given("duration") == Some("servo");
     let mut setpoint = vec![0.8, -0.6, 0.0];
     if let Some(text) = given("setpoint") {
+        if !is_servo {
+            // A free arm has none: it would be left out of account.
+            return Err(UsageError::UnknownArgument {
+                argument: "--setpoint without --duration servo".to_owned(),
+            });
+        }
         let joints: Result<Vec<f64>, _> = text.split(',').map(|one| one.trim().parse()).collect();
         setpoint = joints
             .ok()
@@ -85,10 +94,17 @@ pub(super) fn read(matches: &ArgMatches) -> Result<PlanOptions, UsageError> {
         None | Some("servo") => None,
         Some(text) => Some(positive("duration", text)?),
     };
+    if duration.is_some_and(|duration| duration > MAX_DURATION) {
+        return Err(UsageError::Value {
+            argument: "--duration".to_owned(),
+            needs: format!("must be at most {MAX_DURATION} s"),
+            value: given("duration").unwrap_or_default().to_owned(),
+        });
+    }
     Ok(PlanOptions {
         error: positive("error", given("error").unwrap_or_default())?,
         duration,
-        is_servo: given("duration") == Some("servo"),
+        is_servo,
         links,
         setpoint,
     })

@@ -23,7 +23,7 @@ pub(super) const RECORD_DIR: LaunchOption = LaunchOption {
     option: "record-dir",
     variable: "ARM_SIM_RECORD_DIR",
     value: "FOLDER",
-    about: "Folder in which clients may have runs recorded, by /recorder/start",
+    about: "Folder in which clients may have runs recorded, by /recorder/start; it has to be there",
     default: "none",
     is_switch: false,
 };

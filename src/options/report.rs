@@ -5,7 +5,7 @@
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-use clap::builder::OsStringValueParser;
+use clap::builder::{OsStringValueParser, PossibleValuesParser};
 use clap::{Arg, ArgAction, ArgMatches, Command};
 
 use crate::report::{self, ReportOptions};
@@ -37,7 +37,9 @@ pub(super) fn command() -> Command {
                     report::names()
                 ),
             )
-            .value_delimiter(','),
+            .value_delimiter(',')
+            .value_parser(PossibleValuesParser::new(report::sections()))
+            .hide_possible_values(true),
         )
         .arg(
             Arg::new("quick")

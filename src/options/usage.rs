@@ -35,6 +35,9 @@ pub enum UsageError {
         /// The argument as it was given.
         argument: String,
     },
+    /// The word `help`.
+    #[error("help is an option, behind any command: use --help")]
+    Help,
     /// An option at the end, or before another option.
     #[error("{option} needs a value")]
     MissingValue {

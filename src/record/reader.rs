@@ -4,7 +4,7 @@
 //! that was recorded by another is left out.
 
 use std::collections::HashMap;
-use std::io::Read;
+use std::io::{self, Read};
 
 use mcap::McapError;
 use mcap::io::MessageReader;
@@ -43,9 +43,12 @@ pub enum RecordEnding {
 /// Why a file can't be read on.
 #[derive(Debug, thiserror::Error)]
 pub enum ReadError {
+    /// The system can't read it.
+    #[error(transparent)]
+    File(io::Error),
     /// It is no MCAP file, or damaged.
     #[error("not a record: {0}")]
-    Mcap(#[from] McapError),
+    Mcap(McapError),
     /// A message that its definition does not fit.
     #[error("{topic}: {why}")]
     Message {
@@ -54,6 +57,15 @@ pub enum ReadError {
         /// The fault.
         why: CdrError,
     },
+}
+
+impl From<McapError> for ReadError {
+    fn from(error: McapError) -> Self {
+        match error {
+            McapError::Io(error) => Self::File(error),
+            error => Self::Mcap(error),
+        }
+    }
 }
 
 /// A record that is being read.

@@ -304,7 +304,7 @@ impl<R: Read + Seek> Reel<R> {
             let file = &mut self.file;
             file.seek(SeekFrom::Start(place.offset))
                 .and_then(|_| file.read_exact(&mut chunk))
-                .map_err(McapError::Io)?;
+                .map_err(ReadError::File)?;
             let mut moments = Vec::new();
             let mut latest = place.from;
             for record in records(&chunk)? {
@@ -367,7 +367,7 @@ fn read_some(file: &mut impl Read, into: &mut [u8]) -> Result<usize, ReadError> 
     loop {
         match file.read(into) {
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            read => return Ok(read.map_err(McapError::Io)?),
+            read => return read.map_err(ReadError::File),
         }
     }
 }

@@ -52,6 +52,14 @@ pub enum ReportError {
         /// The name.
         name: String,
     },
+    /// A section that is kept, and whose file cannot be read.
+    #[error("cannot read {}: {error}; --only with its name makes it anew", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// The fault.
+        error: io::Error,
+    },
     /// A file or directory that cannot be written.
     #[error("cannot write {}: {error}", path.display())]
     Write {
@@ -62,17 +70,21 @@ pub enum ReportError {
     },
 }
 
-/// The sections' names, in order, with commas between.
+/// The sections' names, in order.
+pub fn sections() -> impl Iterator<Item = &'static str> {
+    SECTIONS.iter().map(|section| section.name)
+}
+
+/// The same, with commas between.
 #[must_use]
 pub fn names() -> String {
-    let all: Vec<&str> = SECTIONS.iter().map(|section| section.name).collect();
-    all.join(", ")
+    sections().collect::<Vec<_>>().join(", ")
 }
 
 /// Makes the report and answers the page's path.
 ///
 /// # Errors
-/// A section that does not exist, or a file that cannot be written.
+/// A section that does not exist, one that is kept and cannot be read, or a file that cannot be written.
 pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     for name in &options.only {
         if !SECTIONS.iter().any(|section| section.name == name) {
@@ -87,6 +99,10 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     })?;
     let wanted =
         |name: &str| options.only.is_empty() || options.only.iter().any(|only| only == name);
+    let mut others = Vec::new();
+    for maker in SECTIONS.iter().filter(|maker| !wanted(maker.name)) {
+        others.extend(read(&kept.join(format!("{}.json", maker.name)))?);
+    }
     let weight = |maker: &Maker| if options.quick { 1.0 } else { maker.weight };
     let makers = || SECTIONS.iter().filter(|maker| wanted(maker.name));
     let progress = Mutex::new(ProgressBar::new(makers().map(weight).sum()));
@@ -100,9 +116,8 @@ pub fn run(options: &ReportOptions) -> Result<PathBuf, ReportError> {
     })?;
     let mut sections = Vec::new();
     for maker in SECTIONS {
-        let section = made.iter().find(|section| section.name == maker.name);
-        let kept = || read(&kept.join(format!("{}.json", maker.name)));
-        sections.extend(section.cloned().or_else(kept));
+        let mut all = made.iter().chain(&others);
+        sections.extend(all.find(|section| section.name == maker.name).cloned());
     }
     let page = options.out.join("index.html");
     write(&page, &html::page(&sections, &machine))?;
@@ -237,8 +252,16 @@ fn rows(table: &Table) -> Value {
     })
 }
 
-fn read(path: &Path) -> Option<Section> {
-    serde_json::from_str(&fs::read_to_string(path).ok()?).ok()
+/// The section in that file; none if it has not been made yet.
+fn read(path: &Path) -> Result<Option<Section>, ReportError> {
+    match fs::read_to_string(path).and_then(|text| Ok(serde_json::from_str(&text)?)) {
+        Ok(section) => Ok(Some(section)),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
+        Err(error) => Err(ReportError::Read {
+            path: path.to_owned(),
+            error,
+        }),
+    }
 }
 
 /// Writes beside the file first, so that there is always a whole one.

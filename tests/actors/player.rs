@@ -530,8 +530,9 @@ fn a_record_waits_for_its_subscribers() {
         assert!((1..=8).contains(&underway), "{underway}");
         for n in 0..300 {
             let rate = if n % 2 == 0 { MAX_RATE } else { -MAX_RATE };
-            stage::asked(&player, DriveRecord::Rate(rate)).await;
-            stage::asked(&player, DriveRecord::Seek(ms(n))).await;
+            for drive in [DriveRecord::Rate(rate), DriveRecord::Seek(ms(n))] {
+                stage::asked(&player, drive).await.unwrap();
+            }
             sleep(ms(10)).await;
         }
         assert_eq!(come.get(), underway);
@@ -552,7 +553,8 @@ fn who_subscribes_over_and_over_has_the_record_searched_once_a_tick() {
         let path = on_disk("over-and-over", &file(&entries));
         let record = PlayedRecord::<2>::open(fs::File::open(path).unwrap()).unwrap();
         let player = Player::new(record, taking.start().recipient()).start();
-        stage::asked(&player, DriveRecord::Pause(true)).await;
+        let paused = stage::asked(&player, DriveRecord::Pause(true)).await;
+        assert!(paused.unwrap().is_paused);
         let interest = async |topic, wanted| {
             player.send(Interest { topic, wanted }).await.unwrap();
             tokio::task::yield_now().await;
@@ -569,6 +571,29 @@ fn who_subscribes_over_and_over_has_the_record_searched_once_a_tick() {
         let before = come.get();
         sleep(ms(20)).await;
         assert_eq!(come.get(), before + 2);
+    });
+}
+
+#[test]
+fn a_place_that_cannot_be_read_any_more_is_not_gone_to() {
+    let entries = in_virtual_time(run());
+    in_virtual_time(async {
+        let show = Show::of("shrunk", &entries).await;
+        let mut client = show.connect();
+        let played = Path::new(env!("CARGO_TARGET_TMPDIR")).join("player-shrunk.mcap");
+        let played = fs::File::options().write(true).open(played).unwrap();
+        played.set_len(100).unwrap();
+        let time = json!({"time": {"sec": 1, "nanosec": 0}});
+        let refused = client.call("/rosbag2_player/seek", time).await;
+        assert_eq!(refused["result"], false, "{refused}");
+        let why = refused["status"].as_str().unwrap();
+        assert!(
+            why.starts_with("the record cannot be read there: "),
+            "{why}"
+        );
+        let stands = drive(&mut client, "is_paused", json!({})).await;
+        assert_eq!(stands, json!({"paused": true}));
+        assert!(position(&mut client).await < 1.0);
     });
 }
 

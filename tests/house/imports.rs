@@ -14,18 +14,19 @@ use std::path::{Path, PathBuf};
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 
 /// Floors that a floor may name, besides itself: each row only rows above it.
-const FLOORS: [(&str, &[&str]); 13] = [
+const FLOORS: [(&str, &[&str]); 14] = [
     ("math", &[]),
     ("protocol", &[]),
     ("logging", &["protocol"]),
+    ("output", &[]),
     ("study", &["math"]),
     ("record", &["math", "protocol"]),
     ("web", &["protocol"]),
     ("report", &["math", "study"]),
-    ("command", &["protocol"]),
+    ("command", &["protocol", "output"]),
     (
         "options",
-        &["protocol", "web", "report", "command", "logging"],
+        &["protocol", "study", "web", "report", "command", "logging"],
     ),
     ("plan", &["math", "study", "options"]),
     (
@@ -38,7 +39,7 @@ const FLOORS: [(&str, &[&str]); 13] = [
     (
         "main",
         &[
-            "command", "logging", "record", "report", "options", "plan", "actors",
+            "command", "logging", "output", "record", "report", "options", "plan", "actors",
         ],
     ),
 ];

@@ -87,6 +87,21 @@ fn a_section_made_anew_keeps_the_others() {
     assert_eq!(first, kept);
 }
 
+/// Made by another version, or cut: left out without a word it would be missed late.
+#[test]
+fn a_kept_section_that_cannot_be_read_is_told_by_its_file() {
+    let scratch = Scratch::new("unreadable");
+    let kept = scratch.0.join("sections/drift.json");
+    fs::create_dir_all(kept.parent().unwrap()).unwrap();
+    fs::write(&kept, "{}").unwrap();
+    let error = run(&quick(&scratch.0, &["conditioning"])).unwrap_err();
+    let said = error.to_string();
+    assert!(said.contains(kept.to_str().unwrap()), "{said}");
+    assert!(said.contains("missing field"), "{said}");
+    // Before anything is made, which takes minutes.
+    assert!(!scratch.0.join("sections/conditioning.json").exists());
+}
+
 #[test]
 fn an_unknown_section_is_refused_with_the_names_of_all() {
     let scratch = Scratch::new("unknown");

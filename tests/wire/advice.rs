@@ -26,12 +26,11 @@ fn suggested_gains_change_nothing_and_can_be_set() {
     let limits = client.ask("/study/stability", json!({}));
     assert_eq!(limits["minimum_over_poses_held"], found["timestep_limit"]);
 
-    let response = client.call("/study/gains", json!({"margin": 0.5}));
-    assert_eq!(response["result"], false);
-    assert!(
-        response["status"].as_str().unwrap().starts_with("margin"),
-        "{response}"
-    );
+    for margin in [0.5, 0.0, -1.0] {
+        let response = client.call("/study/gains", json!({"margin": margin}));
+        assert_eq!(response["result"], false);
+        assert_eq!(response["status"], "margin must be at least 1");
+    }
 }
 
 #[test]
@@ -86,6 +85,12 @@ fn the_command_plans_and_refuses_like_the_service() {
     ]);
     assert_eq!(status, Some(0));
     assert!(out.contains("control period"), "{out}");
+    let (status, out, _) = run(&["--error", "1e300", "--duration", "0.1"]);
+    assert_eq!(status, Some(0));
+    assert!(
+        out.contains("for 0.1 s, end effector within 1e300 m:"),
+        "{out}"
+    );
     let (status, _, complaint) = run(&["--error", "0"]);
     assert_eq!(status, Some(2));
     assert!(

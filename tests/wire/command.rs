@@ -392,11 +392,14 @@ fn parameters_are_told_as_they_can_be_set_again() {
         json_of(&runtime, &["param", "get", "/arm_sim", "integrator"]),
         "verlet"
     );
-    let unknown = refusal(&runtime, &["param", "get", "/arm_sim", "colour"], 1);
-    assert!(
-        unknown.contains("name must be that of a parameter"),
-        "{unknown}"
-    );
+    for (node, name) in [("/arm_sim", "colour"), ("/nope", "gravity")] {
+        let full = format!("{node}:{name}");
+        let expected = format!("there is no parameter {full:?}; `pendularm param list` has all");
+        let get = ["param", "get", node, name];
+        assert_eq!(refusal(&runtime, &get, 1), expected);
+        let set = ["param", "set", node, name, "1"];
+        assert_eq!(refusal(&runtime, &set, 1), expected);
+    }
     let wrong = refusal(
         &runtime,
         &["param", "set", "/arm_sim", "gravity", "heavy"],

@@ -60,6 +60,24 @@ fn without_a_runtime_the_status_is_3() {
     }
 }
 
+#[test]
+fn a_negative_number_is_refused_by_its_option() {
+    for (arguments, option) in [
+        (
+            &["topic", "list", "--timeout", "-1"][..],
+            "--timeout <SECONDS>",
+        ),
+        (&["topic", "echo", "/clock", "-n", "-1"], "--times <N>"),
+        (&["topic", "hz", "/clock", "-w", "-1"], "--window <N>"),
+        (&["topic", "pub", "/chatter", "-t", "-1"], "--times <N>"),
+        (&["topic", "pub", "/chatter", "-r", "-1.5"], "--rate <HZ>"),
+    ] {
+        let said = complaint(&output(arguments), 2);
+        assert!(said.contains(&format!("{option} must be ")), "{said}");
+        assert!(said.contains("got \"-1"), "{said}");
+    }
+}
+
 /// A server that says these bytes to whoever comes, and then closes or says nothing more.
 fn server(says: &'static [u8], closes: bool) -> SocketAddr {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
@@ -287,6 +305,16 @@ fn every_page_of_help_has_an_example_and_the_exit_statuses() {
         let widest = page.lines().map(|line| line.chars().count()).max();
         assert!(widest <= Some(125), "{page}");
     }
+}
+
+/// The controller is off at the start, and a goal would be waited for without end.
+#[test]
+fn the_examples_of_a_goal_begin_with_the_controller() {
+    let page = output(&["action", "send_goal", "--help"]);
+    let page = String::from_utf8(page.stdout).unwrap();
+    let examples = page.split_once("Examples:\n").unwrap().1;
+    let first = "  pendularm service call /pid_controller/enable '{data: true}'";
+    assert!(examples.starts_with(first), "{examples}");
 }
 
 #[test]

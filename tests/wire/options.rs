@@ -179,7 +179,11 @@ fn a_seed_is_any_number_of_64_bits() {
         );
         assert_eq!(refusal(&[], &[("ARM_SIM_SEED", value)]), expected);
     }
-    assert!(refusal(&["--seed=-1"], &[]).starts_with("--seed must be"));
+    for negative in [&["--seed=-1"][..], &["--seed", "-1"]] {
+        let refused = refusal(negative, &[]);
+        assert!(refused.starts_with("--seed must be"), "{refused}");
+        assert!(refused.ends_with("got \"-1\""), "{refused}");
+    }
 }
 
 #[test]
@@ -223,6 +227,10 @@ fn arguments_that_do_not_exist_are_refused_by_name() {
         let expected = format!("unknown argument {argument:?}; --help shows all of them");
         assert_eq!(refusal(&[argument], &[]), expected);
     }
+    for help in [&["help"][..], &["plan", "help"]] {
+        let expected = "help is an option, behind any command: use --help";
+        assert_eq!(refusal(help, &[]), expected);
+    }
     assert!(refusal(&["--speed=3"], &[]).starts_with("unknown argument \"--speed\""));
     assert!(refusal(&["--links", "2", "3"], &[]).starts_with("unknown argument \"3\""));
 }
@@ -244,6 +252,35 @@ fn a_report_is_asked_for_with_its_directory_its_sections_and_its_haste() {
     assert_eq!(all.only, ["error", "budget"]);
     assert!(refusal(&["--links", "2", "report"], &[]).starts_with("unknown argument \"--links\""));
     assert!(refusal(&["report", "--speed"], &[]).starts_with("unknown argument \"--speed\""));
+    for (names, wrong) in [("error,colour", "colour"), ("", "")] {
+        let refused = refusal(&["report", "--only", names], &[]);
+        let known = pendularm::report::names();
+        let expected = format!("--only <NAMES> must be one of {known}, got {wrong:?}");
+        assert_eq!(refused, expected);
+    }
+}
+
+#[test]
+fn a_plan_is_asked_for_with_what_can_be_planned() {
+    let plan = |more: &[&'static str]| [&["plan", "--error", "0.01"], more].concat();
+    assert!(parse(&plan(&["--duration", "1000"]), &[]).is_ok());
+    assert!(parse(&plan(&["--duration=servo", "--setpoint", "-1,2"]), &[]).is_ok());
+    for free in [
+        &["--setpoint", "1,2"][..],
+        &["--setpoint=1,2", "--duration=2"],
+    ] {
+        let refused = refusal(&plan(free), &[]);
+        let expected = "unknown argument \"--setpoint without --duration servo\"";
+        assert!(refused.starts_with(expected), "{refused}");
+    }
+    assert_eq!(
+        refusal(&plan(&["--duration", "-1"]), &[]),
+        "--duration must be a number greater than 0, got \"-1\""
+    );
+    assert_eq!(
+        refusal(&plan(&["--duration", "5000"]), &[]),
+        "--duration must be at most 1000 s, got \"5000\""
+    );
 }
 
 #[test]
@@ -554,26 +591,47 @@ fn help_and_version_go_to_standard_output_with_status_0() {
     }
 }
 
-/// Every write to `/dev/full` fails, as one to a pipe that nobody holds any more does.
+/// Every write to `/dev/full` fails.
+#[cfg(target_os = "linux")]
+fn full() -> Stdio {
+    let full = std::fs::File::options().write(true).open("/dev/full");
+    Stdio::from(full.unwrap())
+}
+
 #[cfg(target_os = "linux")]
 #[test]
-fn standard_streams_that_take_nothing_change_no_exit_status() {
-    let full = || {
-        Stdio::from(
-            std::fs::File::options()
-                .write(true)
-                .open("/dev/full")
-                .unwrap(),
-        )
-    };
+fn output_that_is_lost_is_a_failure() {
+    for arguments in [
+        &["--help"][..],
+        &["--version"],
+        &["plan", "--error", "0.1", "--duration", "0.1"],
+        #[cfg(feature = "cli")]
+        &["completions", "bash"],
+    ] {
+        let output = program(arguments).stdout(full()).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(said.starts_with("pendularm: standard output: "), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn a_reader_that_is_gone_is_no_failure() {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = program(&["--help"]).stdout(writer).output().unwrap();
+    assert_eq!((output.status.code(), output.stderr), (Some(0), vec![]));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_complaint_that_nobody_takes_changes_no_exit_status() {
     let status = |arguments: &[&str]| {
-        program(arguments)
-            .stdout(full())
-            .stderr(full())
-            .status()
-            .unwrap()
-            .code()
+        let mut program = program(arguments);
+        program.stdout(full()).stderr(full());
+        program.status().unwrap().code()
     };
-    assert_eq!(status(&["--help"]), Some(0));
+    assert_eq!(status(&["--help"]), Some(1));
     assert_eq!(status(&["--links", "4"]), Some(2));
 }

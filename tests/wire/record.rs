@@ -212,7 +212,8 @@ fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
         text(&there),
     ]);
     assert_eq!(status, Some(1));
-    assert!(said.contains("cannot record: there.mcap: "), "{said}");
+    let named = format!("cannot record: {}: ", there.display());
+    assert!(said.contains(&named), "{said}");
     assert_eq!(fs::read_to_string(&there).unwrap(), "precious");
 
     let (status, said) = run(&["replay", text(&there)]);
@@ -221,8 +222,26 @@ fn what_cannot_be_recorded_or_replayed_is_refused_with_the_files_name() {
     let (status, said) = run(&["replay", text(&folder.join("nowhere.mcap"))]);
     assert_eq!(status, Some(1));
     assert!(said.contains("nowhere.mcap: "), "{said}");
+    let (status, said) = run(&["replay", text(&folder)]);
+    assert_eq!(status, Some(1));
+    let cause = format!("{}: Is a directory", folder.display());
+    assert!(said.contains(&cause), "{said}");
     let (status, _) = run(&["replay"]);
     assert_eq!(status, Some(2));
+}
+
+#[test]
+fn a_folder_that_is_none_is_refused_at_the_start() {
+    let folder = folder("no-folder");
+    let file = folder.join("file");
+    fs::write(&file, "").unwrap();
+    for none in [&folder.join("missing"), &file] {
+        let bind = ["--bind", "127.0.0.1:0", "--log", "off"];
+        let (status, said) = run(&[&bind[..], &["--record-dir", text(none)]].concat());
+        assert_eq!(status, Some(1));
+        let named = format!("cannot record: {}: ", none.display());
+        assert!(said.contains(&named), "{said}");
+    }
 }
 
 #[test]

@@ -90,7 +90,8 @@ impl<const N: usize> Handler<Call<Pause>> for Player<N> {
     fn handle(&mut self, call: Call<Pause>, ctx: &mut Context<Self>) {
         let Call { ask, reply } = call;
         if let Some(paused) = ask.paused {
-            self.drive(DriveRecord::Pause(paused), ctx);
+            // Only a place that is sought can be refused.
+            let _ = self.drive(DriveRecord::Pause(paused), ctx);
         }
         reply.conclude(Echo {
             values: self.state().is_paused,

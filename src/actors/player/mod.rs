@@ -166,15 +166,15 @@ impl<const N: usize> Actor for Player<N> {
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
 impl Ask for DriveRecord {
-    type Answer = PlayerState;
+    type Answer = Result<PlayerState, ReadError>;
 }
 
 impl<const N: usize> Handler<Call<DriveRecord>> for Player<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<DriveRecord>, ctx: &mut Context<Self>) {
-        self.drive(call.ask, ctx);
-        call.reply.conclude(self.state());
+        let driven = self.drive(call.ask, ctx);
+        call.reply.conclude(driven.map(|()| self.state()));
     }
 }
 
@@ -218,7 +218,7 @@ impl<const N: usize> Handler<SimulationTime> for Player<N> {
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
 impl<const N: usize> Player<N> {
-    fn drive(&mut self, how: DriveRecord, ctx: &mut Context<Self>) {
+    fn drive(&mut self, how: DriveRecord, ctx: &mut Context<Self>) -> Result<(), ReadError> {
         self.tick();
         self.go_on(ctx);
         match how {
@@ -229,10 +229,11 @@ impl<const N: usize> Player<N> {
                 // It may be the other way from here.
                 self.target = None;
             }
-            DriveRecord::Seek(to) => self.seek(to),
+            DriveRecord::Seek(to) => self.seek(to)?,
             DriveRecord::Look => {}
         }
         self.go_on(ctx);
+        Ok(())
     }
 
     fn state(&self) -> PlayerState {
@@ -246,13 +247,13 @@ impl<const N: usize> Player<N> {
 
     /// A record that can't be read on stands still.
     fn attempt<T>(&mut self, what: impl FnOnce(&mut Self) -> Result<T, ReadError>) -> Option<T> {
-        what(self)
-            .inspect_err(|error| {
-                tracing::error!(%error, "the record stands still");
-                self.is_paused = true;
-                self.target = None;
-            })
-            .ok()
+        what(self).inspect_err(|error| self.stand_still(error)).ok()
+    }
+
+    fn stand_still(&mut self, error: &ReadError) {
+        tracing::error!(%error, "the record stands still");
+        self.is_paused = true;
+        self.target = None;
     }
 
     /// Whether there is nothing more to come in the direction in which it goes.
@@ -264,17 +265,21 @@ impl<const N: usize> Player<N> {
         }
     }
 
-    fn seek(&mut self, to: Duration) {
+    /// Goes there, unless the record can't be read there.
+    fn seek(&mut self, to: Duration) -> Result<(), ReadError> {
         let to = u64::try_from(to.as_nanos()).unwrap_or(u64::MAX);
-        self.position = to.min(self.tape.reel.duration());
+        let to = to.min(self.tape.reel.duration());
+        let wound = self.tape.reel.wind(to);
+        wound.inspect_err(|error| self.stand_still(error))?;
+        self.position = to;
         self.target = None;
         self.forget_owed();
         // All have come to another place.
         self.fresh.clone_from(&self.wanted);
-        self.attempt(|player| player.tape.reel.wind(player.position));
         // The first place that is sought is looked at now, whoever has come before; another at the next tick.
         self.has_looked &= std::mem::replace(&mut self.has_sought, true);
         self.owe_fresh();
+        Ok(())
     }
 
     /// The arm's settings as they were.

@@ -17,6 +17,7 @@ use crate::protocol::catalog::{Playback, Service, Topic};
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::op::follow::seconds;
+use crate::record::ReadError;
 
 /// Longest time that can be asked for \[s\]: a record of ten thousand years ends earlier.
 const MAX_TIME: f64 = 1e11;
@@ -91,7 +92,11 @@ fn read_time(fields: &mut Fields<'_>) -> Option<Duration> {
 }
 
 impl Answered for DriveRecord {
-    fn write(state: PlayerState, to: &Address) -> Bytes {
+    fn write(driven: Result<PlayerState, ReadError>, to: &Address) -> Bytes {
+        let state = match driven {
+            Ok(state) => state,
+            Err(why) => return to.failure(&format!("the record cannot be read there: {why}")),
+        };
         let service = Service::from_name(to.name());
         let values = match service {
             Some(Service::Playback(Playback::IsPaused)) => json!({"paused": state.is_paused}),

@@ -87,7 +87,7 @@ pub enum NotRecorded {
     /// The file can't be written.
     #[error("{file}: {why}")]
     File {
-        /// The file's name.
+        /// The file's name, or the operator's path.
         file: String,
         /// The system's reason.
         why: String,

@@ -9,6 +9,7 @@ mod messages;
 mod tape;
 mod wire;
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use actix::prelude::*;
@@ -221,6 +222,19 @@ impl<const N: usize> Recorder<N> {
         };
         ends.into_actor(self)
     }
+}
+
+/// Looks into the folder in which clients may have records made, as is done before each of them.
+///
+/// # Errors
+/// The system's word, if that is no folder.
+pub fn look_into(folder: &Path) -> Result<(), NotRecorded> {
+    fs::read_dir(folder)
+        .map(drop)
+        .map_err(|why| NotRecorded::File {
+            file: folder.display().to_string(),
+            why: why.to_string(),
+        })
 }
 
 /// The place of a client's record: the file's name, and all about the file.

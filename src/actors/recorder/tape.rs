@@ -65,7 +65,7 @@ pub(super) fn begin(
         .spawn(move || {
             let scribe = open(&target).and_then(|file| {
                 Scribe::new(io::BufWriter::new(file), &settings)
-                    .map_err(|why| failure(&target.path, &why))
+                    .map_err(|why| failure(&target, &why))
             });
             let scribe = match scribe {
                 Ok(scribe) => scribe,
@@ -100,7 +100,7 @@ pub(super) fn file_name(path: &Path) -> String {
 
 /// Makes the file, which must not be there: no record is ever overwritten.
 fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
-    let refused = |why: io::Error| failure(&target.path, &why);
+    let refused = |why: io::Error| failure(target, &why);
     if let (Some(_), Some(folder)) = (target.limit, target.path.parent()) {
         let records = fs::read_dir(folder)
             .map_err(refused)?
@@ -113,9 +113,14 @@ fn open(target: &TapeTarget) -> Result<File, NotRecorded> {
     File::create_new(&target.path).map_err(refused)
 }
 
-fn failure(path: &Path, why: &impl ToString) -> NotRecorded {
+/// The operator is told of the file as he gave it; where the folder of clients lies is not theirs to know.
+fn failure(target: &TapeTarget, why: &impl ToString) -> NotRecorded {
+    let path = &target.path;
     NotRecorded::File {
-        file: file_name(path),
+        file: match target.limit {
+            Some(_) => file_name(path),
+            None => path.display().to_string(),
+        },
         why: why.to_string(),
     }
 }

@@ -32,6 +32,9 @@ table! {
     }
 }
 
+/// The answer about a parameter that is none.
+pub const NO_SUCH: &str = "name must be that of a parameter; get_param_names lists them";
+
 /// Parameters that one call of a parameter service may name: each several times over.
 pub const MAX_NAMED: usize = 64;
 

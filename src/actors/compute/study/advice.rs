@@ -118,7 +118,7 @@ impl<const N: usize> Callable for SuggestGains<N> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
             settling_time: fields.number("settling_time", Bound::Positive),
-            margin: fields.number("margin", Bound::Positive),
+            margin: fields.number("margin", Bound::Finite),
             timestep: fields.number("timestep", Bound::Positive),
             method: fields.choice("integrator", &Method::ALL, Method::name),
             params: fields.object("params", SetParams::of),

@@ -17,12 +17,10 @@ use crate::protocol::catalog::{self, Service};
 use crate::protocol::messages::Stamp;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, Rejections};
-use crate::protocol::ros::parameters::Parameter;
+use crate::protocol::ros::parameters::{NO_SUCH, Parameter};
 use crate::protocol::ros::rosapi;
 use crate::protocol::ros::rosapi::Census;
 use crate::protocol::wire::json;
-
-const NO_SUCH: &str = "name must be that of a parameter; get_param_names lists them";
 
 /// A question about what there is: topics, services, nodes and types.
 #[derive(Debug, Clone, PartialEq, Eq)]
