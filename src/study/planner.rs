@@ -185,7 +185,9 @@ impl<const N: usize> Planning<N> {
         let fineness = if task.control.is_free() {
             // So much of half a turn moves the end effector of the stretched arm by the part of the error.
             let reach = task.control.arm.reach();
-            Fineness::Tolerance(PART_OF_TRUTH * task.error / (PI * reach))
+            let tolerance = PART_OF_TRUTH * task.error / (PI * reach);
+            // The one that it is compared with first must be finer.
+            Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
             Fineness::Steps(4)
         };
