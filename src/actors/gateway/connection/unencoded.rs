@@ -2,16 +2,15 @@
 //!
 //! **Invariant:** at most [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
 
-use std::collections::VecDeque;
-
 use crate::actors::gateway::messages::Deliver;
+use crate::protocol::outbox::blocks::Blocks;
 use crate::protocol::outbox::{MAX_TOPIC_BYTES, PLACE_BYTES};
 use crate::protocol::wire::series;
 
 /// The messages of one connection that wait.
 #[derive(Default)]
 pub(super) struct Unencoded {
-    waiting: VecDeque<Deliver>,
+    waiting: Blocks<Deliver>,
     /// Their bytes, as they came.
     bytes: usize,
     /// Whether there is a task at work.
@@ -47,5 +46,35 @@ impl Unencoded {
         let message = self.waiting.pop_front()?;
         self.bytes -= message.frames.plain().len();
         Some(message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+    use crate::actors::gateway::messages::Frames;
+
+    /// Nobody is charged for places that nothing takes.
+    #[test]
+    fn the_places_go_with_the_messages() {
+        let mut unencoded = Unencoded::default();
+        for _ in 0..20_000 {
+            let message = Deliver {
+                topic: "/t".into(),
+                frames: Frames::Plain(Bytes::from_static(b"x")),
+                underway: None,
+            };
+            unencoded.push(message);
+        }
+        for left in [1, 0] {
+            while unencoded.size().0 > left {
+                unencoded.pop();
+            }
+            let places = unencoded.waiting.places();
+            assert!(places <= 128, "{places} for {left}");
+        }
+        const { assert!(size_of::<Deliver>() <= PLACE_BYTES) };
     }
 }
