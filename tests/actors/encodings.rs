@@ -38,8 +38,23 @@ async fn next_message(peer: &mut Peer) -> (Value, u64) {
     }
 }
 
+async fn publish_long(peer: &mut Peer, topic: &str) {
+    let msg = json!({"pad": "x".repeat(2000)});
+    peer.send(json!({"op": "publish", "topic": topic, "msg": msg}))
+        .await;
+}
+
+/// Bytes of the pieces that the next message comes in.
+async fn piece_of(peer: &mut Peer) -> usize {
+    let first = peer.receive().await;
+    for _ in 1..first["total"].as_u64().unwrap() {
+        peer.receive().await;
+    }
+    first["data"].as_str().unwrap().len()
+}
+
 #[test]
-fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_is_refused() {
+fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_counts_as_the_power_of_two_below() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut peers = Vec::new();
@@ -51,46 +66,31 @@ fn a_topic_is_cut_up_in_so_many_sizes_and_one_more_is_refused() {
             );
             peers.push(peer);
         }
-        let mut late = gateway.connect(WIDE);
-        let refused = subscribe_in_pieces(&mut late, 99).await;
-        assert_eq!(refused["level"], "error");
-        assert!(
-            refused["msg"]
-                .as_str()
-                .unwrap()
-                .starts_with("fragment_size"),
-            "{refused}"
-        );
-        assert_eq!(
-            subscribe_in_pieces(&mut late, 100).await["level"],
-            "info",
-            "one that is in use"
-        );
-        late.send(json!({"op": "unsubscribe", "topic": "/t"})).await;
-        late.subscribe("/t").await;
+        let mut publisher = gateway.connect(WIDE);
+        publisher.advertise("/t").await;
+        let mut late = [99, 110, 127, 128, 500, 99, 600].map(|size| (size, gateway.connect(WIDE)));
+        for (size, late) in &mut late {
+            assert_eq!(subscribe_in_pieces(late, *size).await["level"], "info");
+        }
+        publish_long(&mut publisher, "/t").await;
+        let cut_in = [64, 110, 64, 128, 256, 64, 512];
+        for ((_, late), piece) in late.iter_mut().zip(cut_in) {
+            assert_eq!(piece_of(late).await, piece);
+        }
+        assert_eq!(piece_of(&mut peers[5]).await, 105);
+        let (_, late) = &mut late[0];
         late.send(json!({"op": "subscribe", "topic": "/other", "fragment_size": 99}))
             .await;
-        assert_eq!(
-            late.receive().await["level"],
-            "info",
-            "another topic has its own"
-        );
-        peers[5]
-            .send(json!({"op": "unsubscribe", "topic": "/t"}))
-            .await;
-        peers[5].call("/none", 1).await;
-        peers[5].receive().await;
-        assert_eq!(
-            subscribe_in_pieces(&mut late, 99).await["level"],
-            "info",
-            "there is room again"
-        );
+        late.receive().await;
+        publisher.advertise("/other").await;
+        publish_long(&mut publisher, "/other").await;
+        assert_eq!(piece_of(late).await, 99, "another topic has its own");
     });
 }
 
-/// Another size under the same id takes the place of the one before, also where all are in use; a refusal changes nothing.
+/// Another size under the same id takes the place of the one before, also where all are in use.
 #[test]
-fn a_subscription_changes_its_own_size_where_all_are_in_use_and_keeps_it_where_it_may_not() {
+fn a_subscription_changes_its_own_size_where_all_are_in_use() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
         let mut peers = Vec::new();
@@ -101,28 +101,17 @@ fn a_subscription_changes_its_own_size_where_all_are_in_use_and_keeps_it_where_i
         }
         let mut second = gateway.connect(WIDE);
         subscribe_in_pieces(&mut second, 100).await;
-        assert_eq!(
-            subscribe_in_pieces(&mut second, 99).await["level"],
-            "error",
-            "another has the size that it would give up"
-        );
+        // Another has the size that it gives up.
+        subscribe_in_pieces(&mut second, 99).await;
         let last = peers.last_mut().unwrap();
-        let changed = subscribe_in_pieces(last, 200).await;
-        assert_eq!(changed["level"], "info", "{changed}");
-        let freed = 100 + MAX_FRAGMENT_SIZES - 1;
-        assert_eq!(
-            subscribe_in_pieces(&mut second, freed).await["level"],
-            "error",
-            "there are as many as before"
-        );
+        for size in [300, 256, 200] {
+            subscribe_in_pieces(last, size).await;
+        }
         let mut publisher = gateway.connect(WIDE);
         publisher.advertise("/t").await;
-        let msg = json!({"pad": "x".repeat(300)});
-        let frame = json!({"op": "publish", "topic": "/t", "msg": msg});
-        publisher.send(frame).await;
-        assert_eq!(next_message(&mut second).await.0["msg"], msg);
-        let last = peers.last_mut().unwrap();
-        assert_eq!(last.receive().await["num"], 0, "it comes in pieces");
+        publish_long(&mut publisher, "/t").await;
+        assert_eq!(piece_of(&mut second).await, 64);
+        assert_eq!(piece_of(last).await, 200);
     });
 }
 

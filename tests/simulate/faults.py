@@ -95,8 +95,10 @@ FAULTS = [
      "        self.next().is_none_or(|next| next <= now)",
      "        self.next().is_none_or(|next| next <= now || (R(10) && next <= now + self.interval / 2))"),
     ("a throttle keeps the older message, one time in 4", "src/protocol/outbox/throttle.rs",
-     "full.then(|| throttle.held.pop_front()).flatten()",
-     "full.then(|| if R(4) { throttle.held.pop_back() } else { throttle.held.pop_front() }).flatten()"),
+     "            self.pop(topic);\n        }\n        None",
+     "            if R(4) {\n                let newest = throttle.held.pop_back();\n                self.count -= 1;\n"
+     "                self.bytes -= newest.map_or(0, |(_, frame)| frame.len());\n            } else {\n                self.pop(topic);\n"
+     "            }\n        }\n        None"),
     ("what a deaf client misses is not counted", "src/protocol/outbox/mod.rs",
      "                return;\n            }\n            self.dropped += 1;", "                return;\n            }\n            self.dropped += u64::from(!F);"),
     ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments.rs",

@@ -85,9 +85,7 @@ impl Hostile {
             Hostility::Encodings => {
                 for _ in 0..1 + court.below(60) {
                     let (n, topic) = (self.next(), court.among(&["/t1", "/many_sizes"]));
-                    // A topic of honest clients keeps sizes for them.
-                    let sizes = if topic == "/t1" { 8 } else { 300 };
-                    let size = 64 + 5 * court.below(sizes);
+                    let size = 64 + 5 * court.below(300);
                     let compression = court.among(&["none", "cbor", "cbor-raw", "png"]);
                     self.say(&format!(
                         "{{\"op\":\"subscribe\",\"id\":\"{n}\",\"topic\":\"{topic}\",\"fragment_size\":{size},\"compression\":\"{compression}\"}}"

@@ -11,7 +11,8 @@ pub const MAX_CONNECTIONS: usize = 1024;
 pub const MAX_RESPONSES_WAITING: usize = 32 * 1024 * 1024;
 /// Subscriptions (topic and id) of one connection.
 pub const MAX_SUBSCRIPTIONS: usize = 1024;
-/// Different `fragment_size`s among the subscriptions to a topic: a message is cut up once for each of them.
+/// Different `fragment_size`s among the subscriptions to a topic, beside powers of two: a message is cut up once for
+/// each of them. A further one counts as the power of two below, of which there are few.
 pub const MAX_FRAGMENT_SIZES: usize = 16;
 /// Topics that one connection advertises.
 pub const MAX_ADVERTISED: usize = 1024;

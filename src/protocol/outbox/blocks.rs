@@ -1,16 +1,18 @@
-//! A queue in blocks. Used by the [outbox](crate::protocol::outbox) alone.
+//! A queue in blocks, for what waits for one client.
 //!
 //! **Invariant:** it grows and shrinks by one block at a time. A thousand clients that take nothing are all sent the
 //! same: were their queues doubled and copied, it would be at the same moment.
 
 use std::collections::VecDeque;
 
+/// Places that a queue may keep beside twice as many as are taken.
+const FEW: usize = 4;
 /// Places in a block: a tick's worth of frames. One block is kept while nothing waits.
 const BLOCK: usize = 64;
 
 /// A queue of blocks.
 #[derive(Debug)]
-pub(super) struct Blocks<T> {
+pub(crate) struct Blocks<T> {
     /// None is empty, unless it is the only one.
     blocks: VecDeque<VecDeque<T>>,
     len: usize,
@@ -26,23 +28,23 @@ impl<T> Default for Blocks<T> {
 }
 
 impl<T> Blocks<T> {
-    pub(super) const fn len(&self) -> usize {
+    pub(crate) const fn len(&self) -> usize {
         self.len
     }
 
-    pub(super) const fn is_empty(&self) -> bool {
+    pub(crate) const fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    pub(super) fn front(&self) -> Option<&T> {
+    pub(crate) fn front(&self) -> Option<&T> {
         self.blocks.front()?.front()
     }
 
-    pub(super) fn front_mut(&mut self) -> Option<&mut T> {
+    pub(crate) fn front_mut(&mut self) -> Option<&mut T> {
         self.blocks.front_mut()?.front_mut()
     }
 
-    pub(super) fn push_back(&mut self, item: T) {
+    pub(crate) fn push_back(&mut self, item: T) {
         self.len += 1;
         if let Some(last) = self.blocks.back_mut().filter(|last| last.len() < BLOCK) {
             return last.push_back(item);
@@ -54,20 +56,34 @@ impl<T> Blocks<T> {
         self.blocks.push_back(block);
     }
 
-    pub(super) fn pop_front(&mut self) -> Option<T> {
+    pub(crate) fn pop_front(&mut self) -> Option<T> {
         let first = self.blocks.front_mut()?;
         let item = first.pop_front()?;
         self.len -= 1;
         if first.is_empty() && self.blocks.len() > 1 {
             self.blocks.pop_front();
+            fit(&mut self.blocks);
         }
         Some(item)
+    }
+}
+
+/// Gives back the places of a queue that is less than half full: constant time per item that has left, all told.
+pub(super) fn fit<T>(queue: &mut VecDeque<T>) {
+    if queue.capacity() > 2 * queue.len() + FEW {
+        queue.shrink_to(queue.len() * 3 / 2);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl<T> Blocks<T> {
+        pub(crate) fn places(&self) -> usize {
+            self.blocks.iter().map(VecDeque::capacity).sum()
+        }
+    }
 
     #[test]
     fn what_goes_in_comes_out_in_order_and_one_block_is_kept() {
@@ -78,7 +94,7 @@ mod tests {
             (BLOCK, 1),
             (1000, 1030),
             (0, 33),
-            (5 * BLOCK, 5 * BLOCK),
+            (50 * BLOCK, 50 * BLOCK),
         ] {
             for _ in 0..more {
                 queue.push_back(pushed);
@@ -91,12 +107,12 @@ mod tests {
             }
             assert_eq!(queue.len(), pushed - popped);
             assert!(queue.blocks.len() <= queue.len() / BLOCK + 2);
+            assert!(queue.blocks.capacity() <= 2 * queue.blocks.len() + FEW);
         }
         assert_eq!(
             (queue.pop_front(), queue.front(), queue.is_empty()),
             (None, None, true)
         );
-        let places: usize = queue.blocks.iter().map(VecDeque::capacity).sum();
-        assert_eq!(places, BLOCK);
+        assert_eq!(queue.places(), BLOCK);
     }
 }

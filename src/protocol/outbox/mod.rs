@@ -12,7 +12,7 @@
 //! **Invariant:** dropping removes whole messages, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages
 //! wait, held back ones included.
 
-mod blocks;
+pub(crate) mod blocks;
 mod throttle;
 
 use std::collections::VecDeque;
@@ -32,7 +32,8 @@ pub const MAX_TOPIC_BYTES: usize = MAX_FRAME + 1;
 /// Bytes that a frame takes beside its own: the count of those who share it, its place in a queue (which may be twice
 /// as long as what is in it), and the allocator's own of each.
 pub const FRAME_BYTES: usize = 192;
-/// Bytes of a place in the queue of topic messages, that of one that is held back, with its two indexes, included.
+/// Bytes of a place in the queue of topic messages, that of one that is held back or to be encoded included: the queue
+/// may be twice as long as what is in it, and three times while it grows.
 pub const PLACE_BYTES: usize = 128;
 
 /// The outgoing queue of one connection.

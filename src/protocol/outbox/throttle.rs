@@ -3,16 +3,18 @@
 //! Told the time; knows no clock. Used by the [outbox](crate::protocol::outbox) alone.
 //!
 //! **Invariant:** between two messages of a topic that are let go at least its interval passes, and of those held
-//! back the newest remain.
+//! back the newest remain. Beside what is held back little memory is kept, however much was: nobody is charged for it.
 
 use std::cmp::Reverse;
-use std::collections::{BinaryHeap, HashMap, VecDeque};
+use std::collections::{BTreeMap, BinaryHeap, HashMap, VecDeque};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
 
-/// Entries of the two indexes that may be out of date before they are rebuilt, besides as many as are up to date.
+use crate::protocol::outbox::blocks::fit;
+
+/// Dues that may be out of date before they are rebuilt, besides as many as are up to date.
 const SLACK: usize = 32;
 
 /// The throttles of one connection and what they hold back.
@@ -21,8 +23,8 @@ pub(super) struct Throttles {
     topics: HashMap<Arc<str>, TopicThrottle>,
     /// When the next message of a topic is due. Entries that no longer hold are skipped when they come up.
     releases: BinaryHeap<Reverse<(Instant, Arc<str>)>>,
-    /// The messages that are held back, by age. Entries that no longer hold are skipped when they come up.
-    ages: VecDeque<(u64, Arc<str>)>,
+    /// The topics of which messages are held back, by the number of the oldest.
+    oldest: BTreeMap<u64, Arc<str>>,
     /// How many messages are held back.
     count: usize,
     /// Their size in bytes.
@@ -50,13 +52,6 @@ impl TopicThrottle {
 
     fn is_due(&self, now: Instant) -> bool {
         self.next().is_none_or(|next| next <= now)
-    }
-
-    /// Whether the message of that number is still held back. Numbers rise, and messages leave from the front.
-    fn holds(&self, number: u64) -> bool {
-        self.held
-            .front()
-            .is_some_and(|(oldest, _)| *oldest <= number)
     }
 }
 
@@ -108,11 +103,8 @@ impl Throttles {
             });
         throttle.interval = interval;
         throttle.queue_length = queue_length;
-        while throttle.held.len() > queue_length {
-            if let Some((_, frame)) = throttle.held.pop_front() {
-                self.count -= 1;
-                self.bytes -= frame.len();
-            }
+        for _ in queue_length..throttle.held.len() {
+            self.pop(topic);
         }
         self.schedule(topic);
         self.tidy();
@@ -121,26 +113,25 @@ impl Throttles {
 
     /// Lifts the throttle of a topic and gives what was held back, oldest first.
     pub(super) fn forget(&mut self, topic: &str) -> VecDeque<(u64, Bytes)> {
-        let held = self
-            .topics
-            .remove(topic)
-            .map(|throttle| throttle.held)
-            .unwrap_or_default();
-        self.count -= held.len();
-        self.bytes -= held.iter().map(|(_, frame)| frame.len()).sum::<usize>();
+        let held = self.discard(topic);
+        if self.topics.remove(topic).is_some() {
+            self.topics.shrink_to(2 * self.topics.len());
+            self.tidy();
+        }
         held
     }
 
-    /// Discards what is held back of a topic; its throttle stays.
-    pub(super) fn discard(&mut self, topic: &str) {
-        if let Some(throttle) = self.topics.get_mut(topic) {
-            self.count -= throttle.held.len();
-            self.bytes -= throttle
-                .held
-                .drain(..)
-                .map(|(_, frame)| frame.len())
-                .sum::<usize>();
+    /// Takes out what is held back of a topic, oldest first; its throttle stays.
+    pub(super) fn discard(&mut self, topic: &str) -> VecDeque<(u64, Bytes)> {
+        let throttle = self.topics.get_mut(topic);
+        let held = throttle.map(|throttle| std::mem::take(&mut throttle.held));
+        let held = held.unwrap_or_default();
+        if let Some((oldest, _)) = held.front() {
+            self.oldest.remove(oldest);
         }
+        self.count -= held.len();
+        self.bytes -= held.iter().map(|(_, frame)| frame.len()).sum::<usize>();
+        held
     }
 
     /// A new message: given back if it may go at once, else held back, in place of the oldest of its topic if need be.
@@ -161,17 +152,13 @@ impl Throttles {
         self.count += 1;
         self.bytes += frame.len();
         throttle.held.push_back((number, frame));
-        let first = throttle.held.len() == 1;
-        let full = throttle.held.len() > throttle.queue_length;
-        if let Some((_, replaced)) = full.then(|| throttle.held.pop_front()).flatten() {
-            self.count -= 1;
-            self.bytes -= replaced.len();
-        }
-        self.ages.push_back((number, Arc::clone(topic)));
-        if first {
+        if throttle.held.len() == 1 {
+            self.oldest.insert(number, Arc::clone(topic));
             self.schedule(topic);
+            self.tidy();
+        } else if throttle.held.len() > throttle.queue_length {
+            self.pop(topic);
         }
-        self.tidy();
         None
     }
 
@@ -179,11 +166,8 @@ impl Throttles {
     pub(super) fn release(&mut self, now: Instant) -> Option<Bytes> {
         while self.next_release().is_some_and(|next| next <= now) {
             let Reverse((_, topic)) = self.releases.pop()?;
-            let throttle = self.topics.get_mut(&topic)?;
-            if let Some((_, frame)) = throttle.held.pop_front() {
-                throttle.last = Some(now);
-                self.count -= 1;
-                self.bytes -= frame.len();
+            if let Some(frame) = self.pop(&topic) {
+                self.topics.get_mut(&topic)?.last = Some(now);
                 self.schedule(&topic);
                 return Some(frame);
             }
@@ -207,36 +191,29 @@ impl Throttles {
     }
 
     /// The number of the oldest message that is held back.
-    pub(super) fn oldest(&mut self) -> Option<u64> {
-        while let Some((number, topic)) = self.ages.front() {
-            if self
-                .topics
-                .get(topic)
-                .is_some_and(|throttle| throttle.holds(*number))
-            {
-                return Some(*number);
-            }
-            self.ages.pop_front();
-        }
-        None
+    pub(super) fn oldest(&self) -> Option<u64> {
+        self.oldest.keys().next().copied()
     }
 
     /// Drops the oldest message that is held back.
     pub(super) fn drop_oldest(&mut self) {
-        if self.oldest().is_none() {
-            return;
+        if let Some(topic) = self.oldest.values().next().cloned() {
+            self.pop(&topic);
         }
-        let Some((_, topic)) = self.ages.pop_front() else {
-            return;
-        };
-        if let Some((_, frame)) = self
-            .topics
-            .get_mut(&topic)
-            .and_then(|throttle| throttle.held.pop_front())
-        {
-            self.count -= 1;
-            self.bytes -= frame.len();
+    }
+
+    /// Takes out the oldest message of a topic that is held back.
+    fn pop(&mut self, topic: &Arc<str>) -> Option<Bytes> {
+        let held = &mut self.topics.get_mut(topic)?.held;
+        let (number, frame) = held.pop_front()?;
+        fit(held);
+        self.oldest.remove(&number);
+        if let Some((next, _)) = held.front() {
+            self.oldest.insert(*next, Arc::clone(topic));
         }
+        self.count -= 1;
+        self.bytes -= frame.len();
+        Some(frame)
     }
 
     /// Notes when the topic's next held back message is due.
@@ -250,18 +227,12 @@ impl Throttles {
         }
     }
 
-    /// Rebuilds an index once most of it is out of date: constant time per message, all told.
+    /// Rebuilds the dues once most of them are out of date, or most of their places empty: constant time per message,
+    /// all told.
     fn tidy(&mut self) {
-        if is_stale(self.ages.len(), self.count) {
-            let topics = &self.topics;
-            self.ages.retain(|(number, topic)| {
-                topics
-                    .get(topic)
-                    .is_some_and(|throttle| throttle.holds(*number))
-            });
-        }
-        if is_stale(self.releases.len(), self.topics.len()) {
-            self.releases.clear();
+        let valid = self.topics.len();
+        let most = 2 * valid + SLACK;
+        if is_stale(self.releases.len(), valid) || is_stale(self.releases.capacity(), most) {
             let waiting = self
                 .topics
                 .iter()
@@ -271,7 +242,7 @@ impl Throttles {
                     .next()
                     .map(|next| Reverse((next, Arc::clone(topic))))
             });
-            self.releases.extend(due);
+            self.releases = due.collect();
         }
     }
 }
@@ -300,6 +271,11 @@ mod tests {
             assert_eq!(self.count, held().count());
             let bytes: usize = held().map(|(_, frame)| frame.len()).sum();
             assert_eq!(self.bytes, bytes);
+            let oldest = held().map(|(number, _)| *number).min();
+            assert_eq!(self.oldest(), oldest);
+            let places = |throttle: &TopicThrottle| throttle.held.capacity();
+            let places: usize = self.topics.values().map(places).sum();
+            assert!(places <= 2 * self.count + 4 * self.topics.len());
         }
     }
 
@@ -310,9 +286,9 @@ mod tests {
         let second = Duration::from_secs(1);
         let now = Instant::now();
         let mut throttles = Throttles::default();
-        for topic in [&calm, &busy] {
+        for (first, topic) in [(0, &calm), (2, &busy)] {
             throttles.set(topic, Some((second, 1)));
-            for number in 0..2 {
+            for number in first..first + 2 {
                 let _ = throttles.offer(topic, number, Bytes::from_static(b"x"), now);
             }
         }
@@ -365,9 +341,35 @@ mod tests {
         assert_eq!(throttles.count, 0);
     }
 
-    /// One message is held back for a year, in front of all that comes after it in both indexes.
+    /// Many are held back of one topic after the other; whatever has them go, none leaves its places behind.
     #[test]
-    fn the_indexes_stay_small_though_what_is_oldest_stays_for_long() {
+    fn no_topic_keeps_the_places_of_what_was_held_back() {
+        let topics: Vec<Arc<str>> = (0..100).map(|n| Arc::from(format!("/{n}"))).collect();
+        let year = Duration::from_secs(365 * 24 * 3600);
+        let now = Instant::now();
+        let mut throttles = Throttles::default();
+        for (n, topic) in (0..).zip(&topics) {
+            throttles.set(topic, Some((year, 10_000)));
+            for number in 1001 * n..1001 * (n + 1) {
+                let _ = throttles.offer(topic, number, Bytes::from_static(b"x"), now);
+            }
+            match n % 3 {
+                0 => (0..1000).for_each(|_| throttles.drop_oldest()),
+                1 => drop(throttles.discard(topic)),
+                _ => drop(throttles.set(topic, Some((year, 1)))),
+            }
+            throttles.check();
+        }
+        for topic in &topics {
+            throttles.forget(topic);
+        }
+        throttles.check();
+        assert!(throttles.topics.capacity() + throttles.releases.capacity() <= 3 * SLACK);
+    }
+
+    /// One message is held back for a year, in front of all that comes after it.
+    #[test]
+    fn the_index_stays_small_though_what_is_oldest_stays_for_long() {
         let mut throttles = Throttles::default();
         let (slow, fast) = (Arc::<str>::from("/slow"), Arc::<str>::from("/fast"));
         let mut now = Instant::now();
@@ -385,15 +387,13 @@ mod tests {
             offer(&mut throttles, &fast, now);
             offer(&mut throttles, &fast, now);
             match round % 4 {
-                0 => throttles.discard(&fast),
+                0 => drop(throttles.discard(&fast)),
                 1 => drop(throttles.set(&fast, Some((Duration::from_millis(1), 1)))),
                 2 => now += Duration::from_millis(2),
                 _ => {}
             }
             let _ = throttles.release(now);
-            let (ages, releases) = (throttles.ages.len(), throttles.releases.len());
-            assert!(ages <= 2 * 3 + SLACK + 1, "{ages} ages");
-            assert!(releases <= 2 * 2 + SLACK + 1, "{releases} releases");
+            assert!(throttles.releases.len() <= 2 * 2 + SLACK + 1);
         }
         assert_eq!(throttles.oldest(), Some(2));
     }

@@ -33,7 +33,7 @@ const WATCHED: [&str; 9] = [
     "/robot_description",
     "/arm_sim/error_estimate",
 ];
-/// Together with those of hostile clients fewer than a topic may have.
+/// Hostile clients may have taken all places for others: then the powers of two below count.
 const PIECE_SIZES: [usize; 7] = [64, 65, 80, 127, 128, 200, 263];
 const FUNCTIONS: [&str; 4] = ["sin(t)", "-9.81", "t^2 / (1 + t)", "exp(-t) * cos(3 * t)"];
 /// How long a forwarded call waits that does not say.

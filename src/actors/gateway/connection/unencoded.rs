@@ -2,17 +2,17 @@
 //!
 //! **Invariant:** at most [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
 
-use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::actors::gateway::messages::Deliver;
+use crate::protocol::outbox::blocks::Blocks;
 use crate::protocol::outbox::{MAX_TOPIC_BYTES, PLACE_BYTES};
 use crate::protocol::wire::series;
 
 /// The messages of one connection that wait.
 #[derive(Default)]
 pub(super) struct Unencoded {
-    waiting: VecDeque<Deliver>,
+    waiting: Blocks<Deliver>,
     /// Their bytes, as they came.
     bytes: usize,
     /// The topic of the message that is being encoded, unless that has become too old meanwhile.
@@ -49,9 +49,12 @@ impl Unencoded {
     /// Discards the messages of these topics, which have become too old, the one that is being encoded too.
     pub(super) fn discard(&mut self, topics: &[&str]) {
         let is_old = |topic: &Arc<str>| topics.contains(&&**topic);
-        self.waiting.retain(|message| !is_old(&message.topic));
-        let lengths = self.waiting.iter().map(|one| one.frames.plain().len());
-        self.bytes = lengths.sum();
+        for _ in 0..self.waiting.len() {
+            let oldest = self.pop();
+            if let Some(message) = oldest.filter(|message| !is_old(&message.topic)) {
+                self.push(message);
+            }
+        }
         self.underway.take_if(|topic| is_old(topic));
     }
 
@@ -71,5 +74,35 @@ impl Unencoded {
         let message = self.waiting.pop_front()?;
         self.bytes -= message.frames.plain().len();
         Some(message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bytes::Bytes;
+
+    use super::*;
+    use crate::actors::gateway::messages::Frames;
+
+    /// Nobody is charged for places that nothing takes.
+    #[test]
+    fn the_places_go_with_the_messages() {
+        let mut unencoded = Unencoded::default();
+        for _ in 0..20_000 {
+            let message = Deliver {
+                topic: "/t".into(),
+                frames: Frames::Plain(Bytes::from_static(b"x")),
+                underway: None,
+            };
+            unencoded.push(message);
+        }
+        for left in [1, 0] {
+            while unencoded.size().0 > left {
+                unencoded.pop();
+            }
+            let places = unencoded.waiting.places();
+            assert!(places <= 128, "{places} for {left}");
+        }
+        const { assert!(size_of::<Deliver>() <= PLACE_BYTES) };
     }
 }

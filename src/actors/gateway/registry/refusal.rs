@@ -3,8 +3,8 @@
 //! **Invariant:** every sentence begins with the field it is about, or names the service.
 
 use crate::actors::gateway::limits::{
-    MAX_ADVERTISED, MAX_BACKLOG, MAX_FRAGMENT_SIZES, MAX_PROVIDED, MAX_SUBSCRIPTIONS,
-    MAX_WAITING_CALLS, MAX_WAITING_GOALS,
+    MAX_ADVERTISED, MAX_BACKLOG, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
+    MAX_WAITING_GOALS,
 };
 
 /// An op or a call that changed nothing.
@@ -16,11 +16,6 @@ pub(super) enum Refusal {
     TooManyAdvertised,
     #[error("topic: a connection holds at most {MAX_SUBSCRIPTIONS} subscriptions")]
     TooManySubscriptions,
-    #[error(
-        "fragment_size: the subscribers of a topic have asked for {MAX_FRAGMENT_SIZES} different sizes; \
-         ask for one of those, or for none"
-    )]
-    TooManySizes,
     #[error(
         "compression: cbor-raw needs a message type that this runtime knows; give it as type, or subscribe with cbor"
     )]

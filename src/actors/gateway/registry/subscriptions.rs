@@ -33,14 +33,10 @@ impl Registry {
         let bytes: usize = bytes.into_iter().flatten().map(str::len).sum();
         let client = self.clients.get(&origin.from);
         let before = client.and_then(|client| client.subscription(topic, id.as_deref()));
-        let size = match subscribe.encoding.fragment_size {
-            Some(size) => {
-                let given_up = before.and_then(|one| one.size.as_ref());
-                let shared = self.topics.share_size(&absolute, size, given_up);
-                Some(shared.ok_or(Refusal::TooManySizes)?)
-            }
-            None => None,
-        };
+        let size = subscribe.encoding.fragment_size.map(|size| {
+            let given_up = before.and_then(|one| one.size.as_ref());
+            self.topics.share_size(&absolute, size, given_up)
+        });
         let first = !self.is_wanted(&absolute);
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
@@ -61,7 +57,10 @@ impl Registry {
             id,
             throttle: subscribe.throttle,
             queue_length: subscribe.queue_length,
-            encoding: encoding_for(subscribe),
+            encoding: Encoding {
+                fragment_size: size.as_deref().copied(),
+                ..encoding_for(subscribe)
+            },
             size,
             _share: share,
         });

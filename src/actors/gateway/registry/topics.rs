@@ -88,27 +88,39 @@ impl Topics {
         (name, new)
     }
 
-    /// A `fragment_size` to be kept by the subscription that asks for it, which gives up `given_up` then; `None` if the
-    /// topic of that absolute name has as many others as it may have.
+    /// A `fragment_size` to be kept by the subscription that asks for it, which gives up `given_up` then. Where the
+    /// topic of that absolute name has as many others as it may have, powers of two aside, it is the power of two
+    /// below: nobody is refused because of what others ask for.
     pub(super) fn share_size(
         &mut self,
         topic: &str,
         size: usize,
         given_up: Option<&Arc<usize>>,
-    ) -> Option<Arc<usize>> {
+    ) -> Arc<usize> {
         let sizes = self.sizes.entry(topic.into()).or_default();
         sizes.retain(|one| one.strong_count() > 0);
-        let known = sizes.iter().filter_map(Weak::upgrade);
-        if let Some(known) = known.into_iter().find(|one| **one == size) {
-            return Some(known);
+        let known = |size| {
+            let mut all = sizes.iter().filter_map(Weak::upgrade);
+            all.find(|one| **one == size)
+        };
+        if let Some(known) = known(size) {
+            return known;
         }
+        let all = sizes.iter().filter_map(Weak::upgrade);
+        let others = all.filter(|one| !one.is_power_of_two()).count();
+        let given_up = given_up.filter(|one| !one.is_power_of_two());
         let is_freed = given_up.is_some_and(|one| Arc::strong_count(one) == 1);
-        if sizes.len() - usize::from(is_freed) >= MAX_FRAGMENT_SIZES {
-            return None;
-        }
-        let size = Arc::new(size);
-        sizes.push(Arc::downgrade(&size));
-        Some(size)
+        let is_full = others - usize::from(is_freed) >= MAX_FRAGMENT_SIZES;
+        let size = if is_full {
+            1 << size.max(1).ilog2()
+        } else {
+            size
+        };
+        known(size).unwrap_or_else(|| {
+            let size = Arc::new(size);
+            sizes.push(Arc::downgrade(&size));
+            size
+        })
     }
 
     /// Nobody subscribes to the topic of that absolute name any more.
