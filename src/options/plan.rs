@@ -74,8 +74,10 @@ pub(super) fn read(matches: &ArgMatches) -> Result<PlanOptions, UsageError> {
     if let Some(text) = given("setpoint") {
         if !is_servo {
             // A free arm has none: it would be left out of account.
-            return Err(UsageError::UnknownArgument {
-                argument: "--setpoint without --duration servo".to_owned(),
+            return Err(UsageError::Value {
+                argument: "--setpoint".to_owned(),
+                needs: "must be left out without --duration servo".to_owned(),
+                value: text.to_owned(),
             });
         }
         let joints: Result<Vec<f64>, _> = text.split(',').map(|one| one.trim().parse()).collect();

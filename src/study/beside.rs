@@ -39,9 +39,9 @@ impl<const N: usize> Steppable for Simulation<N> {
 /// The motion that others are compared with.
 #[derive(Debug, Clone)]
 pub(super) enum Truth<const N: usize> {
-    /// Of an arm under a law that acts at every instant.
+    /// An arm under a law that acts at every instant.
     Law(ContinuousLoop<N>),
-    /// Of an arm left to itself.
+    /// An arm left to itself.
     Free(FreeMotion<N>),
 }
 
@@ -111,8 +111,8 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
         }
     }
 
-    /// Goes on by a piece: the largest distance \[m\] once it is known, or known to be too large; infinite where numbers
-    /// have ended.
+    /// Goes on by a piece: the largest distance \[m\] once it is known, or known to be too large; infinite where
+    /// numbers have ended.
     pub(super) fn advance(&mut self) -> Option<f64> {
         let mut work = 0;
         while self.left > 0 && self.apart <= self.allowed {

@@ -121,7 +121,7 @@ pub struct Planning<const N: usize> {
     longest: f64,
     /// Steps of that length.
     fewest: u64,
-    /// Of the truth.
+    /// How finely the truth is followed.
     fineness: Fineness,
     uncertainty: f64,
     /// Methods that have not been tried, the next one last.

@@ -270,7 +270,7 @@ fn a_plan_is_asked_for_with_what_can_be_planned() {
         &["--setpoint=1,2", "--duration=2"],
     ] {
         let refused = refusal(&plan(free), &[]);
-        let expected = "unknown argument \"--setpoint without --duration servo\"";
+        let expected = "--setpoint must be left out without --duration servo, got \"1,2\"";
         assert!(refused.starts_with(expected), "{refused}");
     }
     assert_eq!(

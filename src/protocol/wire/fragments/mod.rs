@@ -1,7 +1,7 @@
 //! Long messages in pieces: `fragment` in both directions.
 //!
-//! [Out](split()) only to subscribers that asked for it with `fragment_size`; in, from whoever sends them, within bounds.
-//! Told the time.
+//! [Out](split()) only to subscribers that asked for it with `fragment_size`; in, from whoever sends them, within
+//! bounds. Told the time.
 //!
 //! **Invariant:** what is kept of unfinished messages is at most [`MAX_FRAME`] bytes in at most [`MAX_UNFINISHED`]
 //! messages, none of them for longer than [`MAX_AGE`].
@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::time::{Duration, Instant};
 
 use crate::protocol::limits::MAX_FRAME;
-pub use split::split;
+pub use split::{MIN_SIZE, split};
 
 /// Messages of one connection that may be incomplete at once: clients send one after the other.
 pub const MAX_UNFINISHED: usize = 8;
@@ -22,8 +22,6 @@ pub const MAX_PIECES: usize = 4096;
 pub const PIECE_BYTES: usize = 128;
 /// How long a message may take to come: longer than the slowest network that a person would bear.
 pub const MAX_AGE: Duration = Duration::from_secs(60);
-/// The smallest pieces sent: smaller ones would be frame more than content.
-pub const MIN_SIZE: usize = 64;
 
 /// A piece of a message.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -5,7 +5,8 @@
 use bytes::Bytes;
 use serde::Serialize;
 
-use super::MIN_SIZE;
+/// The smallest pieces sent: smaller ones would be frame more than content.
+pub const MIN_SIZE: usize = 64;
 
 #[derive(Serialize)]
 struct Fragment<'a> {
