@@ -57,6 +57,7 @@ impl<const N: usize> Tap<N> {
                 simulation: Simulation::new(Arm::default(), gains),
                 paused: false,
                 asked_steps: 0,
+                has_goals: false,
                 is_done: true,
                 anchor: None,
                 jumps: 0,
@@ -106,6 +107,7 @@ impl<const N: usize> Handler<Called> for Tap<N> {
     fn handle(&mut self, Called(call): Called, ctx: &mut Context<Self>) {
         let named = Named::read(call.service, &call.arguments);
         let id = call.caller.id().map(|id| id.get().to_owned());
+        let steps = id.clone().filter(|_| call.service == Service::Step);
         let Some(route) = self.routes.services.get(&call.service) else {
             return;
         };
@@ -122,7 +124,12 @@ impl<const N: usize> Handler<Called> for Tap<N> {
             }
         });
         ctx.wait(input.then(|(), _, _| {
-            after.map(|arm, tap: &mut Self, _: &mut Context<Self>| tap.mirror.observe(arm.as_ref()))
+            after.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
+                tap.mirror.observe(arm.as_ref());
+                if let Some(id) = steps {
+                    tap.mirror.look_after_steps(&id);
+                }
+            })
         }));
     }
 }
@@ -225,6 +232,7 @@ impl<const N: usize> Handler<CommandGoal<N>> for Tap<N> {
     type Result = ();
 
     fn handle(&mut self, command: CommandGoal<N>, ctx: &mut Context<Self>) {
+        self.mirror.has_goals = true;
         let before = self.snapshot().into_actor(self);
         self.arm.do_send(command);
         let after = self.snapshot().into_actor(self);
@@ -257,6 +265,8 @@ struct Mirror<const N: usize> {
     paused: bool,
     /// Steps that were asked for by hand and may still be taken: a resume and a pause at once do not end them.
     asked_steps: u64,
+    /// Whether there has been a goal: steps by hand end at its progress then, and go on between what others ask.
+    has_goals: bool,
     /// Whether the last input, if its fields were good, has been followed as a whole.
     is_done: bool,
     /// A moment, and the simulation's time then.
@@ -421,6 +431,18 @@ impl<const N: usize> Mirror<N> {
                 )
             }
             _ => None,
+        }
+    }
+
+    /// The end of steps that are not all taken at once is not foreseen where there are goals.
+    fn look_after_steps(&self, id: &str) {
+        let mut expected = self.court.expected.borrow_mut();
+        if let Some((values, _)) = expected.get_mut(id)
+            && self.has_goals
+            && let Some(time) = values["time"].as_f64()
+            && time.to_bits() != self.simulation.time().to_bits()
+        {
+            *values = Value::Null;
         }
     }
 

@@ -64,6 +64,11 @@ pub const ATTACKS: &[Attack] = &[
         throttle_hoards,
     ),
     Attack::new(
+        "throttle-topics",
+        "16 clients have 100,000 messages held back of one topic after the other",
+        throttle_topics,
+    ),
+    Attack::new(
         "unfinished-frames",
         "300 clients send all of a frame of 4 MiB but its end",
         unfinished_frames,
@@ -216,15 +221,30 @@ fn throttled_series() -> Vec<Client> {
     .concat()
 }
 
+/// As much is held back as a queue may have, for a year.
+const HELD_BACK: &str = r#","throttle_rate":31536000000,"queue_length":100000"#;
+
 fn throttle_hoards() -> Vec<Client> {
-    let further = r#","throttle_rate":31536000000,"queue_length":100000"#;
     each(0..50, |k| {
         let topic = format!("/attack/hoard/{k}");
         Client::tcp()
-            .says(&subscribe(&topic, further))
+            .says(&subscribe(&topic, HELD_BACK))
             .advertises(&topic)
             .floods(&publish(&topic, r#"{"data":"held back"}"#))
     })
+}
+
+fn throttle_topics() -> Vec<Client> {
+    const EACH: usize = 100_000;
+    let topics = 0..12;
+    let name = |n: usize| format!("/{n:x}");
+    let subscriber = Client::tcp().says_each(topics.clone(), |n| subscribe(&name(n), HELD_BACK));
+    let publisher = topics
+        .clone()
+        .fold(Client::tcp(), |client, n| client.advertises(&name(n)));
+    let messages = topics.start * EACH..topics.end * EACH;
+    let publisher = publisher.says_each(messages, |n| publish(&name(n / EACH), "{}"));
+    [subscriber.times(16), vec![publisher.after(400)]].concat()
 }
 
 fn unfinished_frames() -> Vec<Client> {
