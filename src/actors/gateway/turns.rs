@@ -113,7 +113,8 @@ pub(super) async fn read_bytes(bytes: usize) {
 /// A queue in which writers wait.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum WritersQueue {
-    /// For messages whose publishers wait until they have been offered to the socket, be it of some of them.
+    /// For messages whose publishers wait until they have been offered to the socket, be it of some of them, and for
+    /// those that had to be encoded.
     Paced,
     /// For messages of nodes, which publish on.
     Unpaced,

@@ -98,6 +98,7 @@ impl EncodingTask {
             if let Some(outgoing) = self.0.upgrade() {
                 if outgoing.unencoded.borrow_mut().end() {
                     let _ = outgoing.pass(message);
+                    outgoing.note_encoded();
                 }
                 outgoing.wake_writer();
             }

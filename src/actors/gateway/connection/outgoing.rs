@@ -37,6 +37,8 @@ pub(super) struct Outgoing {
     pub(super) unencoded: RefCell<Unencoded>,
     /// Messages whose publishers wait until they have been offered to the socket.
     underway: RefCell<Vec<Underway>>,
+    /// Some of what waits has been encoded: that is of clients, and goes to many at one moment.
+    is_encoded: Cell<bool>,
     /// The writer, while the client is spoken with.
     writer: RefCell<Option<WriterFuture>>,
     /// Wakes the actor, which polls the writer.
@@ -73,6 +75,7 @@ impl Outgoing {
             outbox: RefCell::new(Outbox::new()),
             unencoded: RefCell::default(),
             underway: RefCell::default(),
+            is_encoded: Cell::new(false),
             writer: RefCell::default(),
             actor: RefCell::new(Waker::noop().clone()),
             in_queue: Cell::new(false),
@@ -135,6 +138,11 @@ impl Outgoing {
     /// Keeps a message's publisher waiting until the message has been offered to the socket.
     pub(super) fn hold(&self, underway: Option<Underway>) {
         self.underway.borrow_mut().extend(underway);
+    }
+
+    /// The message that has just been put in had been encoded aside.
+    pub(super) fn note_encoded(&self) {
+        self.is_encoded.set(true);
     }
 
     /// Whether each frame is written by itself.
@@ -260,7 +268,7 @@ impl Outgoing {
 
     /// The queue in which the writer waits, where it has to.
     pub(super) fn queue(&self) -> WritersQueue {
-        if self.underway.borrow().is_empty() {
+        if self.underway.borrow().is_empty() && !self.is_encoded.get() {
             WritersQueue::Unpaced
         } else {
             WritersQueue::Paced
@@ -293,6 +301,9 @@ impl Outgoing {
             }
         }
         drop(writer);
+        if self.is_empty() {
+            self.is_encoded.set(false);
+        }
         self.recount();
         if !self.in_queue.get() {
             self.underway.borrow_mut().clear();
