@@ -81,7 +81,7 @@ impl EncodingTask {
     async fn run(self) {
         while let Some(outgoing) = self.0.upgrade() {
             let next = outgoing.unencoded.borrow_mut().begin();
-            let Some(message) = next else {
+            let Some((number, message)) = next else {
                 return;
             };
             drop(outgoing);
@@ -96,7 +96,10 @@ impl EncodingTask {
                 }
             }
             if let Some(outgoing) = self.0.upgrade() {
-                if outgoing.unencoded.borrow_mut().end() {
+                let unencoded = outgoing.unencoded.borrow();
+                let is_wanted = unencoded.is_wanted(number, &message.topic);
+                drop(unencoded);
+                if is_wanted {
                     let _ = outgoing.pass(message);
                     outgoing.note_encoded();
                 }

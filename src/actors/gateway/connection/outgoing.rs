@@ -110,16 +110,14 @@ impl Outgoing {
     }
 
     /// Adds a response or a status; messages of `superseded` topics that throttling still holds back, or that wait to
-    /// be encoded, are discarded, being older.
-    pub(super) fn push_response(&self, frame: Bytes, superseded: &[&str]) {
+    /// be encoded, never come, being older.
+    pub(super) fn push_response(&self, frame: Bytes, superseded: &[&'static str]) {
         let mut outbox = self.outbox.borrow_mut();
         if outbox.response_bytes() == 0 {
             self.responses_since.set(Some(Instant::now()));
         }
         outbox.push_response(frame, superseded);
-        if !superseded.is_empty() {
-            self.unencoded.borrow_mut().discard(superseded);
-        }
+        self.unencoded.borrow_mut().supersede(superseded);
     }
 
     /// Sets how a topic is throttled, or forgets the topic.

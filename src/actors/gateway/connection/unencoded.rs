@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** at most [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
 
-use std::sync::Arc;
+use std::collections::HashMap;
 
 use crate::actors::gateway::messages::Deliver;
 use crate::protocol::outbox::blocks::Blocks;
@@ -15,8 +15,10 @@ pub(super) struct Unencoded {
     waiting: Blocks<Deliver>,
     /// Their bytes, as they came.
     bytes: usize,
-    /// The topic of the message that is being encoded, unless that has become too old meanwhile.
-    underway: Option<Arc<str>>,
+    /// Messages that have left: they are numbered as they come.
+    left: usize,
+    /// By topic, the first message that is not too old.
+    too_old: HashMap<&'static str, usize>,
     /// Whether there is a task at work.
     pub(super) at_work: bool,
 }
@@ -46,33 +48,31 @@ impl Unencoded {
         (self.waiting.len(), self.bytes)
     }
 
-    /// Discards the messages of these topics, which have become too old, the one that is being encoded too.
-    pub(super) fn discard(&mut self, topics: &[&str]) {
-        let is_old = |topic: &Arc<str>| topics.contains(&&**topic);
-        for _ in 0..self.waiting.len() {
-            let oldest = self.pop();
-            if let Some(message) = oldest.filter(|message| !is_old(&message.topic)) {
-                self.push(message);
-            }
+    /// The messages of these topics have become too old, the one that is being encoded too: constant time, however many
+    /// wait.
+    pub(super) fn supersede(&mut self, topics: &[&'static str]) {
+        if self.at_work {
+            let next = self.left + self.waiting.len();
+            self.too_old
+                .extend(topics.iter().map(|topic| (*topic, next)));
         }
-        self.underway.take_if(|topic| is_old(topic));
     }
 
-    /// The next message to be encoded.
-    pub(super) fn begin(&mut self) -> Option<Deliver> {
-        let next = self.pop();
-        self.underway = next.as_ref().map(|message| Arc::clone(&message.topic));
-        next
+    /// The next message to be encoded, and its number.
+    pub(super) fn begin(&mut self) -> Option<(usize, Deliver)> {
+        let number = self.left;
+        Some((number, self.pop()?))
     }
 
-    /// The message has been encoded; whether it is still to be sent.
-    pub(super) fn end(&mut self) -> bool {
-        self.underway.take().is_some()
+    /// Whether the message of that number is still to be sent.
+    pub(super) fn is_wanted(&self, number: usize, topic: &str) -> bool {
+        self.too_old.get(topic).is_none_or(|&first| number >= first)
     }
 
     fn pop(&mut self) -> Option<Deliver> {
         let message = self.waiting.pop_front()?;
         self.bytes -= message.frames.plain().len();
+        self.left += 1;
         Some(message)
     }
 }
