@@ -58,6 +58,10 @@ summary() {
             while ((getline line < file) > 0) if (line ~ /^a client computes/) { n = split(line, x, " ")
                 what = line; sub(/ later than.*/, "", what)
                 verdict(what ", longest delay, ms", x[n - 1], "at most 5", x[n - 1] <= 5) }
+            past("arm_thread"); longest = 0
+            while ((getline line < file) > 0) if (match(line, /bytes +[0-9.]+ us/)) { n = split(substr(line, RSTART), x, " ")
+                if (x[2] > longest) longest = x[2] }
+            verdict("the arm\047s thread, held up by 4 MB of a client, microseconds", longest, "under 100", longest > 0 && longest < 100)
             past("allocations")
             while ((getline line < file) > 0) { split(line, x, " ")
                 if (line ~ / steps /) steps += x[n = split(line, x, " ") - 1]
@@ -83,6 +87,7 @@ part() {
     part roundtrip roundtrips
     part idle "$built/idle" "$program"
     part fairness "$built/fairness" "$program"
+    part arm_thread "$built/arm_thread"
     part allocations "$built/allocations"
     part reading pinned "$built/reading"
     part summary summary

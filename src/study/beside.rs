@@ -119,10 +119,13 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
             if work >= WORK_PER_PIECE {
                 return None;
             }
-            match self.step() {
-                Some(more) => work += more,
-                None => self.apart = f64::INFINITY,
-            }
+            let Some(more) = self.step() else {
+                // Nothing that goes on would be counted as work.
+                self.left = 0;
+                self.apart = f64::INFINITY;
+                break;
+            };
+            work += more;
             self.left -= 1;
         }
         Some(self.apart)
@@ -138,5 +141,39 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
             .apart
             .max(if apart.is_nan() { f64::INFINITY } else { apart });
         Some(work)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A run whose numbers have ended, and which counts how often it is asked on.
+    struct Ended<'a>(&'a std::cell::Cell<u64>);
+
+    impl Steppable for Ended<'_> {
+        fn step(&mut self) -> Option<u64> {
+            self.0.set(self.0.get() + 1);
+            None
+        }
+
+        fn end_effector(&self) -> DVec2 {
+            DVec2::NAN
+        }
+    }
+
+    #[test]
+    fn a_comparison_ends_with_its_numbers_however_far_apart_is_allowed() {
+        let asked = std::cell::Cell::new(0);
+        let arm = Arm::<2>::default();
+        let start = State {
+            position: [0.0; 2],
+            velocity: [0.0; 2],
+        };
+        let truth = Truth::Free(FreeMotion::new(arm, start, 0.01, 1e-6));
+        let mut beside = Beside::new(Ended(&asked), 1_000_000, truth, 1, f64::INFINITY);
+        assert_eq!(beside.advance(), Some(f64::INFINITY));
+        assert_eq!(beside.advance(), Some(f64::INFINITY));
+        assert_eq!(asked.get(), 1);
     }
 }

@@ -2,18 +2,20 @@
 //!
 //! `cargo run --release --bin arm_thread`
 //!
-//! A task on that thread looks at the clock whenever it has its turn: the most that passes between two looks is what the
-//! longest message took. The arm is paused, so that steps do not count; of several rounds the quietest counts.
+//! A task on that thread looks at the thread's processor time whenever it has its turn: the most that passes between two
+//! looks is what the longest message took. Elapsed time would tell of the scheduler instead, which gives a thread that
+//! never sleeps 4 ms of rest where others want its core. The arm is paused, so that steps do not count; of several
+//! rounds the quietest counts.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::time::Instant;
 
 use actix::prelude::*;
 use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::resources::gauges::Gauges;
+use pendularm::actors::resources::work_clock::spent;
 use pendularm::actors::wire::Nodes;
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
@@ -132,16 +134,17 @@ async fn measure() {
     ArmSim::attach(&arm, &mut nodes);
     registry.send(Attach(nodes)).await.expect("a registry");
 
-    let longest = Arc::new(AtomicU64::new(0));
+    let [longest, looks] = [(); 2].map(|()| Arc::new(AtomicU64::new(0)));
     let ended = Arc::new(AtomicBool::new(false));
-    let (seen, end) = (Arc::clone(&longest), Arc::clone(&ended));
+    let (seen, looked, end) = (Arc::clone(&longest), Arc::clone(&looks), Arc::clone(&ended));
     thread.spawn(async move {
-        let mut last = Instant::now();
+        let mut last = spent();
         while !end.load(Ordering::Relaxed) {
             tokio::task::yield_now().await;
-            let now = Instant::now();
+            let now = spent();
             let between = u64::try_from((now - last).as_nanos()).unwrap_or(u64::MAX);
             seen.fetch_max(between, Ordering::Relaxed);
+            looked.fetch_add(1, Ordering::Release);
             last = now;
         }
     });
@@ -157,6 +160,11 @@ async fn measure() {
             longest.store(0, Ordering::Relaxed);
             client.send(&frame).await;
             client.settle().await;
+            // The answer leaves before the look that measures it.
+            let answered = looks.load(Ordering::Acquire);
+            while looks.load(Ordering::Acquire) < answered + 2 {
+                tokio::task::yield_now().await;
+            }
             quietest = quietest.min(longest.load(Ordering::Relaxed));
         }
         let took = quietest as f64 / 1e3;

@@ -11,7 +11,7 @@ use std::cmp::Ordering;
 use std::fmt;
 use std::iter::repeat;
 
-use serde::de::{DeserializeSeed, Deserializer, MapAccess, SeqAccess, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
 /// The text that replaces `NaN` on the way in. It reads as an infinity: nothing that we accept tells the two apart.
@@ -135,7 +135,8 @@ pub fn text(raw: &RawValue) -> Option<Cow<'_, str>> {
 /// is repeated. Other members are checked for syntax and ignored.
 ///
 /// # Errors
-/// Where `text` is not one valid JSON object.
+/// Where `text` is not one valid JSON object. The reason does not repeat a string in its place: to escape that would take
+/// fifty times as long as to read it.
 pub(crate) fn members<'a, const N: usize>(
     text: &'a str,
     names: &[&str; N],
@@ -151,6 +152,9 @@ pub(crate) fn members_into<'a>(
     names: &[&str],
     values: &mut [Option<&'a RawValue>],
 ) -> Result<(), serde_json::Error> {
+    if !text.trim_ascii_start().starts_with('{') {
+        return Err(serde::de::Error::custom("not a JSON object"));
+    }
     let mut deserializer = serde_json::Deserializer::from_str(text);
     Members { names, values }.deserialize(&mut deserializer)?;
     deserializer.end()
@@ -169,34 +173,53 @@ pub(crate) struct Entries<'a> {
 /// Reads the array `raw`, keeping at most `limit` entries: a long array costs time, not memory. `None` if it is no
 /// array.
 pub(crate) fn entries(raw: &RawValue, limit: usize) -> Option<Entries<'_>> {
-    let mut deserializer = serde_json::Deserializer::from_str(raw.get());
-    deserializer.deserialize_seq(Limit(limit)).ok()
-}
-
-struct Limit(usize);
-
-impl<'a> Visitor<'a> for Limit {
-    type Value = Entries<'a>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a JSON array")
+    let inside = raw.get().strip_prefix('[')?.strip_suffix(']')?;
+    let mut entries = Entries {
+        first: Vec::new(),
+        last: None,
+        count: 0,
+    };
+    if inside.trim_ascii().is_empty() {
+        return Some(entries);
     }
-
-    fn visit_seq<A: SeqAccess<'a>>(self, mut seq: A) -> Result<Entries<'a>, A::Error> {
-        let mut entries = Entries {
-            first: Vec::new(),
-            last: None,
-            count: 0,
-        };
-        while let Some(entry) = seq.next_element::<&'a RawValue>()? {
-            if entries.count < self.0 {
+    let mut start = 0;
+    loop {
+        let end = entry_end(inside.as_bytes(), start);
+        let is_last = end == inside.len();
+        entries.count += 1;
+        if is_last || entries.count <= limit {
+            let entry = serde_json::from_str(inside.get(start..end)?).ok()?;
+            if entries.count <= limit {
                 entries.first.push(entry);
             }
-            entries.last = Some(entry);
-            entries.count += 1;
+            if is_last {
+                entries.last = Some(entry);
+                return Some(entries);
+            }
         }
-        Ok(entries)
+        start = end + 1;
     }
+}
+
+/// The index of the comma behind the entry that begins at `start`, or of the end: in a valid array without its brackets
+/// whatever is open closes.
+fn entry_end(inside: &[u8], start: usize) -> usize {
+    let mut at = start;
+    let mut open = 0_usize;
+    while let Some(byte) = inside.get(at) {
+        match byte {
+            b'"' => {
+                at = string_end(inside, at);
+                continue;
+            }
+            b'[' | b'{' => open += 1,
+            b']' | b'}' => open = open.saturating_sub(1),
+            b',' if open == 0 => return at,
+            _ => (),
+        }
+        at += 1;
+    }
+    inside.len()
 }
 
 struct Members<'n, 'v, 'a> {
@@ -362,5 +385,42 @@ mod tests {
         let first: Vec<&str> = entries.first.iter().map(|entry| entry.get()).collect();
         assert_eq!((first, entries.count), (vec!["1", "2"], 4));
         assert_eq!(entries.last.map(RawValue::get), Some("4"));
+    }
+
+    #[test]
+    fn entries_end_at_commas_of_their_own_array_alone() {
+        let found = |text: &str| {
+            let raw = RawValue::from_string(text.to_owned()).unwrap();
+            let entries = entries(&raw, 9)?;
+            assert_eq!(
+                entries.last.map(RawValue::get),
+                entries.first.last().map(|raw| raw.get())
+            );
+            assert_eq!(entries.count, entries.first.len());
+            Some(
+                entries
+                    .first
+                    .iter()
+                    .map(|entry| entry.get().to_owned())
+                    .collect::<Vec<_>>(),
+            )
+        };
+        let texts = |texts: &[&str]| Some(texts.iter().map(ToString::to_string).collect());
+        assert_eq!(found("[]"), texts(&[]));
+        assert_eq!(found("[ \n ]"), texts(&[]));
+        assert_eq!(found("[ 1 ]"), texts(&["1"]));
+        assert_eq!(
+            found(r#"[ "a,\"]", [1,[2,3]] ,{"b":[4,5],"c,]":6}, "\\", -7e1 ]"#),
+            texts(&[
+                r#""a,\"]""#,
+                "[1,[2,3]]",
+                r#"{"b":[4,5],"c,]":6}"#,
+                r#""\\""#,
+                "-7e1"
+            ])
+        );
+        for other in [r#""[1]""#, "{}", "1", "null"] {
+            assert_eq!(found(other), None);
+        }
     }
 }

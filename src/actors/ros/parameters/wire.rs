@@ -4,7 +4,7 @@
 
 use actix::prelude::*;
 use bytes::Bytes;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use serde_json::json;
 use serde_json::value::RawValue;
 
@@ -17,7 +17,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Fields, RejectedField, Rejections};
 use crate::protocol::ros::parameters::{MAX_NAMED, Parameter, ParameterType};
-use crate::protocol::wire::json::text;
+use crate::protocol::wire::json::{self, text};
 
 impl<const N: usize> Parameters<N> {
     /// Enters this node's services into the registry's table.
@@ -94,28 +94,42 @@ impl Callable for DescribeParameters {
 }
 
 /// `rcl_interfaces/msg/Parameter`, as far as a parameter of ours has use for it.
-#[derive(Deserialize)]
 struct GivenParameter<'a> {
-    #[serde(borrow)]
     name: &'a RawValue,
-    #[serde(borrow)]
-    value: GivenParameterValue<'a>,
+    kind: u8,
+    integer: Option<&'a RawValue>,
+    double: Option<&'a RawValue>,
+    text: Option<&'a RawValue>,
+    integers: Option<&'a RawValue>,
+    doubles: Option<&'a RawValue>,
 }
 
-#[derive(Deserialize)]
-struct GivenParameterValue<'a> {
-    #[serde(rename = "type")]
-    kind: u8,
-    #[serde(borrow, default)]
-    integer_value: Option<&'a RawValue>,
-    #[serde(borrow, default)]
-    double_value: Option<&'a RawValue>,
-    #[serde(borrow, default)]
-    string_value: Option<&'a RawValue>,
-    #[serde(borrow, default)]
-    integer_array_value: Option<&'a RawValue>,
-    #[serde(borrow, default)]
-    double_array_value: Option<&'a RawValue>,
+impl<'a> GivenParameter<'a> {
+    /// `None` if it is no parameter.
+    fn read(entry: &'a RawValue) -> Option<Self> {
+        let [name, value] = json::members(entry.get(), &["name", "value"]).ok()?;
+        let [kind, integer, double, text, integers, doubles] = json::members(
+            value?.get(),
+            &[
+                "type",
+                "integer_value",
+                "double_value",
+                "string_value",
+                "integer_array_value",
+                "double_array_value",
+            ],
+        )
+        .ok()?;
+        Some(Self {
+            name: name?,
+            kind: u8::try_from(json::integer(kind?)?).ok()?,
+            integer,
+            double,
+            text,
+            integers,
+            doubles,
+        })
+    }
 }
 
 impl<const N: usize> Callable for SetParameters<N> {
@@ -127,9 +141,9 @@ impl<const N: usize> Callable for SetParameters<N> {
         };
         let mut changes = Vec::with_capacity(entries.len());
         for (index, entry) in entries.into_iter().enumerate() {
-            match serde_json::from_str::<GivenParameter<'_>>(entry.get()) {
-                Ok(given) => changes.push(given.change()),
-                Err(_) => {
+            match GivenParameter::read(entry) {
+                Some(given) => changes.push(given.change()),
+                None => {
                     let field = format!("parameters[{index}]");
                     let reason =
                         "must be a rcl_interfaces/msg/Parameter: name and value, with its type";
@@ -146,13 +160,12 @@ impl GivenParameter<'_> {
         let name = text(self.name).ok_or(NotSet::Unknown)?;
         let parameter = Parameter::from_name(&name).ok_or(NotSet::Unknown)?;
         let expected = parameter.kind();
-        let value = &self.value;
-        let member = match (expected, value.kind) {
-            (ParameterType::Double, 2) => value.integer_value,
-            (ParameterType::Double, 3) => value.double_value,
-            (ParameterType::Text, 4) => value.string_value,
-            (ParameterType::DoubleArray, 7) => value.integer_array_value,
-            (ParameterType::DoubleArray, 8) => value.double_array_value,
+        let member = match (expected, self.kind) {
+            (ParameterType::Double, 2) => self.integer,
+            (ParameterType::Double, 3) => self.double,
+            (ParameterType::Text, 4) => self.text,
+            (ParameterType::DoubleArray, 7) => self.integers,
+            (ParameterType::DoubleArray, 8) => self.doubles,
             (_, found) => {
                 return Err(NotSet::WrongType {
                     name: parameter.name(),

@@ -44,9 +44,10 @@ impl OpReader<'_> {
         if !is_ours || msg.get().len() <= USUAL {
             return Ok(None);
         }
-        let heard = trajectory::condensed(msg.raw()).map(Payload::from);
-        self.within(MAX_ARGS, "msg", heard.as_ref().unwrap_or(msg).get())?;
-        Ok(heard)
+        let heard = trajectory::condensed(msg.raw());
+        self.within(MAX_ARGS, "msg", heard.as_deref().unwrap_or(msg.get()))?;
+        let heard = heard.and_then(|text| RawValue::from_string(text).ok());
+        Ok(heard.map(Payload::from))
     }
 }
 
