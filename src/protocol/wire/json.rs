@@ -152,8 +152,8 @@ pub(crate) fn members_into<'a>(
     names: &[&str],
     values: &mut [Option<&'a RawValue>],
 ) -> Result<(), serde_json::Error> {
-    if !text.trim_ascii_start().starts_with('{') {
-        return Err(serde::de::Error::custom("not a JSON object"));
+    if text.trim_ascii_start().starts_with('"') {
+        return Err(serde::de::Error::custom("a string, not an object"));
     }
     let mut deserializer = serde_json::Deserializer::from_str(text);
     Members { names, values }.deserialize(&mut deserializer)?;
