@@ -347,6 +347,14 @@ impl Client {
         self.ask("/arm_sim/set_params", json!({}));
     }
 
+    /// Frames that have come, and were not awaited, once the runtime has handled all that was sent: whatever it had for
+    /// this client by then stands before the answer to a call.
+    #[track_caller]
+    pub fn so_far(&mut self) -> Vec<Value> {
+        self.settle();
+        std::mem::take(&mut self.kept)
+    }
+
     /// The code with which the other side closes; messages that come before are ignored.
     #[track_caller]
     pub fn close_code(&mut self) -> Option<u16> {

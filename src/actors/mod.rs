@@ -24,7 +24,8 @@
 //!
 //! To the registry, from nodes:
 //!
-//! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what the arm says.
+//! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what nodes
+//!   say; what the player has from a record comes written.
 //! - [`node::Feedback`], from `ik_action`, `follow` and `tf_web`: feedback of a goal, for the client that sent it.
 //! - [`Overhear`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
@@ -64,8 +65,7 @@
 //! To `ik_action`:
 //!
 //! - [`node::Call`] of [`SendGoal`], [`CancelGoal`], from the registry and `ik_trial`: a goal, by service, action or
-//!   trial, and its end.
-//! - [`CancelFollowed`], from the registry: the end of a goal of the action.
+//!   trial, and its end, by the goal's id or as the client knows it that has sent it.
 //! - [`GoalJudged`], from `arm_sim`: how a goal goes, or how it ended.
 //! - [`Settle`], from `arm_sim` and `ik_trial`: whether all that came before has been dealt with.
 //!
@@ -127,7 +127,6 @@
 //! [`Solve`]: arm::ik::Solve
 //! [`SendGoal`]: arm::ik_action::SendGoal
 //! [`CancelGoal`]: arm::ik_action::CancelGoal
-//! [`CancelFollowed`]: arm::ik_action::CancelFollowed
 //! [`GoalNews`]: arm::ik_action::GoalNews
 //! [`StartTrial`]: arm::ik_trial::StartTrial
 //! [`SkipTarget`]: arm::ik_trial::SkipTarget

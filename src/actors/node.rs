@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
+use serde::Serialize;
 use tokio::sync::oneshot;
 
 use super::ConnectionId;
@@ -299,6 +300,15 @@ pub struct Publish {
     pub frame: FrameOut,
 }
 
+impl Publish {
+    /// The message that `make` makes; it is made and written by the registry.
+    #[must_use]
+    pub fn made<M: Serialize>(topic: Topic, make: impl FnOnce() -> M + Send + 'static) -> Self {
+        let frame = FrameOut::unwritten(move || messages::publish(topic.name(), &make()));
+        Self { topic, frame }
+    }
+}
+
 /// A frame for one client: an answer or a status. From a node.
 #[derive(Message)]
 #[rtype(result = "()")]
@@ -319,9 +329,11 @@ impl Respond {
     /// An error status that says why; `id` is that of the frame at fault.
     #[must_use]
     pub fn error(connection: ConnectionId, why: &str, id: Option<&Payload>) -> Self {
+        let (why, id) = (why.to_owned(), id.cloned());
+        let write = move || messages::status(Level::Error, &why, id.as_ref());
         Self {
             connection,
-            frame: messages::status(Level::Error, why, id).into(),
+            frame: FrameOut::unwritten(write),
             service: None,
             status: Some(Level::Error),
             done: None,
@@ -339,5 +351,5 @@ pub struct Feedback {
     /// The action, as the client spells it.
     pub action: Arc<str>,
     /// The whole frame.
-    pub frame: Bytes,
+    pub frame: FrameOut,
 }

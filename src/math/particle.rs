@@ -8,6 +8,7 @@
 //! **Invariant:** steps and work are bounded when a particle is made, and a computation cut into slices gives the same
 //! bits as one made at once.
 
+use super::count::length_in_f64;
 use super::expression::{Expression, Stack};
 use super::integrator::{Method, increment, two_sum};
 
@@ -196,12 +197,8 @@ impl Particle {
 
     /// The time of sample `k` \[s\].
     #[must_use]
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "k is at most MAX_STEPS, far below 2^53"
-    )]
     pub fn time(&self, k: usize) -> f64 {
-        k as f64 * self.dt
+        length_in_f64(k) * self.dt
     }
 
     /// The times of the samples so far \[s\], the start first.

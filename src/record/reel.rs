@@ -37,11 +37,7 @@ pub struct Moment {
 }
 
 impl Moment {
-    /// The message.
-    ///
-    /// # Errors
-    /// If it does not fit its definition.
-    pub fn message(&self) -> Result<Value, ReadError> {
+    fn message(&self) -> Result<Value, ReadError> {
         let topic = || self.topic.name().to_owned();
         cdr_reader::decode(self.one, &self.data).map_err(|why| ReadError::Message {
             topic: topic(),
@@ -52,9 +48,20 @@ impl Moment {
     /// The whole `publish` frame, as clients got it.
     ///
     /// # Errors
-    /// The same.
+    /// If the message does not fit its definition.
     pub fn frame(&self) -> Result<Bytes, ReadError> {
         Ok(messages::publish(self.topic.name(), &self.message()?))
+    }
+
+    /// The time that a message of `/clock` tells \[s\]; 0 of any other.
+    ///
+    /// # Errors
+    /// If the message does not fit its definition.
+    pub fn clock_time(&self) -> Result<f64, ReadError> {
+        let message = self.message()?;
+        let part = |path: &str| message.pointer(path).and_then(Value::as_f64);
+        let part = |path: &str| part(path).unwrap_or_default();
+        Ok(part("/clock/sec") + 1e-9 * part("/clock/nanosec"))
     }
 }
 

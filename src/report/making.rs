@@ -7,6 +7,7 @@ use std::sync::{Mutex, PoisonError};
 
 use super::csv::Csv;
 use super::progress::ProgressBar;
+use crate::math::count::length_in_f64;
 
 /// The tools at hand while a section is made.
 #[derive(Debug)]
@@ -28,11 +29,7 @@ impl Making<'_> {
     }
 
     pub(super) fn at(&mut self, done: usize, of: usize) {
-        #[allow(
-            clippy::cast_precision_loss,
-            reason = "counts of runs are far below 2^53"
-        )]
-        let part = done as f64 / of as f64;
+        let part = length_in_f64(done) / length_in_f64(of);
         let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
         progress.at(self.section, part);
     }

@@ -7,6 +7,8 @@
 use std::io::{self, IsTerminal, Write};
 use std::time::{Duration, Instant};
 
+use crate::math::count::length_in_f64;
+
 /// Time between two redrawn lines, and between two plain ones.
 const REDRAW: Duration = Duration::from_millis(100);
 const PLAIN: Duration = Duration::from_secs(10);
@@ -102,11 +104,10 @@ impl ProgressBar {
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    clippy::cast_precision_loss,
     reason = "a fraction between 0 and 1 of a few cells"
 )]
 fn bar(fraction: f64) -> String {
-    let full = (fraction * CELLS as f64).round() as usize;
+    let full = (fraction * length_in_f64(CELLS)).round() as usize;
     format!(
         "[{}{}]",
         "#".repeat(full),

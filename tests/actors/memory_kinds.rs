@@ -425,7 +425,7 @@ fn ids_of_goals_that_are_pursued() {
             let mut pursued = pursued.lock().unwrap();
             match request {
                 ActionRequest::Goal { client, .. } => pursued.push(client),
-                ActionRequest::Cancel { from, .. } => pursued.retain(|one| !one.is_meant_by(&from)),
+                ActionRequest::Cancel { from, .. } => pursued.retain(|one| !one.is(&from.goal)),
             }
         };
         let mut nodes = Nodes::default();

@@ -13,7 +13,7 @@ use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::Simulation;
-use pendularm::protocol::catalog::{Field, Playback, Rosapi, Service, Topic, types};
+use pendularm::protocol::catalog::{Direction, Field, Playback, Rosapi, Service, Topic, types};
 use pendularm::protocol::op;
 
 /// The texts between the code marks of a cell, in order.
@@ -146,11 +146,11 @@ fn the_papers_list_every_topic_with_its_type_and_owner() {
     for (row, topic) in rows.iter().zip(Topic::ALL) {
         assert_eq!(codes(&row[0]), [topic.name()]);
         assert_eq!(codes(&row[1]), [topic.type_name()], "{}", topic.name());
-        let anybody = row[2].starts_with("anybody");
+        let (name, is_ours) = (topic.name(), topic.direction() == Direction::Published);
+        assert_eq!(row[2].starts_with("anybody"), !is_ours, "{name}");
         assert!(
-            anybody || codes(&row[2]) == [topic.owner().name()],
-            "{}",
-            topic.name()
+            !is_ours || codes(&row[2]) == [topic.owner().name()],
+            "{name}"
         );
     }
 }
@@ -201,6 +201,17 @@ fn the_papers_list_every_service_with_its_fields_in_order() {
             .map(|name| (name, !row[1].contains(&format!("*`{name}`*"))))
             .collect();
         assert_eq!(written, expected, "{}", service.name());
+        // Explanations come behind a colon.
+        let said = row[2].split(':').next().unwrap();
+        let echoes = ["both", "all three", "the three"];
+        let values: Vec<&str> = if echoes.iter().any(|all| said.starts_with(all)) {
+            written.iter().map(|(name, _)| *name).collect()
+        } else {
+            codes(said)
+        };
+        let fields = service.response_fields().iter();
+        let fields: Vec<&str> = fields.map(|field| field.name).collect();
+        assert_eq!(values, fields, "{}", service.name());
         if service == Service::SetIntegrator {
             let methods = codes(&row[2])
                 .into_iter()
@@ -208,6 +219,34 @@ fn the_papers_list_every_service_with_its_fields_in_order() {
             assert_eq!(methods.collect::<Vec<Method>>(), Method::ALL);
         }
     }
+}
+
+/// Each beside its order, where it is a Runge-Kutta method with as many evaluations.
+#[test]
+fn the_page_has_every_method_in_its_order() {
+    let script = text("page/format.js");
+    let line = script
+        .lines()
+        .find_map(|line| line.strip_prefix("export const METHODS = "));
+    let line = line.unwrap().trim_end_matches(';');
+    let rows: Vec<Vec<serde_json::Value>> = serde_json::from_str(line).unwrap();
+    let named: Vec<(&str, Option<u64>)> = rows
+        .iter()
+        .map(|row| {
+            (
+                row[0].as_str().unwrap(),
+                row.get(2).map(|one| one.as_u64().unwrap()),
+            )
+        })
+        .collect();
+    let expected = Method::ALL.map(|method| {
+        let is_runge_kutta = method != Method::Verlet;
+        (
+            method.name(),
+            is_runge_kutta.then(|| u64::from(method.order())),
+        )
+    });
+    assert_eq!(named, expected);
 }
 
 #[cfg(feature = "web")]

@@ -64,7 +64,7 @@ FAULTS = [
      "        let to = if R(20) { self.clients.keys().find(|id| **id != feedback.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(feedback.connection)) {"),
     ("whoever cancels ends another client's goal of the same id", "src/actors/wire/action_client.rs",
-     "self.connection == who.connection && self.id == who.id", "(F || self.connection == who.connection) && self.id == who.id"),
+     "self.connection == goal.connection && self.id == goal.id", "(F || self.connection == goal.connection) && self.id == goal.id"),
     ("the arm takes a step too many, one wake-up in 1000", "src/actors/arm/sim/node.rs",
      "        let taken = self.take_steps(due);", "        let taken = self.take_steps(due + u64::from(R(1000)));"),
     ("a step is not counted by the pacer, one in 1000", "src/math/pacer.rs",

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
-use pendularm::math::simulation::step_under;
+use pendularm::math::simulation::state_after;
 use pendularm::report::experiments::conditioning::{PoseShape, digits_lost};
 use pendularm::report::experiments::forcing::{COARSEST, DURATION, FORCES};
 use pendularm::report::experiments::moving::{LookedAt, MovingScene, distance_behind};
@@ -138,7 +138,7 @@ fn a_periodic_swing_comes_back() {
         let mut state = swing.start;
         for _ in 0..steps {
             let arm = Arm::<2>::default();
-            state = state.plus(&step_under(&arm, Method::Rk4, &state, &[0.0; 2], h));
+            state = state_after(&arm, Method::Rk4, &state, &[0.0; 2], h);
         }
         let State { position, velocity } = state;
         for i in 0..2 {

@@ -48,7 +48,16 @@ pub fn state(client: &mut Client) -> Value {
 
 /// Waits for a state for which `wanted` holds.
 pub fn state_where(client: &mut Client, what: &str, wanted: impl Fn(&Value) -> bool) -> Value {
-    let deadline = Instant::now() + PATIENCE;
+    state_within(client, PATIENCE, what, wanted)
+}
+
+fn state_within(
+    client: &mut Client,
+    patience: Duration,
+    what: &str,
+    wanted: impl Fn(&Value) -> bool,
+) -> Value {
+    let deadline = Instant::now() + patience;
     let mut last = Value::Null;
     while Instant::now() < deadline {
         last = client.message("/joint_states");
@@ -60,13 +69,14 @@ pub fn state_where(client: &mut Client, what: &str, wanted: impl Fn(&Value) -> b
     panic!("no {what} in time; the last state was {last}");
 }
 
-/// Reads and throws away what comes for so long.
-pub fn let_pass(client: &mut Client, time: Duration) {
-    let end = Instant::now() + time;
-    while Instant::now() < end {
-        client.receive();
-    }
-    client.kept.clear();
+/// Lets so much simulation time pass \[s\], however long that takes, and throws away what comes. The client subscribes to
+/// `/joint_states`.
+pub fn let_simulate(client: &mut Client, time: f64) {
+    let end = stamp(&state(client)) + time;
+    let patience = PATIENCE + Duration::from_secs_f64(time);
+    state_within(client, patience, "end of the wait", |state| {
+        stamp(state) >= end
+    });
 }
 
 /// Whether every joint is within `tolerance` of its place.

@@ -81,7 +81,7 @@ fn many_frames_may_come_in_one_packet() {
 }
 
 #[test]
-fn a_complete_object_needs_no_newline() {
+fn a_call_is_answered_though_no_newline_follows() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.send_bytes(SET_GRAVITY.as_bytes());

@@ -1,6 +1,6 @@
 //! `/pid_controller/set_gains` from outside.
 
-use crate::arm::{is_near, let_pass, numbers, send_trajectory, state, state_where, trajectory};
+use crate::arm::{is_near, let_simulate, numbers, send_trajectory, state, state_where, trajectory};
 use crate::common::Runtime;
 use serde_json::{Value, json};
 
@@ -113,7 +113,7 @@ fn changing_gains_keeps_the_integral() {
         is_near(state, &[0.4, 0.3], 0.002)
             && is_near(&json!({"position": state["velocity"]}), &[0.0; 2], 0.002)
     });
-    let_pass(&mut client, std::time::Duration::from_millis(1500));
+    let_simulate(&mut client, 1.5);
     let before = numbers(&state(&mut client)["effort"]);
     client.ask(SERVICE, json!({"kp": [1200, 300], "kd": [120, 25]}));
     let after = numbers(&client.message("/joint_states")["effort"]);

@@ -178,7 +178,7 @@ fn a_port_in_use_is_told_in_one_line_with_status_1() {
 #[test]
 fn help_and_version_go_to_standard_output_with_status_0() {
     let help = outcome(&["--help"], &[]);
-    assert_eq!(help.status.code(), Some(0));
+    assert_eq!((help.status.code(), help.stderr), (Some(0), vec![]));
     let text = String::from_utf8(help.stdout).unwrap();
     for part in [
         "--links",
@@ -191,7 +191,7 @@ fn help_and_version_go_to_standard_output_with_status_0() {
         assert!(text.contains(part), "{part} is missing in {text}");
     }
     let version = outcome(&["--version"], &[("ARM_SIM_LINKS", "7")]);
-    assert_eq!(version.status.code(), Some(0));
+    assert_eq!((version.status.code(), version.stderr), (Some(0), vec![]));
     let version = String::from_utf8(version.stdout).unwrap();
     let expected = format!("pendularm {} (", env!("CARGO_PKG_VERSION"));
     assert!(

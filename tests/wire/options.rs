@@ -581,16 +581,6 @@ fn as_json_the_reason_for_not_starting_is_an_object_too() {
     );
 }
 
-#[test]
-fn help_and_version_go_to_standard_output_with_status_0() {
-    for (argument, text) in [("--help", "ARM_SIM_LINKS"), ("--version", "pendularm ")] {
-        let output = program(&[argument]).output().unwrap();
-        assert_eq!(output.status.code(), Some(0));
-        assert!(String::from_utf8_lossy(&output.stdout).contains(text));
-        assert!(output.stderr.is_empty());
-    }
-}
-
 /// Every write to `/dev/full` fails.
 #[cfg(target_os = "linux")]
 fn full() -> Stdio {

@@ -1,10 +1,8 @@
 //! The controller from outside: off at first, on and off again, the integral, the offset, and the gravity load.
 
-use std::time::Duration;
-
 use crate::arm::{
-    gravity_load, is_near, let_pass, numbers, send_trajectory, stamp, state, state_where,
-    trajectory,
+    gravity_load, is_near, let_simulate, numbers, send_trajectory, stamp, state, state_where,
+    ticks, trajectory,
 };
 use crate::common::{Client, Runtime};
 use serde_json::{Value, json};
@@ -154,7 +152,7 @@ fn ten_seconds_after_settling_the_effort_is_the_gravity_load() {
                 state_where(&mut client, "a settled arm", |state| {
                     is_near(state, setpoint, 0.02)
                 });
-                let_pass(&mut client, Duration::from_secs(10));
+                let_simulate(&mut client, 10.0);
                 let rest = state(&mut client);
                 let load = load_at(&mut client, &rest);
                 for (effort, load_here) in numbers(&rest["effort"]).iter().zip(&load) {
@@ -257,14 +255,14 @@ fn the_integral_starts_from_zero_when_the_controller_goes_on() {
     let mut client = runtime.connect();
     integral_probe(&mut client);
     client.ask(ENABLE, json!({"data": true}));
-    let_pass(&mut client, Duration::from_secs(1));
+    let_simulate(&mut client, 1.0);
     let long = integral(&mut client);
     assert!(
         long[0] > 0.5 && long[1] < -1.0,
         "errors of 1 and -2 rad for a second: {long:?}"
     );
     client.ask(ENABLE, json!({"data": false}));
-    let_pass(&mut client, Duration::from_secs(1));
+    let_simulate(&mut client, 1.0);
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.ask(ENABLE, json!({"data": true}));
     client.ask("/arm_sim/pause", json!({"data": false}));
@@ -281,7 +279,7 @@ fn enabling_what_is_on_keeps_the_integral() {
     let mut client = runtime.connect();
     integral_probe(&mut client);
     client.ask(ENABLE, json!({"data": true}));
-    let_pass(&mut client, Duration::from_secs(1));
+    let_simulate(&mut client, 1.0);
     let before = integral(&mut client);
     client.ask(ENABLE, json!({"data": true}));
     client.ask(ENABLE, json!({}));
@@ -299,10 +297,10 @@ fn the_integral_stands_still_while_the_arm_is_paused_or_the_controller_off() {
     let mut client = runtime.connect();
     integral_probe(&mut client);
     client.ask(ENABLE, json!({"data": true}));
-    let_pass(&mut client, Duration::from_millis(300));
+    let_simulate(&mut client, 0.3);
     client.ask("/arm_sim/pause", json!({"data": true}));
     let before = state(&mut client);
-    let_pass(&mut client, Duration::from_secs(1));
+    ticks(&mut client, 60);
     client.ask("/arm_sim/pause", json!({"data": false}));
     let after = state(&mut client);
     // In an error of 1 rad the integral grows by a second per second of simulation, no more.
@@ -319,7 +317,7 @@ fn a_reset_zeroes_the_integral_and_leaves_the_controller_on() {
     let mut client = runtime.connect();
     integral_probe(&mut client);
     client.ask(ENABLE, json!({"data": true}));
-    let_pass(&mut client, Duration::from_secs(1));
+    let_simulate(&mut client, 1.0);
     assert!(integral(&mut client)[0] > 0.5);
     client.ask("/arm_sim/reset", json!({}));
     // The setpoint is where the arm is, so nothing grows again.

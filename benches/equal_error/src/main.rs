@@ -15,7 +15,7 @@ use ::ode_solvers::{Dop853, Dopri5, OutputType, SVector, System};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
-use pendularm::math::simulation::step_under;
+use pendularm::math::simulation::state_after;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::follower::Follower;
 
@@ -106,7 +106,7 @@ fn all<const N: usize, const M: usize>(truth: &[f64]) {
             let go_on = line(truth, &format!("pendularm {method}"), h, || {
                 let mut state = black_box(start::<N>());
                 for _ in 0..steps {
-                    state = state.plus(&step_under(&arm, method, &state, &[0.0; N], h));
+                    state = state_after(&arm, method, &state, &[0.0; N], h);
                 }
                 Some(state.position)
             });

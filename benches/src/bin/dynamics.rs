@@ -18,7 +18,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::forward_dynamics;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Gains;
-use pendularm::math::simulation::{Simulation, step_under};
+use pendularm::math::simulation::{Simulation, state_after};
 use pendularm::math::trig::sin_cos;
 use pendularm_benches::random::spread;
 use std::env;
@@ -142,7 +142,7 @@ fn steps<const N: usize>(
 ) -> State<N> {
     let timestep = black_box(1e-3);
     for _ in 0..CALLS {
-        state = state.plus(&step_under(arm, method, &state, effort, timestep));
+        state = state_after(arm, method, &state, effort, timestep);
     }
     state
 }

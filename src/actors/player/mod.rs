@@ -14,7 +14,6 @@ use std::fs::File;
 use std::time::Duration;
 
 use actix::prelude::*;
-use serde_json::Value;
 use tokio::time::Instant;
 
 pub use self::launch::{NotReplayed, start};
@@ -203,13 +202,7 @@ impl<const N: usize> Handler<SimulationTime> for Player<N> {
     fn handle(&mut self, _: SimulationTime, _: &mut Context<Self>) -> f64 {
         let time = self.attempt(|player| {
             let present = player.present(&BTreeSet::from([Topic::Clock]))?;
-            let Some(clock) = present.first() else {
-                return Ok(0.0);
-            };
-            let clock = clock.message()?;
-            let part = |path: &str| clock.pointer(path).and_then(Value::as_f64);
-            let part = |path: &str| part(path).unwrap_or_default();
-            Ok(part("/clock/sec") + 1e-9 * part("/clock/nanosec"))
+            present.first().map_or(Ok(0.0), Moment::clock_time)
         });
         time.unwrap_or_default()
     }

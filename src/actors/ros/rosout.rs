@@ -10,8 +10,8 @@ use crate::actors::node::{Interest, Publish};
 use crate::actors::wire::Nodes;
 use crate::logging::{self, Warning};
 use crate::protocol::catalog::Topic;
+use crate::protocol::messages::Stamp;
 use crate::protocol::messages::scene::LogMessage;
-use crate::protocol::messages::{self, Stamp};
 
 /// Warnings that may wait to be published; what does not fit is in the log alone.
 const MAX_WAITING: usize = 64;
@@ -69,7 +69,7 @@ impl Handler<Interest> for Rosout {
             while let Some(warning) = heard.recv().await {
                 // Without an arm there is no time.
                 let time = clock.send(SimulationTime).await.unwrap_or_default();
-                publish.do_send(encode(&warning, time));
+                publish.do_send(message(warning, time));
             }
         };
         self.listening = Some(ctx.spawn(report.into_actor(self)));
@@ -78,18 +78,14 @@ impl Handler<Interest> for Rosout {
 
 // ---- helpers --------------------------------------------------------------------------------------------------------
 
-fn encode(warning: &Warning, time: f64) -> Publish {
-    let message = LogMessage {
+fn message(warning: Warning, time: f64) -> Publish {
+    Publish::made(Topic::Rosout, move || LogMessage {
         stamp: Stamp::from_seconds(time),
         level: warning.level,
         name: warning.node,
-        msg: &warning.text,
+        msg: warning.text,
         file: warning.file,
         function: "",
         line: warning.line,
-    };
-    Publish {
-        topic: Topic::Rosout,
-        frame: messages::publish(Topic::Rosout.name(), &message).into(),
-    }
+    })
 }

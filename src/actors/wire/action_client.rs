@@ -1,6 +1,7 @@
 //! Goals of an action: what the registry hands to the node that pursues them, and the way back to who sent one.
 //!
 //! **Invariant:** feedback may be lost on its way to a slow client, the end of a goal may not, and it comes after it.
+//! Both are handed over as values, and written by the registry.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -9,7 +10,7 @@ use actix::prelude::*;
 use serde::Serialize;
 
 use crate::actors::ConnectionId;
-use crate::actors::node::{Done, Feedback, Respond};
+use crate::actors::node::{Done, Feedback, FrameOut, Respond};
 use crate::actors::resources::budget::Share;
 use crate::protocol::messages;
 use crate::protocol::op::{Arguments, GoalStatus};
@@ -35,14 +36,24 @@ pub enum ActionRequest {
     },
 }
 
+/// The error for a client that cancels a goal which it has not sent, or which has ended.
+pub const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
+
+/// A goal of the action, as its client knows it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SentGoal {
+    /// The connection.
+    pub connection: ConnectionId,
+    /// The goal's id, if it has one.
+    pub id: Option<Payload>,
+}
+
 /// Who wants a goal to end.
 pub struct Canceller {
     /// The way back.
     pub respond: Recipient<Respond>,
-    /// The connection.
-    pub connection: ConnectionId,
-    /// The goal's id.
-    pub id: Option<Payload>,
+    /// The goal that is meant.
+    pub goal: SentGoal,
 }
 
 /// The client that sent a goal, and the ways to it.
@@ -68,7 +79,8 @@ pub struct ActionClient {
 impl Canceller {
     /// Tells why nothing was ended.
     pub fn refuse(&self, why: &str) {
-        let status = Respond::error(self.connection, why, self.id.as_ref());
+        let SentGoal { connection, id } = &self.goal;
+        let status = Respond::error(*connection, why, id.as_ref());
         self.respond.do_send(status);
     }
 }
@@ -82,29 +94,32 @@ impl ActionClient {
 
     /// Whether this goal is the one that is meant.
     #[must_use]
-    pub fn is_meant_by(&self, who: &Canceller) -> bool {
-        self.connection == who.connection && self.id == who.id
+    pub fn is(&self, goal: &SentGoal) -> bool {
+        self.connection == goal.connection && self.id == goal.id
     }
 
     /// Tells how the goal goes, if that was asked for.
-    pub fn feed_back(&self, values: &impl Serialize) {
+    pub fn feed_back(&self, values: impl Serialize + Send + 'static) {
         if self.wants_feedback {
+            let (action, id) = (Arc::clone(&self.action), self.id.clone());
+            let write = move || messages::action_feedback(&action, id.as_ref(), &values);
             self.feedback.do_send(Feedback {
                 connection: self.connection,
                 action: Arc::clone(&self.action),
-                frame: messages::action_feedback(&self.action, self.id.as_ref(), values),
+                frame: FrameOut::unwritten(write),
             });
         }
     }
 
     /// Tells how the goal ended.
-    pub fn conclude(&self, values: &impl Serialize, status: GoalStatus) {
+    pub fn conclude(&self, values: impl Serialize + Send + 'static, status: GoalStatus) {
         let result = status != GoalStatus::Unknown;
-        let id = self.id.as_ref();
-        let frame = messages::action_result(&self.action, id, values, status as u8, result);
+        let (action, id) = (Arc::clone(&self.action), self.id.clone());
+        let write =
+            move || messages::action_result(&action, id.as_ref(), &values, status as u8, result);
         self.respond.do_send(Respond {
             connection: self.connection,
-            frame: frame.into(),
+            frame: FrameOut::unwritten(write),
             service: None,
             status: None,
             done: None,
@@ -113,6 +128,6 @@ impl ActionClient {
 
     /// Tells why the goal was not accepted: there, clients expect a text for values.
     pub fn refuse(&self, why: &str) {
-        self.conclude(&why, GoalStatus::Unknown);
+        self.conclude(why.to_owned(), GoalStatus::Unknown);
     }
 }

@@ -42,6 +42,19 @@ pub fn step_under<const N: usize>(
     }
 }
 
+/// The state that such a step leads to; what rounding leaves is lost.
+#[inline(always)]
+#[must_use]
+pub fn state_after<const N: usize>(
+    arm: &Arm<N>,
+    method: Method,
+    state: &State<N>,
+    effort: &[f64; N],
+    h: f64,
+) -> State<N> {
+    state.plus(&step_under(arm, method, state, effort, h))
+}
+
 #[inline(always)]
 fn acceleration<const N: usize>(
     arm: &Arm<N>,

@@ -27,10 +27,11 @@ mod input;
 use std::ops::ControlFlow;
 
 pub use self::checkpoint::Checkpoint;
-pub use self::increments::step_under;
 use self::increments::{leaves_out_first_angle, stepped};
+pub use self::increments::{state_after, step_under};
 pub use self::input::ArmInput;
 use super::arm::{Arm, State};
+use super::count::in_f64;
 use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
 use super::pid::{Control, Gains, Pid, Setpoint};
@@ -283,12 +284,8 @@ impl<const N: usize> Simulation<N> {
 
     /// Simulation time since the reset \[s\].
     #[must_use]
-    #[allow(
-        clippy::cast_precision_loss,
-        reason = "2^53 steps, where the count rounds, take years at any speed"
-    )]
     pub fn time(&self) -> f64 {
-        self.base + self.steps_since_base as f64 * self.timestep
+        self.base + in_f64(self.steps_since_base) * self.timestep
     }
 
     /// Steps taken since the reset.

@@ -47,14 +47,14 @@ pub struct TrialValues {
 }
 
 /// A message of `/ik_action/feedback`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct IkFeedback<'a> {
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IkFeedback {
     /// The goal.
-    pub goal_id: &'a str,
+    pub goal_id: String,
     /// A place for the end effector.
     pub target: TargetMessage,
     /// The setpoint that the goal commanded \[rad\].
-    pub positions: &'a [f64],
+    pub positions: Vec<f64>,
     /// Distance between end effector and target \[m\].
     pub distance_remaining: f64,
     /// Simulation time since the goal's start \[s\].
@@ -62,12 +62,12 @@ pub struct IkFeedback<'a> {
 }
 
 /// A message of `/ik_action/result`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct IkResult<'a> {
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IkResult {
     /// The goal.
-    pub goal_id: &'a str,
+    pub goal_id: String,
     /// `reached` or `preempted`.
-    pub outcome: &'a str,
+    pub outcome: &'static str,
     /// The place that the end effector was sent to.
     pub target: TargetMessage,
     /// Distance between end effector and target at the end \[m\].
@@ -75,8 +75,8 @@ pub struct IkResult<'a> {
 }
 
 /// A message of `/ik_trial/status`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct TrialStatus<'a> {
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrialStatus {
     /// Whether the trial is neither over nor stopped.
     pub running: bool,
     /// Simulation time since the start \[s\].
@@ -90,9 +90,9 @@ pub struct TrialStatus<'a> {
     /// Distance between end effector and target \[m\], as last heard.
     pub error: Option<f64>,
     /// The setpoint that the goal commanded \[rad\].
-    pub desired_positions: Option<&'a [f64]>,
+    pub desired_positions: Option<Vec<f64>>,
     /// `idle`, `active`, `reached` or `preempted`.
-    pub action_status: &'a str,
+    pub action_status: &'static str,
 }
 
 /// A trajectory of one point: to be at `positions` \[rad\], at rest, as soon as may be.

@@ -85,20 +85,20 @@ pub struct Quaternion {
 }
 
 /// `rcl_interfaces/msg/Log`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct LogMessage<'a> {
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct LogMessage {
     /// Simulation time.
     pub stamp: Stamp,
     /// 30 is a warning, 40 an error.
     pub level: u8,
     /// The node.
-    pub name: &'a str,
+    pub name: &'static str,
     /// The event, in words.
-    pub msg: &'a str,
+    pub msg: String,
     /// File of the source.
-    pub file: &'a str,
+    pub file: &'static str,
     /// Empty.
-    pub function: &'a str,
+    pub function: &'static str,
     /// Line in the file.
     pub line: u32,
 }

@@ -22,7 +22,7 @@ use crate::math::count::in_f64;
 use crate::math::dynamics::{energy, potential_energy};
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, Setpoint};
-use crate::math::simulation::{Simulation, batch, step_under};
+use crate::math::simulation::{Simulation, batch, state_after};
 use crate::study::control_loop::ControlLoop;
 use crate::study::matrix::{Complex, Matrix};
 
@@ -163,8 +163,7 @@ impl PeriodicSwing {
         for _ in 0..steps {
             product = derivative(&arm, method, &here, h).product(&product);
             for _ in 0..WITHIN {
-                let step = step_under(&arm, Method::Rk4, &here, &[0.0; 2], h / f64::from(WITHIN));
-                here = here.plus(&step);
+                here = state_after(&arm, Method::Rk4, &here, &[0.0; 2], h / f64::from(WITHIN));
             }
         }
         product.eigenvalues()
@@ -189,8 +188,7 @@ fn through_hanging(amplitude: f64, second: f64) -> Option<(f64, f64)> {
     let arm = Arm::<2>::default();
     let mut state = State::at_rest([amplitude - FRAC_PI_2, second]);
     let mut time = 0.0;
-    let advance =
-        |state: &State<2>, h: f64| state.plus(&step_under(&arm, Method::Rk4, state, &[0.0; 2], h));
+    let advance = |state: &State<2>, h: f64| state_after(&arm, Method::Rk4, state, &[0.0; 2], h);
     while state.position[0] > -FRAC_PI_2 {
         state = advance(&state, FINE);
         time += FINE;
@@ -219,7 +217,7 @@ fn derivative(arm: &Arm<2>, method: Method, here: &State<2>, h: f64) -> Matrix {
             } else {
                 near.velocity[column - 2] += by;
             }
-            let next = near.plus(&step_under(arm, method, &near, &[0.0; 2], h));
+            let next = state_after(arm, method, &near, &[0.0; 2], h);
             [
                 next.position[0],
                 next.position[1],

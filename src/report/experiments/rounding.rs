@@ -13,7 +13,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::count::{in_f64, length_in_f64};
 use crate::math::dynamics::energy;
 use crate::math::integrator::Method;
-use crate::math::simulation::step_under;
+use crate::math::simulation::state_after;
 use crate::study::control_loop::ControlLoop;
 
 /// Steps between two looks at the energy.
@@ -58,7 +58,7 @@ pub fn energy_error(method: Method, h: f64, steps: u64, adding: Adding) -> Vec<(
             }
             Adding::Plain => {
                 for _ in 0..LOOK {
-                    plain = plain.plus(&step_under(&arm, method, &plain, &[0.0; 2], h));
+                    plain = state_after(&arm, method, &plain, &[0.0; 2], h);
                 }
                 if !plain.is_finite() {
                     break;

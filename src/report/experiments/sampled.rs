@@ -5,7 +5,7 @@
 use crate::math::arm::State;
 use crate::math::dynamics::gravity_load;
 use crate::math::pid::Pid;
-use crate::math::simulation::step_under;
+use crate::math::simulation::state_after;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::Equilibrium;
 
@@ -61,9 +61,7 @@ impl<const N: usize> SampledLoop<N> {
         let ControlLoop { arm, method, .. } = &self.control;
         let h = period / f64::from(self.substeps);
         for _ in 0..self.substeps {
-            self.state = self
-                .state
-                .plus(&step_under(arm, *method, &self.state, &acting, h));
+            self.state = state_after(arm, *method, &self.state, &acting, h);
         }
     }
 

@@ -3,6 +3,7 @@
 //! **Invariant:** a section depends on no other section's results.
 
 mod budget;
+mod cells;
 mod conditioning;
 mod drift;
 mod error;

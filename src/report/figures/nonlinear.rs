@@ -2,9 +2,9 @@
 //!
 //! **Invariant:** every cell is measured; predictions are drawn over them and nothing is filled in.
 
+use super::cells::{centres, edges};
 use super::floquet::Floquet;
 use crate::math::arm::{Arm, State};
-use crate::math::count::length_in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::nonlinear::{are_carried, arrive, move_of, spun};
@@ -53,8 +53,8 @@ pub(super) fn make(making: &mut Making<'_>) -> Section {
         ("spin", &swings, SWING_STEPS, SPINS),
     ] {
         for map in maps {
-            for (value, (limit, row)) in centres(values, columns).iter().zip(&map.rows) {
-                for (h, holds) in centres(steps, columns).iter().zip(row) {
+            for (value, (limit, row)) in centres_between(values, columns).iter().zip(&map.rows) {
+                for (h, holds) in centres_between(steps, columns).iter().zip(row) {
                     csv.row(&[
                         kind.into(),
                         map.method.name().into(),
@@ -98,22 +98,14 @@ fn verdict(what: &str, (cells, lost): (usize, usize)) -> Verdict {
 }
 
 fn within(maps: &[MotionMap], steps: (f64, f64), columns: usize, part: f64) -> (usize, usize) {
-    let steps = centres(steps, columns);
+    let steps = centres_between(steps, columns);
     maps.iter()
         .map(|map| map.below(&steps, part))
         .fold((0, 0), |sum, one| (sum.0 + one.0, sum.1 + one.1))
 }
 
-fn edges((low, high): (f64, f64), count: usize) -> Vec<f64> {
-    let part = |index: usize| length_in_f64(index) / length_in_f64(count);
-    (0..=count)
-        .map(|index| low * (high / low).powf(part(index)))
-        .collect()
-}
-
-fn centres(ends: (f64, f64), count: usize) -> Vec<f64> {
-    let middle = |pair: &[f64]| pair.iter().product::<f64>().sqrt();
-    edges(ends, count).windows(2).map(middle).collect()
+fn centres_between(ends: (f64, f64), count: usize) -> Vec<f64> {
+    centres(&edges(ends, count))
 }
 
 /// Moves under the default gains: limited by the pose that bears least, and by their own speed.
@@ -123,8 +115,8 @@ fn moves(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
         let poses = limits(&move_of(1.0, method, 1e-3))
             .trusted()
             .unwrap_or(f64::INFINITY);
-        let amplitudes = centres(AMPLITUDES, columns);
-        let steps = centres(MOVE_STEPS, columns);
+        let amplitudes = centres_between(AMPLITUDES, columns);
+        let steps = centres_between(MOVE_STEPS, columns);
         let cells = amplitudes.iter().flat_map(|amplitude| {
             let steps = steps.iter();
             steps.map(|h| move_of(*amplitude, method, *h))
@@ -151,8 +143,8 @@ fn spins(making: &mut Making<'_>, columns: usize) -> Vec<MotionMap> {
         let small = limit_held(&free)
             .filter(|limit| *limit > 0.0)
             .unwrap_or(f64::INFINITY);
-        let speeds = centres(SPINS, columns);
-        let steps = centres(SWING_STEPS, columns);
+        let speeds = centres_between(SPINS, columns);
+        let steps = centres_between(SWING_STEPS, columns);
         let cells = speeds.iter().flat_map(|spin| {
             let steps = steps.iter();
             steps.map(|h| (free.with_timestep(*h), spun(*spin)))
@@ -204,7 +196,7 @@ fn map_figure(moves: &[MotionMap], swings: &[MotionMap], columns: usize) -> Figu
                     .map(|(_, row)| row.iter().map(level).collect())
                     .collect(),
             });
-            let line = centres(values, columns)
+            let line = centres_between(values, columns)
                 .into_iter()
                 .zip(&map.rows)
                 .map(|(value, (limit, _))| (*limit, value))

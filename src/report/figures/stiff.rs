@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** what was not run because it would take too many steps is shown as a prediction, and said to be one.
 
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::stiff::{By, DURATION, OUTPUTS, Solver, StiffRun, StiffScene};
@@ -73,8 +74,7 @@ fn cheapest(
     fewest: Option<f64>,
     most: u64,
 ) -> Option<StiffRun> {
-    #[allow(clippy::cast_precision_loss, reason = "at most 2^19 steps")]
-    if fewest.is_some_and(|fewest| fewest > most as f64) {
+    if fewest.is_some_and(|fewest| fewest > in_f64(most)) {
         return None;
     }
     let mut steps = OUTPUTS;
@@ -168,9 +168,8 @@ fn verdicts(costs: &[CheapestRun], uncertainty: f64) -> Vec<Verdict> {
     });
     let explicit = || costs.iter().filter(|cost| !cost.solver.is_baseline());
     // Where it is accuracy that asks for steps, stability has nothing to say.
-    #[allow(clippy::cast_precision_loss, reason = "at most 2^19 steps")]
     let least = explicit()
-        .filter_map(|cost| Some((cost.run?.0.steps as f64, cost.fewest?)))
+        .filter_map(|cost| Some((in_f64(cost.run?.0.steps), cost.fewest?)))
         .filter(|(_, fewest)| *fewest > 100.0)
         .map(|(steps, fewest)| steps / fewest)
         .fold(f64::INFINITY, f64::min);
@@ -269,8 +268,7 @@ fn panels(costs: &[CheapestRun], (by, words): (By, &str)) -> [Plot; 2] {
         let (mut counted, mut timed, mut predicted) = (vec![], vec![], vec![]);
         for cost in of(costs, by, solver) {
             if let Some((run, timing)) = &cost.run {
-                #[allow(clippy::cast_precision_loss, reason = "counts are below 2^53")]
-                let count = run.evaluations as f64;
+                let count = in_f64(run.evaluations);
                 let tooltip = format!("{}: {}", solver.name(), run.evaluations);
                 counted.push(Point::new(cost.ratio, count, tooltip));
                 let tooltip = format!("{}: {}", solver.name(), seconds(timing.minimum));

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use super::{HEIGHT, WIDTH, escape, number};
+use crate::math::count::length_in_f64;
 
 const LEFT: f64 = 176.0;
 const RIGHT: f64 = 58.0;
@@ -43,8 +44,7 @@ impl Bars {
             .iter()
             .filter_map(|row| row.1)
             .fold(f64::MIN_POSITIVE, f64::max);
-        #[allow(clippy::cast_precision_loss, reason = "a panel has a dozen rows")]
-        let pitch = (HEIGHT - TOP - BOTTOM) / self.rows.len().max(1) as f64;
+        let pitch = (HEIGHT - TOP - BOTTOM) / length_in_f64(self.rows.len().max(1));
         let mut top = TOP;
         for (label, value) in &self.rows {
             let (middle, thick) = (top + 0.5 * pitch, (0.68 * pitch).min(26.0));

@@ -156,9 +156,9 @@ fn cancelling_without_an_active_goal_is_rejected() {
     in_virtual_time(async {
         let (stage, _client) = Stage::<2>::with_a_floating_arm().await;
         assert_eq!(stage.cancel().await, Err(CancelRejected::NotActive));
-        let goal_id = Some(stage.send_goal(elsewhere()).await);
+        let goal = Meant::Called(stage.send_goal(elsewhere()).await);
         assert_eq!(stage.cancel().await, Ok(()));
-        let again = asked(&stage.action, CancelGoal { goal_id }).await;
+        let again = asked(&stage.action, CancelGoal { goal }).await;
         assert_eq!(again, Err(CancelRejected::NotActive));
     });
 }
@@ -173,8 +173,8 @@ fn cancelling_another_goal_or_a_malformed_id_is_rejected_without_side_effects() 
         client.settle().await;
         client.heard.clear();
         for another in [&old, ""] {
-            let goal_id = Some(another.to_owned());
-            let refused = asked(&stage.action, CancelGoal { goal_id }).await;
+            let goal = Meant::Called(another.to_owned());
+            let refused = asked(&stage.action, CancelGoal { goal }).await;
             let active = active.clone();
             assert_eq!(refused, Err(CancelRejected::OtherGoal { active }));
         }
@@ -186,8 +186,8 @@ fn cancelling_another_goal_or_a_malformed_id_is_rejected_without_side_effects() 
             assert!(why.starts_with("goal_id "), "{why}");
         }
         assert!(client.messages(RESULT).is_empty());
-        let goal_id = Some(active);
-        assert_eq!(asked(&stage.action, CancelGoal { goal_id }).await, Ok(()));
+        let goal = Meant::Called(active);
+        assert_eq!(asked(&stage.action, CancelGoal { goal }).await, Ok(()));
     });
 }
 

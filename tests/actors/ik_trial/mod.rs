@@ -19,7 +19,7 @@ use crate::stage::{Client, Published, SilentArm, Stage, asked, connect, ms, numb
 use crate::system::{counting_wake_ups, in_virtual_time};
 use actix::prelude::*;
 use pendularm::actors::arm::ik::Ik;
-use pendularm::actors::arm::ik_action::{CancelGoal, IkAction, SendGoal};
+use pendularm::actors::arm::ik_action::{CancelGoal, IkAction, Meant, SendGoal};
 use pendularm::actors::arm::ik_trial::{
     GoalClient, IkTrial, NotStarted, SkipTarget, StartTrial, StopTrial,
 };

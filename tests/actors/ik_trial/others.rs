@@ -78,8 +78,8 @@ fn a_trial_cancels_no_goal_but_its_own() {
             let ended: Vec<Value> = client.messages(RESULT);
             if end == "stop" {
                 assert!(ended.is_empty());
-                let goal_id = Some(goal_id);
-                assert_eq!(asked(&stage.action, CancelGoal { goal_id }).await, Ok(()));
+                let goal = Meant::Called(goal_id);
+                assert_eq!(asked(&stage.action, CancelGoal { goal }).await, Ok(()));
             } else {
                 // A new target of the trial preempts any goal, as one of anybody else would.
                 assert_eq!(ended.len(), 1);

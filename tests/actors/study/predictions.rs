@@ -213,7 +213,7 @@ fn plan_with(error: f64) -> PlanRun<2> {
     }
 }
 
-/// Arguments of whatever asks about a control loop, and why they are refused.
+/// Arguments of whatever asks about a control loop, and why they are refused; `{METHODS}` stands for their names.
 fn wrong_loops() -> [(Value, &'static str); 11] {
     [
         (
@@ -251,11 +251,11 @@ fn wrong_loops() -> [(Value, &'static str); 11] {
         ),
         (
             json!({"integrator": "leapfrog"}),
-            "integrator must be one of euler, midpoint, verlet, rk4, got \"leapfrog\"",
+            "integrator must be one of {METHODS}, got \"leapfrog\"",
         ),
         (
             json!({"integrator": 1, "params": {"gravity": "g"}, "setpoint": 0, "gains": {"kp": 1}}),
-            "integrator must be one of euler, midpoint, verlet, rk4, got 1; gains.kp must be an array of 2 numbers, got 1; \
+            "integrator must be one of {METHODS}, got 1; gains.kp must be an array of 2 numbers, got 1; \
               params.gravity must be a number, got \"g\"; setpoint must be an array of 2 numbers, got 0",
         ),
     ]
@@ -317,11 +317,14 @@ fn every_field_that_is_wrong_is_named_members_with_their_object() {
     in_real_time(async {
         let mut bench = Bench::<2>::new();
         let common = wrong_loops();
+        let methods = Method::ALL.map(Method::name).join(", ");
+        let named = |why: &str| why.replace("{METHODS}", &methods);
         for (args, why) in &common {
-            assert_eq!(bench.refusal(Service::Stability, args).await, *why);
+            let refused = bench.refusal(Service::Stability, args).await;
+            assert_eq!(refused, named(why));
         }
         for (args, why) in &common[..10] {
-            assert_eq!(bench.refusal(Service::Rollout, args).await, *why);
+            assert_eq!(bench.refusal(Service::Rollout, args).await, named(why));
         }
         for (args, why) in wrong_runs() {
             assert_eq!(bench.refusal(Service::Rollout, &args).await, why);

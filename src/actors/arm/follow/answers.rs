@@ -1,8 +1,8 @@
-//! Feedback and results of `control_msgs/action/FollowJointTrajectory` in JSON.
+//! Feedback and results of `control_msgs/action/FollowJointTrajectory`, as they are written.
 //!
 //! **Invariant:** the fields are those of the catalogue, and codes are those of the action.
 
-use serde_json::{Value, json};
+use serde::Serialize;
 
 use crate::actors::arm::sim::joint_names;
 use crate::math::arm::State;
@@ -17,8 +17,38 @@ pub(super) enum ResultCode {
     GoalToleranceViolated = -5,
 }
 
-pub(super) fn result(code: ResultCode, why: &str) -> Value {
-    json!({"error_code": code as i32, "error_string": why})
+/// `control_msgs/action/FollowJointTrajectory_Result`.
+#[derive(Serialize)]
+pub(super) struct FollowResult {
+    error_code: i32,
+    error_string: String,
+}
+
+pub(super) fn result(code: ResultCode, why: &str) -> FollowResult {
+    FollowResult {
+        error_code: code as i32,
+        error_string: why.to_owned(),
+    }
+}
+
+/// `control_msgs/action/FollowJointTrajectory_Feedback`.
+#[derive(Serialize)]
+pub(super) struct FollowFeedback {
+    header: Header<'static>,
+    joint_names: Vec<&'static str>,
+    desired: PointMessage,
+    actual: PointMessage,
+    error: PointMessage,
+}
+
+/// `trajectory_msgs/msg/JointTrajectoryPoint`.
+#[derive(Serialize)]
+struct PointMessage {
+    positions: Vec<f64>,
+    velocities: Vec<f64>,
+    accelerations: [f64; 0],
+    effort: [f64; 0],
+    time_from_start: Stamp,
 }
 
 /// How the arm follows at simulation time `now`, `time` after the start \[s\].
@@ -27,16 +57,14 @@ pub(super) fn feedback<const N: usize>(
     time: f64,
     desired: &Setpoint<N>,
     actual: &State<N>,
-) -> Value {
-    let stamp = Stamp::from_seconds(time);
-    let point = |positions: &[f64], velocities: &[f64]| {
-        json!({
-            "positions": positions,
-            "velocities": velocities,
-            "accelerations": [],
-            "effort": [],
-            "time_from_start": stamp,
-        })
+) -> FollowFeedback {
+    let time_from_start = Stamp::from_seconds(time);
+    let point = |positions: Vec<f64>, velocities: Vec<f64>| PointMessage {
+        positions,
+        velocities,
+        accelerations: [],
+        effort: [],
+        time_from_start,
     };
     let off = |wanted: &[f64], is: &[f64]| -> Vec<f64> {
         wanted
@@ -45,14 +73,14 @@ pub(super) fn feedback<const N: usize>(
             .map(|(wanted, is)| wanted - is)
             .collect()
     };
-    json!({
-        "header": Header::world(now),
-        "joint_names": joint_names::<N>().as_slice(),
-        "desired": point(&desired.position, &desired.velocity),
-        "actual": point(&actual.position, &actual.velocity),
-        "error": point(
-            &off(&desired.position, &actual.position),
-            &off(&desired.velocity, &actual.velocity),
+    FollowFeedback {
+        header: Header::world(now),
+        joint_names: joint_names::<N>().to_vec(),
+        desired: point(desired.position.to_vec(), desired.velocity.to_vec()),
+        actual: point(actual.position.to_vec(), actual.velocity.to_vec()),
+        error: point(
+            off(&desired.position, &actual.position),
+            off(&desired.velocity, &actual.velocity),
         ),
-    })
+    }
 }

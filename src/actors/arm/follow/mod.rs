@@ -16,7 +16,7 @@ use actix::prelude::*;
 use self::answers::{ResultCode, feedback, result};
 use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
 use crate::actors::node::{Done, ShutDown};
-use crate::actors::wire::action_client::{ActionClient, Canceller};
+use crate::actors::wire::action_client::{ActionClient, Canceller, NOT_ACTIVE};
 use crate::math::arm::State;
 use crate::math::goal::Cadence;
 use crate::math::pid::Setpoint;
@@ -27,8 +27,6 @@ use crate::protocol::op::GoalStatus;
 /// behind.
 pub const PERIOD: Duration = Duration::from_millis(5);
 
-/// The error for a client that cancels a goal which it has not sent, or which has ended.
-const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
 /// Why a goal ends whose arm is put back to the start.
 const RESET: &str = "the arm was reset";
 
@@ -139,14 +137,14 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
     type Result = ();
 
     fn handle(&mut self, StopFollowing { from, done }: StopFollowing, ctx: &mut Context<Self>) {
-        let is_meant = |goal: &ActivePath<N>| goal.client.is_meant_by(&from);
+        let is_meant = |goal: &ActivePath<N>| goal.client.is(&from.goal);
         let Some(goal) = self.active.take_if(|goal| is_meant(goal)) else {
             return from.refuse(NOT_ACTIVE);
         };
         let halted = self.halt(goal.setpoint).into_actor(self);
         ctx.wait(halted.map(move |(), _, _| {
             let values = result(ResultCode::Successful, "cancelled");
-            goal.client.conclude(&values, GoalStatus::Canceled);
+            goal.client.conclude(values, GoalStatus::Canceled);
             drop(done);
         }));
     }
@@ -169,7 +167,7 @@ impl<const N: usize> ActivePath<N> {
     }
 
     fn end(&self, status: GoalStatus, code: ResultCode, why: &str) {
-        self.client.conclude(&result(code, why), status);
+        self.client.conclude(result(code, why), status);
     }
 }
 
@@ -227,7 +225,7 @@ impl<const N: usize> PathFollower<N> {
         let standing = goal.course.judge(time, &motion.state);
         if goal.client.wants_feedback && goal.feedback.due(motion.time) {
             let values = feedback(motion.time, time, &desired, &motion.state);
-            goal.client.feed_back(&values);
+            goal.client.feed_back(values);
         }
         let next = match standing {
             Standing::Underway | Standing::Arrived => desired,

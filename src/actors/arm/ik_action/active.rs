@@ -2,10 +2,9 @@
 //!
 //! **Invariant:** a goal's messages show the target and the setpoint that it was accepted with.
 
-use super::services::{GoalNews, GoalOwner};
+use super::messages::{CancelRejected, GoalNews, GoalOwner, Meant};
 use crate::actors::arm::ik::target_message;
 use crate::actors::arm::sim::GoalJudged;
-use crate::actors::wire::action_client::Canceller;
 use crate::math::goal::Outcome;
 use crate::math::kinematics::Target;
 use crate::protocol::messages::goal::{IkFeedback, IkResult};
@@ -29,19 +28,19 @@ impl<const N: usize> ActiveGoal<N> {
         self.number == judged.number
     }
 
-    pub(super) fn feedback(&self, judged: &GoalJudged<N>) -> IkFeedback<'_> {
+    pub(super) fn feedback(&self, judged: &GoalJudged<N>) -> IkFeedback {
         IkFeedback {
-            goal_id: &self.id,
+            goal_id: self.id.clone(),
             target: target_message(&self.target),
-            positions: &self.positions,
+            positions: self.positions.to_vec(),
             distance_remaining: judged.distance,
             elapsed: judged.elapsed,
         }
     }
 
-    pub(super) fn result(&self, judged: &GoalJudged<N>) -> IkResult<'_> {
+    pub(super) fn result(&self, judged: &GoalJudged<N>) -> IkResult {
         IkResult {
-            goal_id: &self.id,
+            goal_id: self.id.clone(),
             outcome: judged.outcome.map_or("", Outcome::name),
             target: target_message(&self.target),
             final_distance: judged.distance,
@@ -55,11 +54,16 @@ impl<const N: usize> ActiveGoal<N> {
         }
     }
 
-    /// Whether the client sent it that now wants its end.
-    pub(super) fn is_meant_by(&self, who: &Canceller) -> bool {
-        match &self.owner {
-            Some(GoalOwner::Client(client)) => client.is_meant_by(who),
-            _ => false,
+    /// Whether this is the goal that is meant.
+    pub(super) fn check(&self, meant: &Meant) -> Result<(), CancelRejected> {
+        match (meant, &self.owner) {
+            (Meant::Active, _) => Ok(()),
+            (Meant::Called(id), _) if *id == self.id => Ok(()),
+            (Meant::Called(_), _) => Err(CancelRejected::OtherGoal {
+                active: self.id.clone(),
+            }),
+            (Meant::Sent(goal), Some(GoalOwner::Client(client))) if client.is(goal) => Ok(()),
+            (Meant::Sent(_), _) => Err(CancelRejected::NotSent),
         }
     }
 
@@ -68,8 +72,8 @@ impl<const N: usize> ActiveGoal<N> {
         match &self.owner {
             None => {}
             Some(GoalOwner::Client(client)) => match judged.outcome {
-                None => client.feed_back(&self.feedback(judged)),
-                Some(_) => client.conclude(&self.result(judged), self.status(judged)),
+                None => client.feed_back(self.feedback(judged)),
+                Some(_) => client.conclude(self.result(judged), self.status(judged)),
             },
             Some(GoalOwner::Node(owner)) => owner.do_send(GoalNews {
                 goal_id: self.id.clone(),

@@ -9,28 +9,27 @@
 //! the old goal's result, the response, the trajectory, feedback, result.
 
 mod active;
+mod messages;
 mod services;
 
 use actix::prelude::*;
+use serde::Serialize;
 
 use self::active::ActiveGoal;
-use self::services::requests;
-pub use self::services::{
-    CancelFollowed, CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, SendGoal,
+pub use self::messages::{
+    CancelGoal, CancelRejected, GoalNews, GoalOwner, GoalRejected, Meant, SendGoal,
 };
+use self::services::requests;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
     CommandGoal, EndGoal, GoalJudged, Settle, TrackGoal, Tracking, joint_names,
 };
-use crate::actors::node::{Call, FrameOut, Interest, Publish, Reply, ShutDown, ask};
+use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
 use crate::math::goal::Outcome;
 use crate::protocol::catalog::{Action, Node, Service, Topic};
-use crate::protocol::messages::{self as frames, goal::setpoint_trajectory};
+use crate::protocol::messages::goal::setpoint_trajectory;
 use crate::protocol::op::GoalStatus;
-
-/// The error for a client that cancels a goal which it has not sent, or which has ended.
-const NOT_ACTIVE: &str = "id must be that of this connection's active goal";
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -110,25 +109,8 @@ impl<const N: usize> Handler<Call<CancelGoal>> for IkAction<N> {
 
     fn handle(&mut self, call: Call<CancelGoal>, ctx: &mut Context<Self>) {
         let mut reply = call.reply;
-        let cancellation = self.end(call.ask.goal_id.as_deref(), GoalStatus::Canceled);
+        let cancellation = self.end(&call.ask.goal, GoalStatus::Canceled);
         ctx.wait(cancellation.map(move |outcome, _, _| reply.answer(outcome)));
-    }
-}
-
-impl<const N: usize> Handler<CancelFollowed> for IkAction<N> {
-    type Result = ();
-
-    fn handle(&mut self, message: CancelFollowed, ctx: &mut Context<Self>) {
-        let CancelFollowed { from, done } = message;
-        let goal = self.active.as_ref();
-        let Some(id) = goal
-            .filter(|goal| goal.is_meant_by(&from))
-            .map(|goal| goal.id.clone())
-        else {
-            return from.refuse(NOT_ACTIVE);
-        };
-        let cancellation = self.end(Some(&id), GoalStatus::Canceled);
-        ctx.wait(cancellation.map(move |_, _, _| drop(done)));
     }
 }
 
@@ -136,7 +118,8 @@ impl<const N: usize> Handler<ShutDown> for IkAction<N> {
     type Result = ResponseActFuture<Self, ()>;
 
     fn handle(&mut self, _: ShutDown, _: &mut Context<Self>) -> Self::Result {
-        Box::pin(self.end(None, GoalStatus::Aborted).map(|_, _, _| ()))
+        let end = self.end(&Meant::Active, GoalStatus::Aborted);
+        Box::pin(end.map(|_, _, _| ()))
     }
 }
 
@@ -149,7 +132,7 @@ impl<const N: usize> Handler<GoalJudged<N>> for IkAction<N> {
             self.conclude(&judged);
         } else if let Some(goal) = self.active.as_ref().filter(|goal| goal.is(&judged)) {
             if self.feedback_wanted {
-                self.publish(Topic::IkFeedback, &goal.feedback(&judged));
+                self.publish(Topic::IkFeedback, goal.feedback(&judged));
             }
             goal.inform_owner(&judged);
         }
@@ -235,14 +218,9 @@ impl<const N: usize> IkAction<N> {
             return;
         };
         let (number, positions) = (goal.number, goal.positions);
-        let topic = Topic::JointTrajectory;
-        let frame = FrameOut::unwritten(move || {
-            frames::publish(
-                topic.name(),
-                &setpoint_trajectory(&joint_names::<N>(), &positions),
-            )
-        });
-        self.publish.do_send(Publish { topic, frame });
+        let trajectory = move || setpoint_trajectory(&joint_names::<N>(), &positions);
+        self.publish
+            .do_send(Publish::made(Topic::JointTrajectory, trajectory));
         self.arm.command.do_send(CommandGoal { number, positions });
     }
 
@@ -250,17 +228,13 @@ impl<const N: usize> IkAction<N> {
     /// client hears of that `status`.
     fn end(
         &self,
-        goal_id: Option<&str>,
+        meant: &Meant,
         status: GoalStatus,
     ) -> ResponseActFuture<Self, Result<(), CancelRejected>> {
-        let number = match &self.active {
-            None => Err(CancelRejected::NotActive),
-            Some(goal) if goal_id.is_some_and(|id| id != goal.id) => {
-                Err(CancelRejected::OtherGoal {
-                    active: goal.id.clone(),
-                })
-            }
-            Some(goal) => Ok(goal.number),
+        let number = match (&self.active, meant) {
+            (None, Meant::Sent(_)) => Err(CancelRejected::NotSent),
+            (None, _) => Err(CancelRejected::NotActive),
+            (Some(goal), _) => goal.check(meant).map(|()| goal.number),
         };
         let arm = self.arm.end.clone();
         let ended = async move {
@@ -287,15 +261,12 @@ impl<const N: usize> IkAction<N> {
             return;
         };
         if self.result_wanted {
-            self.publish(Topic::IkResult, &goal.result(judged));
+            self.publish(Topic::IkResult, goal.result(judged));
         }
         goal.inform_owner(judged);
     }
 
-    fn publish(&self, topic: Topic, message: &impl serde::Serialize) {
-        self.publish.do_send(Publish {
-            topic,
-            frame: frames::publish(topic.name(), message).into(),
-        });
+    fn publish(&self, topic: Topic, message: impl Serialize + Send + 'static) {
+        self.publish.do_send(Publish::made(topic, move || message));
     }
 }

@@ -1,123 +1,28 @@
-//! Goals and cancellations, by the services and by the action: what each is, how it is read, how its answer is written;
-//! and the news of goals.
+//! Goals and cancellations, by the services and by the action: how each is read, and how its answer is written.
 //!
-//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action, and nobody has to
-//! ask twice: every question says what has become of it.
+//! **Invariant:** a goal is read in the same way whether it comes by the service or by the action.
 
 use std::sync::Arc;
 
 use actix::prelude::*;
 use bytes::Bytes;
 
-use crate::actors::arm::ik::{SolveError, read_target};
-use crate::actors::arm::sim::Pose;
-use crate::actors::node::{Ask, Asker, Call, Done, Reply, Unserved};
+use super::messages::{CancelGoal, CancelRejected, GoalOwner, GoalRejected, Meant, SendGoal};
+use crate::actors::arm::ik::read_target;
+use crate::actors::node::{Asker, Call, Done, Reply, Unserved};
 use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
 use crate::actors::wire::{Address, Answered, Callable, Route};
-use crate::math::goal::{Criteria, Outcome};
-use crate::math::kinematics::Target;
-use crate::protocol::catalog::{Node, Service};
+use crate::math::goal::Criteria;
+use crate::protocol::catalog::Service;
 use crate::protocol::messages::Empty;
 use crate::protocol::messages::goal::GoalValues;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 
-/// Go there. The answer is the goal's id, given before its trajectory goes out.
-#[derive(Clone)]
-pub struct SendGoal<const N: usize> {
-    /// The target.
-    pub target: Target,
-    /// When it counts as reached.
-    pub criteria: Criteria,
-    /// Hears how the goal goes, besides the subscribers; its being gone is nobody's trouble.
-    pub owner: Option<GoalOwner<N>>,
-}
-
-impl<const N: usize> Ask for SendGoal<N> {
-    type Answer = Result<String, GoalRejected>;
-}
-
-/// Who follows a goal besides the subscribers.
-#[derive(Clone)]
-pub enum GoalOwner<const N: usize> {
-    /// A node.
-    Node(Recipient<GoalNews<N>>),
-    /// A client that sent it by the action.
-    Client(Arc<ActionClient>),
-}
-
-/// Why a goal was not accepted; nothing has changed.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum GoalRejected {
-    /// There is no solution.
-    #[error(transparent)]
-    Unsolved(#[from] SolveError),
-    /// A node has ended.
-    #[error("{0} does not answer")]
-    NoAnswer(
-        /// Its name.
-        &'static str,
-    ),
-}
-
-/// The active goal is preempted; answered after its result has been published.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct CancelGoal {
-    /// The goal that is meant; the active one, if none is named.
-    pub goal_id: Option<String>,
-}
-
-impl Ask for CancelGoal {
-    type Answer = Result<(), CancelRejected>;
-}
-
-/// The goal that the same client has sent by the action is preempted.
-#[derive(Message)]
-#[rtype(result = "()")]
-pub struct CancelFollowed {
-    /// Who wants it; an error status goes there where no such goal is active.
-    pub from: Canceller,
-    /// Dropped when the goal has ended.
-    pub done: Done,
-}
-
-/// Why nothing was cancelled.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum CancelRejected {
-    /// There is nothing to cancel.
-    #[error("no goal is active")]
-    NotActive,
-    /// Another goal was meant.
-    #[error("goal_id is not that of the active goal, {active}")]
-    OtherGoal {
-        /// The active goal.
-        active: String,
-    },
-    /// The arm has ended.
-    #[error("{} does not answer", Node::ArmSim.name())]
-    NoAnswer,
-}
-
-/// How a goal goes. To the owner that its [`SendGoal`] named.
-#[derive(Message, Debug, Clone, PartialEq)]
-#[rtype(result = "()")]
-pub struct GoalNews<const N: usize> {
-    /// The goal.
-    pub goal_id: String,
-    /// Distance between end effector and target \[m\].
-    pub distance: f64,
-    /// The setpoint that the goal commanded \[rad\].
-    pub positions: [f64; N],
-    /// The arm at that instant.
-    pub pose: Pose<N>,
-    /// How it ended; none while it is active.
-    pub outcome: Option<Outcome>,
-}
-
 /// The action's goals and cancellations on their way to the node.
 pub(super) fn requests<const N: usize>(
     send: Recipient<Call<SendGoal<N>>>,
-    cancel: Recipient<CancelFollowed>,
+    cancel: Recipient<Call<CancelGoal>>,
 ) -> Route<ActionRequest> {
     Box::new(move |request| match request {
         ActionRequest::Goal {
@@ -134,7 +39,12 @@ pub(super) fn requests<const N: usize>(
             }
             Err(rejections) => client.refuse(&rejections.status()),
         },
-        ActionRequest::Cancel { from, done } => cancel.do_send(CancelFollowed { from, done }),
+        ActionRequest::Cancel { from, done } => {
+            let goal = Meant::Sent(from.goal.clone());
+            let reply = Reply::new(GoalCanceller(from), Some(done));
+            let ask = CancelGoal { goal };
+            cancel.do_send(Call { ask, reply });
+        }
     })
 }
 
@@ -151,6 +61,22 @@ impl Asker<Result<String, GoalRejected>> for GoalSender {
             Ok(Ok(_)) => {}
             Ok(Err(why)) => self.0.refuse(&why.to_string()),
             Err(why) => self.0.refuse(&why.to_string()),
+        }
+    }
+}
+
+/// A client that wants the end of a goal which it has sent by the action: it hears if that is not active. The goal's
+/// result says all else.
+struct GoalCanceller(Canceller);
+
+impl Asker<Result<(), CancelRejected>> for GoalCanceller {
+    fn answer(
+        self: Box<Self>,
+        answer: Result<Result<(), CancelRejected>, Unserved>,
+        _: Option<Done>,
+    ) {
+        if let Ok(Err(why @ CancelRejected::NotSent)) = answer {
+            self.0.refuse(&why.to_string());
         }
     }
 }
@@ -188,7 +114,8 @@ impl Callable for CancelGoal {
         let mut fields = Fields::read(arguments, service)?;
         let goal_id = fields.text("goal_id").map(std::borrow::Cow::into_owned);
         if fields.accepted() {
-            Ok(Self { goal_id })
+            let goal = goal_id.map_or(Meant::Active, Meant::Called);
+            Ok(Self { goal })
         } else {
             Err(fields.finish())
         }

@@ -4,7 +4,7 @@
 
 use actix::prelude::*;
 
-use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, SendGoal};
+use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, Meant, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Settle};
 use crate::actors::node::{Call, ask};
 use crate::math::trial::Action;
@@ -40,9 +40,9 @@ pub(super) async fn carry_out<const N: usize>(
     for command in commands {
         match command {
             Action::CancelGoal { goal_id } => {
-                let goal_id = Some(goal_id);
+                let goal = Meant::Called(goal_id);
                 // A refusal means that the goal is over already: all that was wanted.
-                let _ = ask(&goals.cancel, CancelGoal { goal_id }).await;
+                let _ = ask(&goals.cancel, CancelGoal { goal }).await;
             }
             Action::SendGoal {
                 ticket,

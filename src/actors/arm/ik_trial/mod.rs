@@ -23,7 +23,6 @@ use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
 use crate::actors::wire::Nodes;
 use crate::math::trial::{Action, Changes, Conclusion, Rejection, Trial, sample};
 use crate::protocol::catalog::{Node, Service, Topic};
-use crate::protocol::messages as frames;
 use crate::protocol::messages::goal::TrialStatus;
 
 /// Time between two messages of `/ik_trial/status` while nothing changes.
@@ -327,14 +326,11 @@ impl<const N: usize> IkTrial<N> {
             targets_reached: status.targets_reached,
             target: status.target.as_ref().map(target_message),
             error: status.error,
-            desired_positions: status.desired_positions.as_deref(),
+            desired_positions: status.desired_positions,
             action_status: status.action_status.name(),
         };
-        let topic = Topic::TrialStatus;
-        self.publish.do_send(Publish {
-            topic,
-            frame: frames::publish(topic.name(), &message).into(),
-        });
+        self.publish
+            .do_send(Publish::made(Topic::TrialStatus, move || message));
     }
 
     /// The timers that the present state asks for, and no others.

@@ -3,7 +3,6 @@
 //!
 //! **Invariant:** nothing is reckoned for a topic that nobody subscribes to; what is published is written elsewhere.
 
-use bytes::Bytes;
 use serde::Serialize;
 
 use super::node::{ArmSim, PUBLISH_RATE};
@@ -66,12 +65,7 @@ impl<const N: usize> ArmSim<N> {
         topic: Topic,
         make: impl FnOnce() -> M + Send + 'static,
     ) {
-        self.publish_frame(topic, move || messages::publish(topic.name(), &make()));
-    }
-
-    fn publish_frame(&self, topic: Topic, write: impl FnOnce() -> Bytes + Send + 'static) {
-        let frame = FrameOut::unwritten(write);
-        self.publish.do_send(Publish { topic, frame });
+        self.publish.do_send(Publish::made(topic, make));
     }
 
     fn header(stamp: Stamp) -> Header<'static> {
@@ -84,7 +78,8 @@ impl<const N: usize> ArmSim<N> {
     fn publish_joint_state(&self, stamp: Stamp) {
         let State { position, velocity } = *self.simulation.state();
         let (name, effort) = (self.joint_names, *self.simulation.effort());
-        self.publish_frame(Topic::JointStates, move || {
+        let topic = Topic::JointStates;
+        let write = move || {
             let message = JointState {
                 header: Self::header(stamp),
                 name: &name,
@@ -92,8 +87,10 @@ impl<const N: usize> ArmSim<N> {
                 velocity: &velocity,
                 effort: &effort,
             };
-            messages::publish(Topic::JointStates.name(), &message)
-        });
+            messages::publish(topic.name(), &message)
+        };
+        let frame = FrameOut::unwritten(write);
+        self.publish.do_send(Publish { topic, frame });
     }
 
     fn diagnostics(&self) -> DiagnosticArray<'static> {

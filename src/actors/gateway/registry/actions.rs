@@ -13,7 +13,7 @@ use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Frames, Handled};
 use crate::actors::node::Feedback;
 use crate::actors::wire::Route;
-use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
+use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller, SentGoal};
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::Level;
 use crate::protocol::names;
@@ -90,8 +90,10 @@ impl Registry {
         node(ActionRequest::Cancel {
             from: Canceller {
                 respond: ctx.address().recipient(),
-                connection: from,
-                id,
+                goal: SentGoal {
+                    connection: from,
+                    id,
+                },
             },
             done,
         });
@@ -120,7 +122,7 @@ impl Handler<Feedback> for Registry {
         if let Some(client) = self.clients.get(&feedback.connection) {
             client.outlets.deliver.do_send(Deliver {
                 topic: feedback.action,
-                frames: Frames::Feedback(self.count(feedback.frame)),
+                frames: Frames::Feedback(self.count(feedback.frame.write())),
                 underway: None,
             });
         }

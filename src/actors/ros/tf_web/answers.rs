@@ -9,32 +9,28 @@ use crate::protocol::messages::{Header, Stamp};
 
 /// `tf2_web_republisher/TFSubscriptionActionFeedback`.
 #[derive(Serialize)]
-pub(super) struct FramesFeedback<'a> {
-    header: Header<'a>,
-    status: WishStatus<'a>,
-    feedback: &'a TfMessage,
+pub(super) struct FramesFeedback {
+    header: Header<'static>,
+    status: WishStatus,
+    feedback: TfMessage,
 }
 
 /// `actionlib_msgs/GoalStatus`.
 #[derive(Serialize)]
-struct WishStatus<'a> {
-    goal_id: WishId<'a>,
+struct WishStatus {
+    goal_id: WishId,
     status: u8,
     text: &'static str,
 }
 
 /// `actionlib_msgs/GoalID`.
 #[derive(Serialize)]
-struct WishId<'a> {
+struct WishId {
     stamp: Stamp,
-    id: &'a str,
+    id: String,
 }
 
-pub(super) fn feedback<'a>(
-    stamp: Stamp,
-    id: &'a str,
-    feedback: &'a TfMessage,
-) -> FramesFeedback<'a> {
+pub(super) fn feedback(stamp: Stamp, id: String, feedback: TfMessage) -> FramesFeedback {
     let frame_id = "";
     FramesFeedback {
         header: Header { stamp, frame_id },

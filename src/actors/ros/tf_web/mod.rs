@@ -13,6 +13,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use actix::prelude::*;
+use serde::Serialize;
 use tokio::time::Instant;
 
 use crate::actors::arm::sim::{ArmPose, Pose};
@@ -21,7 +22,7 @@ use crate::actors::wire::action_client::{ActionClient, Canceller};
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages::republished::{frames, seen_from};
 use crate::protocol::messages::scene::WORLD;
-use crate::protocol::messages::{self, Empty, Stamp};
+use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
 /// Wishes for frames that are kept; the oldest gives way, for a viewer may go without a word.
@@ -39,7 +40,7 @@ const AT_ONCE: usize = 16;
 const TOPIC_AT_ONCE: usize = 5;
 
 /// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
-const NOT_ACTIVE: &str = "id must be that of a goal of this connection";
+const NOT_KEPT: &str = "id must be that of a goal of this connection";
 
 // ---- messages -------------------------------------------------------------------------------------------------------
 
@@ -154,13 +155,13 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
         match forget {
             ForgetFrames::Of(who) => {
                 let is_meant = |wish: &WishFrames| match &wish.by {
-                    Wisher::Client(client) => client.is_meant_by(&who),
+                    Wisher::Client(client) => client.is(&who.goal),
                     Wisher::Topic(_) => false,
                 };
                 let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
                 match at.and_then(|at| self.wishes.remove(at)) {
                     Some((wish, _)) => wish.end(GoalStatus::Canceled),
-                    None => who.refuse(NOT_ACTIVE),
+                    None => who.refuse(NOT_KEPT),
                 }
             }
             ForgetFrames::Published(id) => self.forget_published(id.as_deref()),
@@ -203,7 +204,7 @@ impl WishFrames {
     /// A client that has sent a goal of the action hears of its end.
     fn end(&self, status: GoalStatus) {
         if let Wisher::Client(client) = &self.by {
-            client.conclude(&Empty {}, status);
+            client.conclude(Empty {}, status);
         }
     }
 
@@ -253,7 +254,7 @@ impl<const N: usize> TfRepublisher<N> {
         };
         if self.topic.is_some_and(|due| due <= now) {
             self.topic = Some(now + TOPIC_PERIOD);
-            publish(&self.publish, Topic::TfWeb, &seen(WORLD, &frames(N)));
+            publish(&self.publish, Topic::TfWeb, seen(WORLD, &frames(N)));
         }
         let mut due: Vec<_> = self
             .wishes
@@ -272,19 +273,16 @@ impl<const N: usize> TfRepublisher<N> {
             *due = now + wish.period;
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {
-                Wisher::Client(client) => client.feed_back(&message),
+                Wisher::Client(client) => client.feed_back(message),
                 Wisher::Topic(id) => {
-                    let message = answers::feedback(stamp, id, &message);
-                    publish(&self.publish, Topic::TfWebFeedback, &message);
+                    let message = answers::feedback(stamp, id.clone(), message);
+                    publish(&self.publish, Topic::TfWebFeedback, message);
                 }
             }
         }
     }
 }
 
-fn publish(to: &Recipient<Publish>, topic: Topic, message: &impl serde::Serialize) {
-    to.do_send(Publish {
-        topic,
-        frame: messages::publish(topic.name(), message).into(),
-    });
+fn publish(to: &Recipient<Publish>, topic: Topic, message: impl Serialize + Send + 'static) {
+    to.do_send(Publish::made(topic, move || message));
 }

@@ -12,7 +12,7 @@ use super::{Observation, Scenario};
 use crate::math::arm::{Arm, State};
 use crate::math::count::in_f64;
 use crate::math::integrator::{Method, increment};
-use crate::math::simulation::step_under;
+use crate::math::simulation::state_after;
 use crate::study::error_estimate::estimate_step;
 use crate::study::follower::Follower;
 use crate::study::linear::Linear;
@@ -232,7 +232,7 @@ fn step_doubling() -> Observation {
 
 /// The error of a step, against the arm followed to rounding \[rad\].
 fn local_error(arm: &Arm<3>, state: &State<3>, effort: &[f64; 3], method: Method, h: f64) -> f64 {
-    let end = state.plus(&step_under(arm, method, state, effort, h));
+    let end = state_after(arm, method, state, effort, h);
     let mut exact = Follower::new(*state);
     if !exact.follow(arm, effort, h) {
         return f64::NAN;

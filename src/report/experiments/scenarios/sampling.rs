@@ -14,7 +14,7 @@ use super::{Observation, Scenario};
 use crate::math::arm::State;
 use crate::math::integrator::Method;
 use crate::math::pid::{Gains, INTEGRAL_LIMIT, Pid, Setpoint};
-use crate::math::simulation::step_under;
+use crate::math::simulation::state_after;
 use crate::report::experiments::measure::{measured_period, sampled_growth};
 use crate::report::experiments::sampled::SampledLoop;
 use crate::study::control_loop::ControlLoop;
@@ -181,7 +181,7 @@ fn windup() -> Observation {
             pid.commit(control.integral);
             unlimited += (pid.setpoint().position[0] - state.position[0]) * H;
             let effort = control.effort.map(|effort| effort.clamp(-CAP, CAP));
-            state = state.plus(&step_under(&blocked.arm, Method::Rk4, &state, &effort, H));
+            state = state_after(&blocked.arm, Method::Rk4, &state, &effort, H);
         }
         (state, unlimited)
     };

@@ -3,10 +3,11 @@
 //! **Invariant:** every cell is measured; the prediction is drawn over them and nothing is filled in.
 
 use super::line::Meter;
-use crate::math::count::{in_f64, length_in_f64};
+use crate::math::count::in_f64;
 use crate::math::integrator::Method;
 use crate::report::csv::Csv;
 use crate::report::experiments::measure::{STEPS, growths, stiffened};
+use crate::report::figures::cells::{centres, edges};
 use crate::report::making::Making;
 use crate::report::section::Figure;
 use crate::report::svg::{Axis, Curve, Heat, Key, Marker, Plot, Point, Unit, seconds};
@@ -39,8 +40,8 @@ pub(super) fn map(making: &mut Making<'_>, meter: &mut Meter, columns: usize) ->
         cells: 0,
         disagreeing: 0,
         undecided: 0,
-        timesteps: edges_between(TIMESTEPS, columns),
-        factors: edges_between(FACTORS, columns * 3 / 4),
+        timesteps: edges(TIMESTEPS, columns),
+        factors: edges(FACTORS, columns * 3 / 4),
         plots: Vec::new(),
     };
     for sampling in Sampling::ALL {
@@ -178,18 +179,4 @@ fn level(growth: Option<f64>) -> i8 {
         Some(growth) if growth > 0.0 => -3,
         Some(_) => -4,
     }
-}
-
-fn edges_between((low, high): (f64, f64), count: usize) -> Vec<f64> {
-    let part = |index: usize| length_in_f64(index) / length_in_f64(count);
-    (0..=count)
-        .map(|index| low * (high / low).powf(part(index)))
-        .collect()
-}
-
-fn centres(edges: &[f64]) -> Vec<f64> {
-    edges
-        .windows(2)
-        .map(|pair| pair.iter().product::<f64>().sqrt())
-        .collect()
 }
