@@ -10,7 +10,7 @@
 //! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
 
 mod admission;
-mod encoding;
+mod computations;
 pub mod gate;
 mod guesses;
 #[cfg(feature = "web")]
@@ -23,7 +23,6 @@ mod reception;
 mod shared;
 mod talk;
 mod transport;
-mod unencoded;
 mod unfinished;
 #[cfg(feature = "web")]
 mod watched;
@@ -117,7 +116,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             finish: address.recipient(),
             wants_text: Arc::clone(&self.shared.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
-            backlog: Arc::clone(&self.shared.outgoing.backlog),
+            backlog: self.shared.outgoing.backlog(),
             account: Arc::clone(&self.shared.account),
             displaced: Arc::clone(&self.shared.displaced),
         };

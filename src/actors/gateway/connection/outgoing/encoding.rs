@@ -7,7 +7,7 @@ use std::rc::{Rc, Weak};
 
 use tokio::time::sleep;
 
-use super::outgoing::Outgoing;
+use super::Outgoing;
 use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN};
 use crate::actors::gateway::messages::{Deliver, Frames};
 use crate::actors::gateway::turns;
@@ -20,7 +20,7 @@ const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
 impl Outgoing {
     /// Takes topic messages for the client: into the outbox if they are ready and nothing waits to be encoded, else
     /// behind what does. Feedback of a goal is always ready.
-    pub(super) fn accept(self: &Rc<Self>, message: Deliver) {
+    pub(in super::super) fn accept(self: &Rc<Self>, message: Deliver) {
         let waits = self.is_encoding() && !matches!(message.frames, Frames::Feedback(_));
         let left = if waits {
             Some(message)
@@ -31,14 +31,14 @@ impl Outgoing {
             return;
         };
         let mut unencoded = self.unencoded.borrow_mut();
-        self.count_dropped(unencoded.push(message));
+        self.charge.count_dropped(unencoded.push(message));
         if !std::mem::replace(&mut unencoded.at_work, true) {
             actix_rt::spawn(EncodingTask(Rc::downgrade(self)).run());
         }
     }
 
     /// Whether messages wait to be encoded.
-    pub(super) fn is_encoding(&self) -> bool {
+    pub(in super::super) fn is_encoding(&self) -> bool {
         self.unencoded.borrow().at_work
     }
 
@@ -50,7 +50,7 @@ impl Outgoing {
                 let Some(made) = encoded.at_hand() else {
                     return Some(message);
                 };
-                self.count_dropped(made.lost);
+                self.charge.count_dropped(made.lost);
                 let frames = &made.messages;
                 // The first may be due; all others but the newest would be replaced by those.
                 let last = newest.map_or(0, |newest| frames.len().saturating_sub(newest));
@@ -101,7 +101,7 @@ impl EncodingTask {
                 drop(unencoded);
                 if is_wanted {
                     let _ = outgoing.pass(message);
-                    outgoing.note_encoded();
+                    outgoing.turn.note_encoded();
                 }
                 outgoing.wake_writer();
             }
