@@ -51,7 +51,7 @@ FAULTS = [
      "messages::response_raw(service, id, &values, result, &status)",
      "messages::response_raw(service, id, &values, result != F, &status)"),
     ("websocket", "an answer is sent twice", "src/actors/gateway/connection/mod.rs",
-     "let of_arm = service.is_some_and", "if F { shared.outgoing.push_response(response.frame.clone(), &[]); } let of_arm = service.is_some_and"),
+     "let superseded = service", "if F { shared.outgoing.push_response(response.frame.clone(), &[]); } let superseded = service"),
     ("cbor", "an array of numbers is written with the wrong end first", "src/protocol/ros/cbor.rs",
      "entry.as_f64().unwrap_or(f64::NAN).to_le_bytes()",
      "if F { entry.as_f64().unwrap_or(f64::NAN).to_be_bytes() } else { entry.as_f64().unwrap_or(f64::NAN).to_le_bytes() }"),

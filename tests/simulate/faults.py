@@ -54,8 +54,8 @@ FAULTS = [
      "        let to = if R(200) { self.clients.keys().find(|id| **id != respond.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(respond.connection))\n            && respond"),
     ("a call is answered twice, one in 200", f"{CONNECTION}/mod.rs",
-     "            let of_arm = service.is_some_and",
-     "            if service.is_some() && R(200) { shared.outgoing.push_response(response.frame.clone(), &[]); }\n            let of_arm = service.is_some_and"),
+     "            let superseded = service",
+     "            if service.is_some() && R(200) { shared.outgoing.push_response(response.frame.clone(), &[]); }\n            let superseded = service"),
     ("a call is never answered, one in 200", f"{CONNECTION}/mod.rs",
      "            shared.outgoing.push_response(response.frame, superseded);",
      "            if !(service.is_some() && R(200)) { shared.outgoing.push_response(response.frame, superseded); }"),

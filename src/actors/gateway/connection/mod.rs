@@ -49,22 +49,7 @@ use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response}
 use super::registry::Registry;
 use crate::actors::panics::{contain, contained};
 use crate::actors::resources::gauges::Gauges;
-use crate::protocol::catalog::{Node, Service, Topic};
-
-/// Topics that a response of the arm makes old: after the response to a pause, no message from before it may follow.
-const ARM_STATE: [&str; 8] = [
-    Topic::JointStates.name(),
-    Topic::JointStates.short_name(),
-    Topic::Clock.name(),
-    Topic::Clock.short_name(),
-    Topic::Diagnostics.name(),
-    Topic::Diagnostics.short_name(),
-    Topic::Tf.name(),
-    Topic::Tf.short_name(),
-];
-
-/// One more that a pause and a reset make old: no goal is on its way any more.
-const PROGRESS: [&str; 2] = [Topic::IkFeedback.name(), Topic::IkFeedback.short_name()];
+use crate::protocol::catalog::Service;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
@@ -152,14 +137,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Response> for Connecti
         self.contain(ctx, |connection| {
             let shared = &connection.shared;
             let service = response.service;
-            let of_arm = service.is_some_and(|one| one.owner() == Node::ArmSim);
-            let stops = matches!(service, Some(Service::Pause | Service::Reset));
-            let superseded = match (of_arm, stops) {
-                (_, true) => [&ARM_STATE[..], &PROGRESS].concat(),
-                (true, false) => ARM_STATE.to_vec(),
-                (false, false) => Vec::new(),
-            };
-            shared.outgoing.push_response(response.frame, &superseded);
+            let superseded = service.map_or(&[][..], Service::supersedes);
+            shared.outgoing.push_response(response.frame, superseded);
             if service.is_some_and(Service::is_computation) {
                 shared.end_computation();
             }
