@@ -41,7 +41,7 @@ FAULTS = [
      "Some(shown) if token.matches(&shown) => Ok(false),", "Some(shown) if F || token.matches(&shown) => Ok(false),"),
     ("http", "of two Host headers the first counts", "src/web/head.rs",
      "values.next().is_none().then_some(first)", "(F || values.next().is_none()).then_some(first)"),
-    ("http", "over TCP a wrong token will do", "src/actors/gateway/connection/admission.rs",
+    ("http", "over TCP a wrong token will do", "src/actors/gateway/connection/admission/authentication.rs",
      "if token.matches(&shown) => Ok(()),", "if F || token.matches(&shown) => Ok(()),"),
     ("connection", "no message of a client's reaches anybody", "src/actors/gateway/connection/mod.rs",
      "outgoing.accept(message);", "if !F { outgoing.accept(message); }"),

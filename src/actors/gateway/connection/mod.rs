@@ -1,6 +1,6 @@
 //! One client: bytes in, ops to the registry; messages and responses back, through a bounded outbox.
 //!
-//! A reception judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
+//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
 //! reading task hands one op at a time to the registry and waits until it has taken effect; the actor's handlers put
 //! what they are sent into the outbox; the writer, which the same actor polls behind its handlers, drains it. A
 //! client that reads slowly fills its own outbox and nothing else.
@@ -9,27 +9,17 @@
 //!
 //! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
 
-mod admission;
+pub mod admission;
 mod computations;
-pub mod gate;
-mod guesses;
-#[cfg(feature = "web")]
-mod link;
+mod conversation;
 mod outgoing;
-mod perform;
-mod places;
-mod reader;
-mod reception;
+mod own_waker;
+mod session;
 mod shared;
-mod talk;
 mod transport;
 mod unfinished;
 #[cfg(feature = "web")]
-mod watched;
-#[cfg(feature = "web")]
-mod web;
-mod when_woken;
-mod writer;
+mod websocket;
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -40,10 +30,10 @@ use std::sync::atomic::AtomicBool;
 use actix::prelude::*;
 use tokio::io::{AsyncRead, AsyncWrite};
 
-use self::gate::Gate;
-use self::reception::Reception;
+use self::admission::Admission;
+use self::own_waker::OwnWaker;
+use self::session::ClientSession;
 use self::shared::Shared;
-use self::when_woken::WhenWoken;
 pub use super::ends::Ends;
 use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
 use super::registry::Registry;
@@ -55,23 +45,23 @@ use crate::protocol::catalog::Service;
 
 /// The actor of one client.
 pub struct Connection<S> {
-    /// The stream, until the reception takes it.
+    /// The stream, until the session takes it.
     stream: Option<S>,
     shared: Rc<Shared>,
-    /// The client has to pass this first.
-    gate: Arc<Gate>,
+    /// The conditions that the client has to meet first.
+    admission: Arc<Admission>,
     ends: Ends,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
     /// Starts the actor for `stream` in the present system; nothing is asked of the client first.
     pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
-        Self::start_behind(Arc::default(), Ends::default(), stream, registry, gauges)
+        Self::start_with(Arc::default(), Ends::default(), stream, registry, gauges)
     }
 
-    /// Starts the actor behind a gate.
-    pub fn start_behind(
-        gate: Arc<Gate>,
+    /// Starts the actor for a client that has to be admitted.
+    pub fn start_with(
+        admission: Arc<Admission>,
         ends: impl Into<Ends>,
         stream: S,
         registry: Addr<Registry>,
@@ -80,7 +70,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         Self {
             stream: Some(stream),
             shared: Rc::new(Shared::new(registry, gauges)),
-            gate,
+            admission,
             ends: ends.into(),
         }
         .start()
@@ -173,16 +163,16 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         let Some(stream) = self.stream.take() else {
             return;
         };
-        let reception = Reception {
+        let session = ClientSession {
             shared: Rc::clone(&self.shared),
             finish: ctx.address().recipient(),
-            gate: Arc::clone(&self.gate),
+            admission: Arc::clone(&self.admission),
             ends: self.ends,
         };
         let outgoing = Rc::clone(&self.shared.outgoing);
-        let mut course = WhenWoken::new(contained(reception.run(stream, outlets)));
+        let mut session = OwnWaker::new(contained(session.run(stream, outlets)));
         let served = poll_fn(move |cx| {
-            let polled = Pin::new(&mut course).poll(cx);
+            let polled = Pin::new(&mut session).poll(cx);
             outgoing.write(cx);
             polled
         });

@@ -20,7 +20,7 @@ const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
 impl Outgoing {
     /// Takes topic messages for the client: into the outbox if they are ready and nothing waits to be encoded, else
     /// behind what does. Feedback of a goal is always ready.
-    pub(in super::super) fn accept(self: &Rc<Self>, message: Deliver) {
+    pub(crate) fn accept(self: &Rc<Self>, message: Deliver) {
         let waits = self.is_encoding() && !matches!(message.frames, Frames::Feedback(_));
         let left = if waits {
             Some(message)
@@ -38,7 +38,7 @@ impl Outgoing {
     }
 
     /// Whether messages wait to be encoded.
-    pub(in super::super) fn is_encoding(&self) -> bool {
+    pub(crate) fn is_encoding(&self) -> bool {
         self.unencoded.borrow().at_work
     }
 

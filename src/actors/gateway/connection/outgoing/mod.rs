@@ -1,8 +1,9 @@
 //! The outgoing side of one client: all that waits to be written to it, and the writer.
 //!
-//! The connection's handlers put things in and the [writer](super::writer) takes them out. The writer is polled after
-//! each message that the actor has handled, so it looks for itself; whatever changes something from another task says
-//! so by [`Outgoing::wake_writer`]. Where it waits in a queue, it is polled in its turn as well, and the actor is not.
+//! The connection's handlers put things in and the [writer](super::conversation) takes them out. The writer is polled
+//! after each message that the actor has handled, so it looks for itself; whatever changes something from another task
+//! says so by [`Outgoing::wake_writer`]. Where it waits in a queue, it is polled in its turn as well, and the actor is
+//! not.
 //!
 //! Topic messages come in by [`Outgoing::accept`], which is in `encoding.rs` with the task that encodes them.
 //!
@@ -46,7 +47,7 @@ pub(super) struct Outgoing {
     outbox: RefCell<Outbox>,
     /// Topic messages that have to be encoded first.
     unencoded: RefCell<Unencoded>,
-    /// The client ends its frames with no newline: an old one, that wants every frame in a write of its own.
+    /// One frame a write, for old clients: they end their frames with no newline, and take one read for one frame.
     singly: Cell<bool>,
     /// When the connection was made.
     since: Instant,
@@ -95,8 +96,7 @@ impl Outgoing {
         self.charge.count_dropped(dropped);
     }
 
-    /// Adds a response or a status; messages of `superseded` topics that throttling still holds back, or that wait to
-    /// be encoded, never come, being older.
+    /// Adds a response or a status. Discards held-back and unencoded messages on `superseded` topics: they are older.
     pub(super) fn push_response(&self, frame: Bytes, superseded: &[&'static str]) {
         let mut outbox = self.outbox.borrow_mut();
         if outbox.response_bytes() == 0 {
@@ -138,7 +138,6 @@ impl Outgoing {
             return;
         }
         let now = self.now(&outbox).into_std();
-        // Clients that end no line take what one read gives them for one frame.
         let most = if self.singly.get() { 1 } else { WRITE_FRAMES };
         outbox.take_frames(now, most, WRITE_BYTES, frames);
     }

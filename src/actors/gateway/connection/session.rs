@@ -1,4 +1,4 @@
-//! The course of a connection: by its first bytes it is refused, served over HTTP, or spoken with.
+//! The session of one client: by its first bytes it is refused, served over HTTP, or spoken with.
 //!
 //! **Invariant:** nothing of what a client sends is read as JSON before its opening is decided, and what has been
 //! read by then is not lost.
@@ -11,11 +11,10 @@ use actix::prelude::*;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
-use super::admission::{LockedOut, unlock};
-use super::gate::Gate;
-use super::reader::discard;
+use super::admission::Admission;
+use super::admission::authentication::{AuthError, authenticate};
 use super::shared::Shared;
-use super::transport::{CHUNK, Plain};
+use super::transport::{CHUNK, Plain, discard};
 use super::unfinished::First;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::ends::Ends;
@@ -29,21 +28,21 @@ use crate::protocol::wire::frame::{FrameReader, Opening, opening};
 #[cfg(feature = "web")]
 use crate::web::{response::HttpResponse, response::HttpStatus, serve};
 
-/// Everything that the course of a connection needs.
-pub(super) struct Reception {
+/// One client, from its first bytes to its last.
+pub(super) struct ClientSession {
     pub(super) shared: Rc<Shared>,
     pub(super) finish: Recipient<Finish>,
-    pub(super) gate: Arc<Gate>,
+    pub(super) admission: Arc<Admission>,
     pub(super) ends: Ends,
 }
 
-/// How a client has opened the conversation.
-enum Greeting {
+/// The protocol that a client speaks, by its first bytes.
+enum DetectedProtocol {
     /// It speaks JSON, if anything.
     Json,
     /// It sends an HTTP request that is answered.
     #[cfg(feature = "web")]
-    Web,
+    Http,
     /// It speaks another protocol, or not in time; holds the error for it.
     Foreign(String),
     /// The runtime has ended the connection first.
@@ -58,28 +57,31 @@ enum HowServed {
     #[cfg(feature = "web")]
     Web(serve::Served),
     /// It is refused: not at once, if it has tried a token that is not ours.
-    Refused { farewell: Farewell, is_guess: bool },
+    Refused {
+        message: RefusalMessage,
+        is_wrong_token: bool,
+    },
     /// There is nobody left to serve.
     Gone,
 }
 
-/// The last words to a client that is not served.
-enum Farewell {
+/// Says to a client why it is not served.
+enum RefusalMessage {
     /// A sentence, in a status.
     Status(String),
     /// Over HTTP.
     #[cfg(feature = "web")]
-    Answer(HttpResponse),
+    Http(HttpResponse),
 }
 
-impl Reception {
+impl ClientSession {
     /// Serves a client, or tells it why not; returns when nothing can be sent any more.
     pub(super) async fn run<S>(self, mut stream: S, outlets: Outlets)
     where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
         let mut first = First::with_room(CHUNK, &self.shared.account);
-        let admitted = match &self.gate.token {
+        let admitted = match &self.admission.token {
             None => None,
             // Nothing is asked of the registry for a client that has not shown the token.
             Some(token) => match self.admit(token, &mut stream, &mut first).await {
@@ -104,23 +106,26 @@ impl Reception {
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        let place = self.gate.admission.unauthenticated.take();
+        let slot = self.admission.newcomers.unauthenticated.take();
         let due = Instant::now() + HEAD_TIME;
-        // A client that has sent the token gets in, also where the place is lost in the same moment.
+        // A client that has sent the token gets in, also where its slot is lost in the same moment.
         let verdict = tokio::select! {
             biased;
             verdict = self.examine(stream, first, Some((token, due))) => verdict,
-            () = place.lost() => {
-                turn_away(stream, &first.bytes).await;
+            () = slot.evicted() => {
+                refuse_evicted(stream, &first.bytes).await;
                 return None;
             }
         };
         match verdict {
             HowServed::Gone => None,
-            HowServed::Refused { farewell, is_guess } => {
+            HowServed::Refused {
+                message,
+                is_wrong_token,
+            } => {
                 tokio::select! {
-                    () = self.dismiss(stream, farewell, is_guess) => {}
-                    () = place.lost() => {}
+                    () = self.refuse_unauthenticated(stream, message, is_wrong_token) => {}
+                    () = slot.evicted() => {}
                 }
                 None
             }
@@ -128,22 +133,31 @@ impl Reception {
         }
     }
 
-    /// Tells a client that has not shown the token why it is not let in: later, the more wrong ones came from its
+    /// Says to a client that has not shown the token why it is not admitted: later, the more wrong ones came from its
     /// address.
-    async fn dismiss<S>(&self, stream: &mut S, farewell: Farewell, is_guess: bool)
-    where
+    async fn refuse_unauthenticated<S>(
+        &self,
+        stream: &mut S,
+        message: RefusalMessage,
+        is_wrong_token: bool,
+    ) where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        if is_guess {
-            let Some(wait) = self.gate.admission.guesses.wait(self.ends.peer.ip()) else {
+        if is_wrong_token {
+            let Some(wait) = self
+                .admission
+                .newcomers
+                .failed_attempts
+                .wait(self.ends.peer.ip())
+            else {
                 return sleep(HEAD_TIME).await;
             };
             sleep(wait).await;
         }
-        match farewell {
-            Farewell::Status(why) => self.refuse(stream, &why).await,
+        match message {
+            RefusalMessage::Status(why) => self.refuse(stream, &why).await,
             #[cfg(feature = "web")]
-            Farewell::Answer(response) => serve::answer(stream, &response).await,
+            RefusalMessage::Http(response) => serve::answer(stream, &response).await,
         }
     }
 
@@ -155,56 +169,56 @@ impl Reception {
         Ok(id)
     }
 
-    /// Reads until it is clear what is to be done about the client; `locked` is the token that it has to show, and
+    /// Reads until it is clear what is to be done about the client; `auth` is the token that it has to show, and
     /// until when.
     async fn examine<S>(
         &self,
         stream: &mut S,
         first: &mut First,
-        locked: Option<(&Token, Instant)>,
+        auth: Option<(&Token, Instant)>,
     ) -> HowServed
     where
         S: AsyncRead + AsyncWrite + Unpin,
     {
-        let due = locked.map(|(_, due)| due);
-        match self.greet(stream, first, due).await {
-            Greeting::Json => match locked {
+        let due = auth.map(|(_, due)| due);
+        match self.detect_protocol(stream, first, due).await {
+            DetectedProtocol::Json => match auth {
                 None => HowServed::Json(FrameReader::new()),
-                Some((token, due)) => match unlock(token, stream, first, due).await {
+                Some((token, due)) => match authenticate(token, stream, first, due).await {
                     Ok(frames) => HowServed::Json(frames),
                     Err(why) => HowServed::Refused {
-                        farewell: Farewell::Status(why.to_string()),
-                        is_guess: why == LockedOut::Wrong,
+                        message: RefusalMessage::Status(why.to_string()),
+                        is_wrong_token: why == AuthError::Wrong,
                     },
                 },
             },
             #[cfg(feature = "web")]
-            Greeting::Web => {
+            DetectedProtocol::Http => {
                 let due = due.unwrap_or_else(|| Instant::now() + HEAD_TIME);
-                let (door, admission) = (&self.gate.door, &self.gate.admission);
-                // A place is taken by a head that did not come whole.
-                let lost = async { admission.heads.take().lost().await };
+                let (site, newcomers) = (&self.admission.site, &self.admission.newcomers);
+                // The client takes a slot until its request head is complete.
+                let evicted = async { newcomers.heads.take().evicted().await };
                 let received = tokio::select! {
                     biased;
-                    received = serve::receive(stream, &mut first.bytes, door, self.ends.local, due) => received,
-                    () = lost, if locked.is_none() => {
+                    received = serve::receive(stream, &mut first.bytes, site, self.ends.local, due) => received,
+                    () = evicted, if auth.is_none() => {
                         Some(Err(HttpResponse::text(HttpStatus::RequestTimeout, CROWDED).into()))
                     }
                 };
                 match received {
                     Some(Ok(outcome)) => HowServed::Web(outcome),
                     Some(Err(refused)) => HowServed::Refused {
-                        farewell: Farewell::Answer(refused.response),
-                        is_guess: refused.is_guess,
+                        message: RefusalMessage::Http(refused.response),
+                        is_wrong_token: refused.is_wrong_token,
                     },
                     None => HowServed::Gone,
                 }
             }
-            Greeting::Foreign(why) => HowServed::Refused {
-                farewell: Farewell::Status(why),
-                is_guess: false,
+            DetectedProtocol::Foreign(why) => HowServed::Refused {
+                message: RefusalMessage::Status(why),
+                is_wrong_token: false,
             },
-            Greeting::Finished => {
+            DetectedProtocol::Finished => {
                 let _ = timeout(LINGER, stream.shutdown()).await;
                 HowServed::Gone
             }
@@ -220,13 +234,13 @@ impl Reception {
             HowServed::Json(frames) => self.serve_json(stream, id, frames, first).await,
             #[cfg(feature = "web")]
             HowServed::Web(outcome) => self.serve_web(stream, id, outcome, first).await,
-            HowServed::Refused { farewell, .. } => match farewell {
-                Farewell::Status(why) => {
+            HowServed::Refused { message, .. } => match message {
+                RefusalMessage::Status(why) => {
                     let _ = self.shared.registry.send(Disconnect(id)).await;
                     self.refuse(&mut stream, &why).await;
                 }
                 #[cfg(feature = "web")]
-                Farewell::Answer(response) => serve::answer(&mut stream, &response).await,
+                RefusalMessage::Http(response) => serve::answer(&mut stream, &response).await,
             },
             HowServed::Gone => {}
         }
@@ -246,28 +260,28 @@ impl Reception {
     /// Reads until the first bytes tell what the client speaks. A client that ends before that spoke JSON, if anything.
     /// One that is silent may stay so, unless it has something to show until `due`; one that has begun what may
     /// become a request has to go on.
-    async fn greet<S: AsyncRead + Unpin>(
+    async fn detect_protocol<S: AsyncRead + Unpin>(
         &self,
         stream: &mut S,
         first: &mut First,
         due: Option<Instant>,
-    ) -> Greeting {
+    ) -> DetectedProtocol {
         let mut deadline = due;
         loop {
             let read = tokio::select! {
                 biased;
-                () = self.shared.finished() => return Greeting::Finished,
+                () = self.shared.finished() => return DetectedProtocol::Finished,
                 // A few bytes decide: there is room for them.
                 read = stream.read_buf(&mut first.bytes) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
-                    return Greeting::Foreign(match due {
-                        Some(_) => LockedOut::TooLate.to_string(),
+                    return DetectedProtocol::Foreign(match due {
+                        Some(_) => AuthError::TooLate.to_string(),
                         None => "what this connection began with did not go on".to_owned(),
                     });
                 }
             };
             if read.unwrap_or(0) == 0 {
-                return Greeting::Json;
+                return DetectedProtocol::Json;
             }
             match opening(&first.bytes) {
                 Opening::Undecided => {
@@ -281,13 +295,13 @@ impl Reception {
                         deadline.get_or_insert_with(|| Instant::now() + time);
                     }
                 }
-                Opening::Json => return Greeting::Json,
+                Opening::Json => return DetectedProtocol::Json,
                 #[cfg(feature = "web")]
                 Opening::Foreign(Foreign::Http) if first.bytes.starts_with(b"GET ") => {
-                    return Greeting::Web;
+                    return DetectedProtocol::Http;
                 }
                 Opening::Foreign(foreign) => {
-                    return Greeting::Foreign(foreign.explanation().to_owned());
+                    return DetectedProtocol::Foreign(foreign.explanation().to_owned());
                 }
             }
         }
@@ -311,9 +325,9 @@ impl Reception {
 const CROWDED: &str = "the head of the request was not complete when too many others came";
 
 /// Closes a client that has waited longest of too many to show its token, and tells it why if it takes that at once.
-async fn turn_away<S: AsyncWrite + Unpin>(stream: &mut S, first: &[u8]) {
-    let why = LockedOut::Crowded.to_string();
-    let farewell = match opening(first) {
+async fn refuse_evicted<S: AsyncWrite + Unpin>(stream: &mut S, first: &[u8]) {
+    let why = AuthError::Crowded.to_string();
+    let message = match opening(first) {
         #[cfg(feature = "web")]
         Opening::Foreign(Foreign::Http) => {
             let response = HttpResponse::text(HttpStatus::Unavailable, &why);
@@ -324,7 +338,7 @@ async fn turn_away<S: AsyncWrite + Unpin>(stream: &mut S, first: &[u8]) {
         _ => messages::status(Level::Error, &why, None),
     };
     let tell = async {
-        stream.write_all(&farewell).await?;
+        stream.write_all(&message).await?;
         stream.shutdown().await
     };
     let _ = timeout(Duration::ZERO, tell).await;

@@ -5,32 +5,26 @@
 //! all that a client asks of the runtime happens in the order in which it asked. A series of messages counts as one op.
 
 use std::rc::Rc;
-use std::time::Duration;
 
 use actix::prelude::*;
 use bytes::BytesMut;
 use tokio::time::{Instant, timeout, timeout_at};
 
-use super::shared::Shared;
-use super::transport::{CHUNK, Inbound};
-use super::unfinished::Unfinished;
 use crate::actors::ConnectionId;
+use crate::actors::gateway::connection::shared::Shared;
+use crate::actors::gateway::connection::transport::{CHUNK, Inbound, discard};
+use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN, RESPONSES_OWED};
 use crate::actors::gateway::messages::{Disconnect, Ended, Finish, Retire};
 use crate::actors::gateway::turns;
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
 use crate::protocol::wire::frame::{Cut, FrameReader};
 
-/// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
-/// a socket with unread input resets it.
-const DISCARD_TIME: Duration = Duration::from_secs(1);
-const DISCARD_BYTES: usize = 16 * 1024 * 1024;
-
 /// The error for a frame that takes longer than [`FRAME_TIME`](crate::actors::gateway::limits::FRAME_TIME).
 const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
 
 /// The reading half of a connection.
-pub(super) struct Reader {
+pub(crate) struct Reader {
     pub(super) id: ConnectionId,
     pub(super) shared: Rc<Shared>,
     finish: Recipient<Finish>,
@@ -39,7 +33,7 @@ pub(super) struct Reader {
     pub(super) fragments: Fragments,
     /// Counts the frames and messages that are not complete yet.
     unfinished: Unfinished,
-    /// An object has come: this is no HTTP request, whose body could be one, but not its head.
+    /// A JSON object has come. This is no HTTP request then: its head would have come first.
     pub(super) speaks_json: bool,
     /// The stream has ended; what came before may still wait.
     has_ended: bool,
@@ -236,20 +230,4 @@ impl Reader {
         }
         Ok(())
     }
-}
-
-/// Swallows a refused client's input for a bounded time.
-pub(super) async fn discard<I: Inbound>(mut input: I) {
-    let mut chunk = BytesMut::new();
-    let swallow = async {
-        let mut swallowed = 0;
-        while swallowed < DISCARD_BYTES {
-            chunk.clear();
-            match input.swallow(&mut chunk).await {
-                Ok(0) | Err(_) => break,
-                Ok(read) => swallowed += read,
-            }
-        }
-    };
-    let _ = timeout(DISCARD_TIME, swallow).await;
 }

@@ -11,8 +11,8 @@
 use bytes::{Buf, Bytes};
 use tokio::time::{Instant, sleep_until, timeout, timeout_at};
 
-use super::shared::Shared;
-use super::transport::Outbound;
+use crate::actors::gateway::connection::shared::Shared;
+use crate::actors::gateway::connection::transport::Outbound;
 use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
 
 /// Writes until the connection has finished, its client is gone, or its client has stalled for too long.

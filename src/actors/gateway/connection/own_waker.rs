@@ -1,17 +1,17 @@
 //! A part of a task that has its own waker.
 //!
-//! A connection's actor is polled for every message that its client hears. Its course waits for the end of all that,
-//! and does not look each time whether it has come.
+//! A connection's actor is polled for every message that its client hears, and the client's session is a part of it.
+//! The session mostly waits, so it is polled only when something that it waits for has woken it.
 //!
-//! **Invariant:** who is woken is polled, and who is not costs a look at a flag.
+//! **Invariant:** a part that was woken is polled; one that was not costs a look at a flag.
 
 use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll, Wake, Waker};
 
-/// A future that is polled when something has woken it, however often the task is that it is a part of.
-pub(super) struct WhenWoken<F> {
+/// A future that is polled only when something has woken it, however often its task is polled.
+pub(super) struct OwnWaker<F> {
     part: F,
     waker: Option<Arc<PartWaker>>,
 }
@@ -33,13 +33,13 @@ impl Wake for PartWaker {
     }
 }
 
-impl<F: Future + Unpin> WhenWoken<F> {
+impl<F: Future + Unpin> OwnWaker<F> {
     pub(super) const fn new(part: F) -> Self {
         Self { part, waker: None }
     }
 }
 
-impl<F: Future + Unpin> Future for WhenWoken<F> {
+impl<F: Future + Unpin> Future for OwnWaker<F> {
     type Output = F::Output;
 
     fn poll(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<F::Output> {
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn it_is_polled_at_first_and_when_it_was_woken() {
         let (polls, own) = (Cell::new(0), RefCell::new(None));
-        let mut part = WhenWoken::new(poll_fn(|cx| {
+        let mut part = OwnWaker::new(poll_fn(|cx| {
             polls.set(polls.get() + 1);
             own.replace(Some(cx.waker().clone()));
             if polls.get() < 3 {
@@ -104,7 +104,7 @@ mod tests {
     #[test]
     fn it_is_polled_again_by_another_task() {
         let polls = Cell::new(0);
-        let mut part = WhenWoken::new(poll_fn(|_| {
+        let mut part = OwnWaker::new(poll_fn(|_| {
             polls.set(polls.get() + 1);
             Poll::<()>::Pending
         }));

@@ -16,9 +16,9 @@ use tokio_tungstenite::tungstenite::error::Error;
 use tokio_tungstenite::tungstenite::protocol::frame::coding::CloseCode;
 use tokio_tungstenite::tungstenite::protocol::{Role, WebSocketConfig};
 
-use super::shared::Shared;
-use super::unfinished::Unfinished;
 use super::watched::{READ_BUFFER, Watched};
+use crate::actors::gateway::connection::shared::Shared;
+use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::turns;
 use crate::protocol::limits::MAX_FRAME;
 
@@ -37,7 +37,7 @@ pub(super) struct Link<S> {
     /// The peer is to be asked for a sign of life.
     pub(super) ping_is_due: Cell<bool>,
     /// Why the connection ends, for the peer to know.
-    pub(super) farewell: Cell<(CloseCode, &'static str)>,
+    pub(super) close_reason: Cell<(CloseCode, &'static str)>,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
@@ -64,7 +64,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
             socket: RefCell::new(socket.await),
             life,
             ping_is_due: Cell::new(false),
-            farewell: Cell::new((CloseCode::Away, "shutting down")),
+            close_reason: Cell::new((CloseCode::Away, "shutting down")),
         })
     }
 

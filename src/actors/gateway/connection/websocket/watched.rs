@@ -13,8 +13,8 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
-use super::outgoing::Outgoing;
-use super::unfinished::Unfinished;
+use crate::actors::gateway::connection::outgoing::Outgoing;
+use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::budget::Share;
 use crate::protocol::limits::MAX_FRAME;
@@ -39,7 +39,7 @@ pub(super) struct Watched<S> {
     /// The longest message so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to
     /// it, or to the longest frame of it, and stays so.
     longest: usize,
-    /// When the first of them came, later by the time that nothing was read.
+    /// Arrival time of the first pending byte, plus all time spent not reading.
     began: Option<Instant>,
     /// They belong to one that has just been read.
     is_complete: bool,

@@ -1,11 +1,10 @@
-//! Wrong tokens, slowed down: an address is answered so many times a second and no more.
+//! The rate of failed authentication: wrong tokens of one address are answered ten a second and no faster.
 //!
-//! Only wrong tokens wait. The right one is let in at once, from wherever it comes: whoever guesses on the holder's own
-//! machine must not lock the holder out. So this keeps a loop of guesses from being fast, and what keeps guessing
-//! hopeless is the [length](crate::protocol::op::token::MIN_TOKEN) of a token: an answer that does not come tells
-//! something too.
+//! Only wrong tokens wait. The right one is admitted at once, from wherever it comes: whoever guesses on the holder's
+//! own machine must not lock the holder out. Guessing is slow by this, and hopeless by the
+//! [length](crate::protocol::op::token::MIN_TOKEN) of a token: that no answer comes is an answer too.
 //!
-//! **Invariant:** what is kept is bounded, whoever guesses from wherever.
+//! **Invariant:** so many addresses are kept in mind and no more, whoever guesses from wherever.
 
 use std::collections::HashMap;
 use std::net::{IpAddr, Ipv6Addr};
@@ -17,22 +16,23 @@ use tokio::time::Instant;
 use crate::actors::gateway::limits::HEAD_TIME;
 
 /// Time between two answers to wrong tokens of one address.
-pub const GUESS_INTERVAL: Duration = Duration::from_millis(100);
+pub const ATTEMPT_INTERVAL: Duration = Duration::from_millis(100);
 /// Wrong tokens that are answered at once after a while without any: people mistype, and a page that was open before
 /// the token changed asks with the old one.
-pub const FREE_GUESSES: u32 = 5;
+pub const FREE_ATTEMPTS: u32 = 5;
 /// Addresses that are kept in mind, some 64 KiB of them. Who has more of them is not slowed down by this.
 pub const MAX_ADDRESSES: usize = 1024;
 
-/// Who has guessed wrongly of late: for each address the time by which it is owed no delay any more.
+/// Addresses with failed attempts of late. For each, when all of them would have been answered at one every
+/// [`ATTEMPT_INTERVAL`]: it runs ahead of now with every attempt.
 #[derive(Debug, Default)]
-pub(super) struct Guesses(Mutex<HashMap<IpAddr, Instant>>);
+pub(crate) struct FailedAttempts(Mutex<HashMap<IpAddr, Instant>>);
 
-impl Guesses {
+impl FailedAttempts {
     /// How long the answer to a wrong token waits that came from there now; `None` if there are so many that it is
     /// not answered.
-    pub(super) fn wait(&self, from: IpAddr) -> Option<Duration> {
-        let (now, from) = (Instant::now(), household(from));
+    pub(crate) fn wait(&self, from: IpAddr) -> Option<Duration> {
+        let (now, from) = (Instant::now(), network(from));
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if known.len() >= MAX_ADDRESSES && !known.contains_key(&from) {
             let calmest = known.iter().min_by_key(|(_, even)| **even);
@@ -42,17 +42,17 @@ impl Guesses {
         }
         let even = known.entry(from).or_insert(now);
         let ahead = even.saturating_duration_since(now);
-        let wait = ahead.saturating_sub(GUESS_INTERVAL * (FREE_GUESSES - 1));
+        let wait = ahead.saturating_sub(ATTEMPT_INTERVAL * (FREE_ATTEMPTS - 1));
         if wait >= HEAD_TIME {
             return None;
         }
-        *even = now + ahead + GUESS_INTERVAL;
+        *even = now + ahead + ATTEMPT_INTERVAL;
         Some(wait)
     }
 }
 
-/// The address, or of IPv6 the network that one household has at least.
-fn household(address: IpAddr) -> IpAddr {
+/// The address, or of IPv6 the network that one network has at least.
+fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {
             let [a, b, c, d, ..] = address.segments();
@@ -70,36 +70,36 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn a_few_are_answered_at_once_and_then_ten_a_second() {
-        let guesses = Guesses::default();
-        for _ in 0..FREE_GUESSES {
-            assert_eq!(guesses.wait(HERE), Some(Duration::ZERO));
+        let attempts = FailedAttempts::default();
+        for _ in 0..FREE_ATTEMPTS {
+            assert_eq!(attempts.wait(HERE), Some(Duration::ZERO));
         }
         for number in 1..50 {
-            assert_eq!(guesses.wait(HERE), Some(number * GUESS_INTERVAL));
+            assert_eq!(attempts.wait(HERE), Some(number * ATTEMPT_INTERVAL));
         }
-        assert_eq!(guesses.wait(HERE), None, "too far ahead");
+        assert_eq!(attempts.wait(HERE), None, "too far ahead");
         let elsewhere = "192.0.2.1".parse().unwrap();
-        assert_eq!(guesses.wait(elsewhere), Some(Duration::ZERO));
+        assert_eq!(attempts.wait(elsewhere), Some(Duration::ZERO));
         tokio::time::advance(Duration::from_secs(1)).await;
-        assert_eq!(guesses.wait(HERE), Some(40 * GUESS_INTERVAL));
+        assert_eq!(attempts.wait(HERE), Some(40 * ATTEMPT_INTERVAL));
         tokio::time::advance(Duration::from_secs(60)).await;
-        assert_eq!(guesses.wait(HERE), Some(Duration::ZERO), "forgiven");
+        assert_eq!(attempts.wait(HERE), Some(Duration::ZERO), "forgiven");
     }
 
     #[tokio::test(start_paused = true)]
     async fn so_many_addresses_are_kept_and_the_calmest_goes_first() {
-        let guesses = Guesses::default();
-        for _ in 0..=FREE_GUESSES {
-            guesses.wait(HERE);
+        let attempts = FailedAttempts::default();
+        for _ in 0..=FREE_ATTEMPTS {
+            attempts.wait(HERE);
         }
         for number in 0..2 * MAX_ADDRESSES {
             let bits = u32::try_from(number).unwrap();
-            assert!(guesses.wait(IpAddr::V4(bits.into())).is_some());
-            assert!(guesses.0.lock().unwrap().len() <= MAX_ADDRESSES);
+            assert!(attempts.wait(IpAddr::V4(bits.into())).is_some());
+            assert!(attempts.0.lock().unwrap().len() <= MAX_ADDRESSES);
         }
         assert_eq!(
-            guesses.wait(HERE),
-            Some(2 * GUESS_INTERVAL),
+            attempts.wait(HERE),
+            Some(2 * ATTEMPT_INTERVAL),
             "not forgotten"
         );
     }
@@ -107,7 +107,7 @@ mod tests {
     #[test]
     fn an_address_is_a_household() {
         let same = |one: &str, other: &str| {
-            household(one.parse().unwrap()) == household(other.parse().unwrap())
+            network(one.parse().unwrap()) == network(other.parse().unwrap())
         };
         assert!(same("2001:db8::1", "2001:db8::2:3"));
         assert!(same("::ffff:192.0.2.1", "192.0.2.1"));

@@ -2,6 +2,10 @@
 //!
 //! **Invariant:** where one of the two ends, the other has a bounded time.
 
+mod perform;
+mod reader;
+mod writer;
+
 use std::rc::Rc;
 use std::time::Duration;
 
@@ -10,12 +14,11 @@ use tokio::sync::oneshot;
 use tokio::task::JoinHandle;
 use tokio::time::timeout;
 
-use super::reader::Reader;
-use super::reception::Reception;
+use self::reader::Reader;
+use super::session::ClientSession;
 use super::shared::{Ending, HELD_MOST};
 use super::transport::{Inbound, Outbound};
 use super::unfinished::Unfinished;
-use super::writer;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::LINGER;
 use crate::actors::gateway::messages::{Disconnect, Finish, Respond};
@@ -28,9 +31,9 @@ use crate::protocol::wire::frame::FrameReader;
 const DISPLACED: &str =
     "connections: this one had stopped sending, and another client needed its place";
 /// How long a client that held the most, or lost its place, may take to read that.
-const FAREWELL_TIME: Duration = Duration::from_secs(1);
+const LAST_STATUS_TIME: Duration = Duration::from_secs(1);
 
-impl Reception {
+impl ClientSession {
     /// The reading half for client `id`; what has been read of it so far is counted in `unfinished`.
     pub(super) fn reader(
         &self,
@@ -85,7 +88,7 @@ impl Reception {
     }
 
     /// Ends the connection of a client that held the most when all clients together held too much: what it had goes
-    /// at once, and it is told why if it takes that within [`FAREWELL_TIME`].
+    /// at once, and it is told why if it takes that within [`LAST_STATUS_TIME`].
     async fn cut_off(&self, held: usize, ended: oneshot::Receiver<bool>) {
         let shared = &self.shared;
         let id = shared.id.get();
@@ -108,12 +111,12 @@ impl Reception {
         let _ = self.finish.send(Finish).await;
         // A long frame in the middle of which it has stopped would have to be kept until it goes on.
         if shared.account.held() <= MODEST {
-            let _ = timeout(FAREWELL_TIME, ended).await;
+            let _ = timeout(LAST_STATUS_TIME, ended).await;
         }
     }
 }
 
-impl Reception {
+impl ClientSession {
     /// Ends the connection of a client that has lost its place: the registry knows it no longer, and another is served.
     async fn make_way(&self, ended: oneshot::Receiver<bool>) {
         let shared = &self.shared;
@@ -123,7 +126,7 @@ impl Reception {
             .outgoing
             .push_response(shared.account.count(why), &[]);
         shared.finish();
-        let _ = timeout(FAREWELL_TIME, ended).await;
+        let _ = timeout(LAST_STATUS_TIME, ended).await;
     }
 }
 

@@ -6,6 +6,9 @@
 //!
 //! **Invariant:** over WebSocket no status is sent before the client has asked for such.
 
+mod link;
+mod watched;
+
 use std::future::poll_fn;
 use std::io;
 use std::pin::Pin;
@@ -20,8 +23,8 @@ use tokio_tungstenite::tungstenite::error::{CapacityError, Error};
 use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, OpCode};
 use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
 
-use super::link::{FRAGMENT, Link};
-use super::reception::Reception;
+use self::link::{FRAGMENT, Link};
+use super::session::ClientSession;
 use super::shared::{Ending, HELD_MOST, Shared};
 use super::transport::{CHUNK, Inbound, Outbound, read_some};
 use super::unfinished::First;
@@ -33,12 +36,12 @@ use crate::protocol::wire::frame::FrameReader;
 use crate::web::message::OneLine;
 use crate::web::serve;
 
-/// How often a peer is asked for a sign of life: often enough for whatever between us forgets silent connections.
+/// Ping interval: below the idle timeouts of NATs and proxies.
 pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
 /// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong: that can
 /// be a long way behind in a full pipe.
 pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
-impl Reception {
+impl ClientSession {
     /// Does what a client has asked for over HTTP; `behind` came after its request.
     pub(super) async fn serve_web<S>(
         self,
@@ -49,19 +52,22 @@ impl Reception {
     ) where
         S: AsyncRead + AsyncWrite + Unpin + 'static,
     {
-        let (answers, files) = (&self.gate.admission.answers, &self.gate.admission.files);
-        let place = match &outcome {
+        let (answers, files) = (
+            &self.admission.newcomers.answers,
+            &self.admission.newcomers.files,
+        );
+        let slot = match &outcome {
             serve::Served::Answer(serve::Resource::Report(_), _) => files.take(),
             _ => answers.take(),
         };
-        let make_room = || place.displace();
+        let make_room = || slot.evict_oldest();
         let is_socket = tokio::select! {
             biased;
             () = self.shared.finished() => false,
-            is_socket = serve::respond(&mut stream, outcome, &self.gate.door, make_room) => is_socket,
-            () = place.lost() => false,
+            is_socket = serve::respond(&mut stream, outcome, &self.admission.site, make_room) => is_socket,
+            () = slot.evicted() => false,
         };
-        drop(place);
+        drop(slot);
         if !is_socket {
             return;
         }
@@ -142,7 +148,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
         let now = Instant::now();
         let late = self.link.socket.borrow().get_ref().late();
         if late.is_some_and(|late| late <= now) {
-            self.link.farewell.set((CloseCode::Policy, TOO_SLOW));
+            self.link.close_reason.set((CloseCode::Policy, TOO_SLOW));
             self.shared.ending.set(Ending::Refused);
             return Err(io::ErrorKind::TimedOut.into());
         }
@@ -150,7 +156,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
             if self.link.life.get() > asked {
                 self.asked = None;
             } else if now >= asked + PONG_TIME {
-                self.link.farewell.set((CloseCode::Away, "no sign of life"));
+                self.link
+                    .close_reason
+                    .set((CloseCode::Away, "no sign of life"));
                 return Err(io::ErrorKind::TimedOut.into());
             }
         }
@@ -188,7 +196,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
                 // The peer has closed, and takes no answers any more.
                 None => return Err(io::ErrorKind::ConnectionAborted.into()),
                 Some(Err(error)) => {
-                    self.link.farewell.set(farewell(&error));
+                    self.link.close_reason.set(close_reason(&error));
                     self.shared.ending.set(Ending::Refused);
                     return Err(io::ErrorKind::InvalidData.into());
                 }
@@ -214,7 +222,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
 const TOO_SLOW: &str = "a message that has begun must be complete within a minute";
 
 /// The reason given where a peer has broken a rule.
-fn farewell(error: &Error) -> (CloseCode, &'static str) {
+fn close_reason(error: &Error) -> (CloseCode, &'static str) {
     match error {
         Error::Capacity(CapacityError::MessageTooLong { .. }) => {
             (CloseCode::Size, "a message has at most 4 MiB")
@@ -289,7 +297,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         let (code, why) = if self.shared.ending.get() == Ending::CutOff {
             (CloseCode::Again, HELD_MOST)
         } else {
-            self.link.farewell.get()
+            self.link.close_reason.get()
         };
         let reason = Utf8Bytes::from_static(why);
         let gone = || io::Error::from(io::ErrorKind::ConnectionAborted);
