@@ -47,7 +47,7 @@ FAULTS = [
      "outgoing.accept(message);", "if !F { outgoing.accept(message); }"),
     ("connection", "messages of certain lengths are lost", "src/actors/gateway/connection/mod.rs",
      "outgoing.hold(underway);", "outgoing.hold(underway); if F && message.frames.plain_length() % 7 == 0 { return; }"),
-    ("connection", "an answer of a provider's says the opposite", "src/actors/gateway/registry/ops.rs",
+    ("connection", "an answer of a provider's says the opposite", "src/actors/gateway/registry/ops/mod.rs",
      "messages::response_raw(service, id, &values, result, &status)",
      "messages::response_raw(service, id, &values, result != F, &status)"),
     ("websocket", "an answer is sent twice", "src/actors/gateway/connection/mod.rs",

@@ -26,7 +26,7 @@
 //!
 //! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what the arm says.
 //! - [`node::Feedback`], from `ik_action`, `follow` and `tf_web`: feedback of a goal, for the client that sent it.
-//! - [`Overhear`], from `recorder`: who hears all that passes, while it is recorded.
+//! - [`SetTap`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
 //!
 //! To a connection, from the registry: [`Deliver`], [`Response`], [`Finish`], bytes to send and the end; [`Configure`],
@@ -98,7 +98,7 @@
 //! [`Ended`]: gateway::messages::Ended
 //! [`Retire`]: gateway::messages::Retire
 //! [`Request`]: gateway::messages::Request
-//! [`Overhear`]: gateway::messages::Overhear
+//! [`SetTap`]: gateway::messages::SetTap
 //! [`TakeCensus`]: gateway::messages::TakeCensus
 //! [`Deliver`]: gateway::messages::Deliver
 //! [`Response`]: gateway::messages::Response

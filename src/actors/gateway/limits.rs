@@ -20,7 +20,7 @@ pub const MAX_ADVERTISED: usize = 1024;
 pub const MAX_PROVIDED: usize = 256;
 /// Calls of one connection that wait for clients to answer.
 pub const MAX_WAITING_CALLS: usize = 256;
-/// Goals of one connection that other clients pursue.
+/// Goals of one connection that other clients carry out.
 pub const MAX_WAITING_GOALS: usize = 256;
 /// How long a provider may take when its caller does not say.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);

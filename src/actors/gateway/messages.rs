@@ -179,8 +179,8 @@ pub struct TakeCensus {
     pub at_most: usize,
 }
 
-/// Something that passes the registry, for whoever overhears it.
-pub enum Overheard<'a> {
+/// Something that passes the registry, for the tap.
+pub enum Tapped<'a> {
     /// A message of the runtime, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
     /// A client's message on a topic that the runtime listens to.
@@ -207,14 +207,14 @@ pub enum Overheard<'a> {
     },
 }
 
-/// Overhears what passes, on the registry's thread, and may not wait.
-pub type Eavesdropper = Box<dyn FnMut(Overheard<'_>) + Send>;
+/// Gets a copy of all that passes the registry, on the registry's thread, and may not wait.
+pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
 
-/// From now on this one overhears what passes, or nobody does; every topic of the runtime counts as subscribed to
-/// meanwhile. From the recorder.
+/// Sets the tap, or takes it away. While there is one, every topic of the runtime counts as subscribed to. From the
+/// recorder.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct Overhear(pub Option<Eavesdropper>);
+pub struct SetTap(pub Option<Tap>);
 
 /// No call is taken any more, and waiting calls and goals for clients are refused, for the reason given. From the
 /// runtime, when it ends.

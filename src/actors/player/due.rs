@@ -29,7 +29,7 @@ const UNDERWAY: usize = 8;
 const FEW: usize = 64;
 
 impl<const N: usize> Player<N> {
-    /// Reckons where the record is to be by now.
+    /// Computes where the record is to be by now.
     pub(super) fn tick(&mut self) {
         let now = Instant::now();
         let passed = (now - self.ticked).min(CATCH_UP);

@@ -108,12 +108,12 @@ pub enum Op {
         /// Action name.
         action: String,
     },
-    /// An operation of a client that pursues goals of an action.
-    Pursue {
+    /// An operation of an action server: a client that carries out the goals of an action.
+    ServeAction {
         /// Action name.
         action: String,
         /// The op.
-        pursuit: PursuerOp,
+        op: ActionServerOp,
     },
     /// A piece of a longer frame.
     Fragment(Piece),
@@ -152,8 +152,8 @@ impl Op {
             Self::CallService(CallService { args, .. })
             | Self::SendActionGoal(ActionGoal { args, .. }) => args.payload().allocated(),
             Self::ServiceResponse { values, .. }
-            | Self::Pursue {
-                pursuit: PursuerOp::Feedback { values } | PursuerOp::End { values, .. },
+            | Self::ServeAction {
+                op: ActionServerOp::Feedback { values } | ActionServerOp::End { values, .. },
                 ..
             } => values.allocated(),
             // Names, which are short.
@@ -256,10 +256,10 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
-/// An operation of a client that pursues goals; where it is about one goal, the frame's id says which.
+/// An operation of an action server; where it is about one goal, the frame's id says which.
 #[derive(Debug, Clone)]
-pub enum PursuerOp {
-    /// The sender pursues the action from now on.
+pub enum ActionServerOp {
+    /// The sender serves the action from now on.
     Advertise {
         /// Action type, if given.
         type_name: Option<String>,

@@ -1,37 +1,37 @@
-//! Goals for actions of clients: to the client that pursues them, and what it says of them back to who sent them.
+//! Goals of actions that a client serves: they go to that client, and its feedback and results back to the sender.
 //!
 //! **Invariant:** every goal that is forwarded has one `action_result`, unless its sender goes first.
 
 use std::sync::Arc;
 
-use super::pursuers::ForwardedGoal;
-use super::refusal::Refusal;
-use super::services::Provider;
-use super::state::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{CALL_BYTES, MAX_BACKLOG, MAX_PROVIDED, MAX_WAITING_GOALS};
 use crate::actors::gateway::messages::{Deliver, Frames};
+use crate::actors::gateway::registry::refusal::Refusal;
+use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
+use crate::actors::gateway::registry::tables::action_servers::ForwardedGoal;
+use crate::actors::gateway::registry::tables::services::Provider;
 use crate::protocol::catalog::Action;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
-use crate::protocol::op::{ActionGoal, Arguments, GoalStatus, PursuerOp};
+use crate::protocol::op::{ActionGoal, ActionServerOp, Arguments, GoalStatus};
 use crate::protocol::wire::payload::Payload;
 
 impl Registry {
-    /// Does what a client says that pursues goals.
-    pub(super) fn pursue(
+    /// Performs an op of an action server.
+    pub(crate) fn serve_action(
         &mut self,
         origin: &FrameOrigin,
         action: &str,
-        pursuit: PursuerOp,
+        op: ActionServerOp,
     ) -> Result<(), Refusal> {
-        match pursuit {
-            PursuerOp::Advertise { type_name } => {
+        match op {
+            ActionServerOp::Advertise { type_name } => {
                 self.advertise_action(origin, action, type_name.as_deref())
             }
-            PursuerOp::Unadvertise => self.unadvertise_action(origin, action),
-            PursuerOp::Feedback { values } => self.pass_feedback(origin, action, &values),
-            PursuerOp::End {
+            ActionServerOp::Unadvertise => self.unadvertise_action(origin, action),
+            ActionServerOp::Feedback { values } => self.pass_feedback(origin, action, &values),
+            ActionServerOp::End {
                 values,
                 status,
                 result,
@@ -54,23 +54,23 @@ impl Registry {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return Ok(());
         };
-        let provided = client.provided.len() + client.pursued.len();
-        if provided >= MAX_PROVIDED && !client.pursued.contains_key(action) {
+        let provided = client.provided.len() + client.served_actions.len();
+        if provided >= MAX_PROVIDED && !client.served_actions.contains_key(action) {
             return Err(Refusal::TooManyProvided);
         }
         let share = client.register(spelling.len() + type_name.map_or(0, str::len));
-        client.pursued.insert(action.into(), share);
-        let pursuer = Provider {
+        client.served_actions.insert(action.into(), share);
+        let server = Provider {
             connection: origin.from,
             spelling: spelling.into(),
         };
-        let before = self.pursuers.pursue(action, pursuer);
+        let before = self.action_servers.serve(action, server);
         if let Some(before) = before.filter(|one| one.connection != origin.from)
             && let Some(before) = self.clients.get_mut(&before.connection)
         {
-            before.pursued.remove(action);
+            before.served_actions.remove(action);
         }
-        self.tally.pursue(action, type_name);
+        self.tally.serve_action(action, type_name);
         let msg = format!("advertised action {spelling}");
         self.send_status(origin.from, Level::Info, &msg, origin.id.as_ref());
         Ok(())
@@ -80,25 +80,25 @@ impl Registry {
     fn unadvertise_action(&mut self, origin: &FrameOrigin, spelling: &str) -> Result<(), Refusal> {
         let action = &*names::absolute(spelling);
         if !self.withdraw_action(action, origin.from) {
-            return Err(Refusal::NotPursuer(spelling.to_owned()));
+            return Err(Refusal::NotActionServer(spelling.to_owned()));
         }
         if let Some(client) = self.clients.get_mut(&origin.from) {
-            client.pursued.remove(action);
+            client.served_actions.remove(action);
         }
         Ok(())
     }
 
-    /// Withdraws an action by its absolute name, if `connection` pursues it; true if it did.
-    pub(super) fn withdraw_action(&mut self, action: &str, connection: ConnectionId) -> bool {
-        let pursued = self.pursuers.withdraw(action, connection);
-        if pursued {
+    /// Withdraws an action by its absolute name, if `connection` serves it; true if it did.
+    pub(crate) fn withdraw_action(&mut self, action: &str, connection: ConnectionId) -> bool {
+        let served = self.action_servers.withdraw(action, connection);
+        if served {
             self.tally.drop_action(action);
         }
-        pursued
+        served
     }
 
-    /// Passes a goal on to the client that pursues the action.
-    pub(super) fn forward_goal(
+    /// Passes a goal on to the client that serves the action.
+    pub(crate) fn forward_goal(
         &mut self,
         from: ConnectionId,
         id: Option<Payload>,
@@ -110,39 +110,43 @@ impl Registry {
         }
         let unknown = || Refusal::NoAction(action.to_owned());
         let name = &*names::absolute(action);
-        let pursuer = self.pursuers.pursuer(name).ok_or_else(unknown)?.clone();
+        let server = self
+            .action_servers
+            .server(name)
+            .ok_or_else(unknown)?
+            .clone();
         if matches!(goal.args, Arguments::Neither(_)) {
             return Err(Refusal::BadArguments);
         }
-        if self.pursuers.sent_by(from) >= MAX_WAITING_GOALS {
+        if self.action_servers.sent_by(from) >= MAX_WAITING_GOALS {
             return Err(Refusal::TooManyGoals);
         }
         let (Some(client), Some(sender)) = (
-            self.clients.get(&pursuer.connection),
+            self.clients.get(&server.connection),
             self.clients.get(&from),
         ) else {
             return Err(unknown());
         };
-        if !client.pursued.contains_key(name) {
+        if !client.served_actions.contains_key(name) {
             return Err(unknown());
         }
         if client.backlog() > MAX_BACKLOG {
             return Err(Refusal::ProviderBusy(action.to_owned()));
         }
         let id_bytes = id.as_ref().map_or(0, Payload::allocated);
-        let names = 2 * action.len() + pursuer.spelling.len();
+        let names = 2 * action.len() + server.spelling.len();
         let share = sender.outlets.account.take(CALL_BYTES + id_bytes + names);
-        let known_as = self.pursuers.remember(ForwardedGoal {
+        let known_as = self.action_servers.remember(ForwardedGoal {
             sender: from,
             id,
-            pursuer: pursuer.connection,
+            server: server.connection,
             action: Arc::from(action),
-            spelling: pursuer.spelling.clone(),
+            spelling: server.spelling.clone(),
             wants_feedback: goal.feedback,
             _share: share,
         });
         client.send(messages::action_goal(
-            &pursuer.spelling,
+            &server.spelling,
             &known_as,
             goal.type_name.as_deref(),
             goal.args.payload(),
@@ -151,17 +155,20 @@ impl Registry {
         Ok(())
     }
 
-    /// Asks the client that pursues a goal of this client to end it.
-    pub(super) fn forward_cancellation(
+    /// Asks the action server of a goal of this client to end it.
+    pub(crate) fn forward_cancellation(
         &self,
         origin: &FrameOrigin,
         action: &str,
     ) -> Result<(), Refusal> {
         let meant = self
-            .pursuers
+            .action_servers
             .meant_by_sender(origin.id.as_ref(), action, origin.from);
         let Some((id, goal)) = meant else {
-            let is_known = self.pursuers.pursuer(&names::absolute(action)).is_some();
+            let is_known = self
+                .action_servers
+                .server(&names::absolute(action))
+                .is_some();
             let why = if is_known {
                 Refusal::NoGoal
             } else {
@@ -169,11 +176,11 @@ impl Registry {
             };
             return Err(why(action.to_owned()));
         };
-        if let Some(pursuer) = self.clients.get(&goal.pursuer) {
-            if pursuer.backlog() > MAX_BACKLOG {
+        if let Some(server) = self.clients.get(&goal.server) {
+            if server.backlog() > MAX_BACKLOG {
                 return Err(Refusal::ProviderBusy(action.to_owned()));
             }
-            pursuer.send(messages::cancellation(&goal.spelling, &id));
+            server.send(messages::cancellation(&goal.spelling, &id));
         }
         Ok(())
     }
@@ -186,9 +193,9 @@ impl Registry {
         values: &Payload,
     ) -> Result<(), Refusal> {
         let meant = self
-            .pursuers
-            .meant_by_pursuer(origin.id.as_ref(), action, origin.from);
-        let goal = meant.and_then(|number| self.pursuers.goal(number));
+            .action_servers
+            .meant_by_server(origin.id.as_ref(), action, origin.from);
+        let goal = meant.and_then(|number| self.action_servers.goal(number));
         let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
         if let Some(sender) = self
             .clients
@@ -213,9 +220,9 @@ impl Registry {
         encode: impl FnOnce(&ForwardedGoal) -> bytes::Bytes,
     ) -> Result<(), Refusal> {
         let meant = self
-            .pursuers
-            .meant_by_pursuer(origin.id.as_ref(), action, origin.from);
-        let goal = meant.and_then(|number| self.pursuers.take(number));
+            .action_servers
+            .meant_by_server(origin.id.as_ref(), action, origin.from);
+        let goal = meant.and_then(|number| self.action_servers.take(number));
         let goal = goal.ok_or_else(|| Refusal::StaleGoal(action.to_owned()))?;
         if let Some(sender) = self.clients.get(&goal.sender) {
             if sender.backlog() > MAX_BACKLOG {
@@ -228,8 +235,8 @@ impl Registry {
         Ok(())
     }
 
-    /// Tells who sent a goal that it has ended without a result of its pursuer.
-    pub(super) fn abort(&self, goal: &ForwardedGoal, why: &Refusal) {
+    /// Tells who sent a goal that it has ended without a result of its server.
+    pub(crate) fn abort(&self, goal: &ForwardedGoal, why: &Refusal) {
         if let Some(sender) = self.clients.get(&goal.sender) {
             let (id, why) = (goal.id.as_ref(), why.to_string());
             let status = GoalStatus::Aborted as u8;

@@ -9,11 +9,11 @@ use std::sync::Arc;
 use bytes::Bytes;
 use tokio::sync::oneshot;
 
-use super::state::Registry;
-use super::topics::Subscriber;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::encoded::Encoded;
-use crate::actors::gateway::messages::{Deliver, Frames, Handled, Overheard, Publish, Underway};
+use crate::actors::gateway::messages::{Deliver, Frames, Handled, Publish, Tapped, Underway};
+use crate::actors::gateway::registry::state::Registry;
+use crate::actors::gateway::registry::tables::topics::Subscriber;
 use crate::protocol::catalog::Topic;
 use crate::protocol::messages;
 use crate::protocol::names;
@@ -22,7 +22,7 @@ use crate::protocol::wire::series;
 
 /// Paces who publishes: it goes on when its message has been offered to the socket of every subscriber.
 #[derive(Default)]
-pub(super) struct Pace {
+pub(crate) struct Pace {
     underway: Option<(Underway, oneshot::Receiver<()>)>,
     deliveries: usize,
 }
@@ -39,7 +39,7 @@ impl Pace {
     }
 
     /// The message's publisher waits for `handled`, and until it is underway to nobody any more.
-    pub(super) fn and(self, handled: Handled) -> Handled {
+    pub(crate) fn and(self, handled: Handled) -> Handled {
         let end = self.underway.map(|(_, end)| end);
         handled.and_by_subscribers(end, self.deliveries)
     }
@@ -47,7 +47,7 @@ impl Pace {
 
 impl Registry {
     /// Delivers a message of a node, and keeps it if its topic is latched.
-    pub(super) fn publish_own(
+    pub(crate) fn publish_own(
         &mut self,
         Publish { topic, frame }: Publish,
         pace: Option<&mut Pace>,
@@ -57,7 +57,7 @@ impl Registry {
             return;
         }
         let frame = frame.write();
-        self.ear.hear(Overheard::Published(topic, &frame));
+        self.tap.pass(Tapped::Published(topic, &frame));
         self.fan_out(name, pace, |spelling| {
             messages::respelled(name, spelling, &frame)
         });
@@ -69,7 +69,7 @@ impl Registry {
     /// Delivers a message, or a series of them, to everybody who subscribes to `topic`, an absolute name, under
     /// whichever spelling; `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait, which a
     /// live arm can't.
-    pub(super) fn fan_out(
+    pub(crate) fn fan_out(
         &self,
         topic: &str,
         mut pace: Option<&mut Pace>,
@@ -106,7 +106,7 @@ impl Registry {
     }
 
     /// A latched topic's last message, to a subscriber who came after it.
-    pub(super) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
+    pub(crate) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
         let latched =
             Topic::from_name(spelling).and_then(|topic| Some((topic, self.latched.get(&topic)?)));
         let subscriber = self
@@ -130,7 +130,7 @@ impl Registry {
     }
 
     /// The type of a topic's messages, if anybody has said it and it is known.
-    pub(super) fn known_type(&self, topic: &str) -> Option<&'static str> {
+    pub(crate) fn known_type(&self, topic: &str) -> Option<&'static str> {
         match Topic::from_name(topic) {
             Some(topic) => Some(topic.type_name()),
             None => Some(self.tally.known_type(&names::absolute(topic))?.name),
@@ -145,7 +145,7 @@ impl Registry {
     }
 
     /// A message to be delivered counts once, until the last copy is gone.
-    pub(super) fn count(&self, frame: Bytes) -> Bytes {
+    pub(crate) fn count(&self, frame: Bytes) -> Bytes {
         self.gauges.memory().count(frame)
     }
 }

@@ -2,17 +2,24 @@
 //!
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
 
+mod action_servers;
+mod actions;
+mod calls;
+mod cleanup;
+pub(crate) mod fan_out;
+mod subscriptions;
+
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
-use super::census::Use;
-use super::fan_out::Pace;
-use super::refusal::Refusal;
-use super::services::Provider;
-use super::state::{FrameOrigin, Registry};
+use self::fan_out::Pace;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{MAX_ADVERTISED, MAX_PROVIDED};
-use crate::actors::gateway::messages::{Handled, Overheard, Request};
+use crate::actors::gateway::messages::{Handled, Request, Tapped};
+use crate::actors::gateway::registry::refusal::Refusal;
+use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
+use crate::actors::gateway::registry::tables::census::Use;
+use crate::actors::gateway::registry::tables::services::Provider;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::{Direction, Service, Topic};
 use crate::protocol::messages::{self, Level};
@@ -23,7 +30,7 @@ use crate::protocol::wire::series::Series;
 
 impl Registry {
     /// Performs one op of a client that is known.
-    pub(super) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
+    pub(crate) fn perform(&mut self, request: Request, ctx: &mut Context<Self>) -> Handled {
         let origin = FrameOrigin {
             from: request.from,
             id: request.id,
@@ -56,7 +63,7 @@ impl Registry {
                 self.advertise_service(&origin, &service, type_name.as_deref())
             }
             Op::UnadvertiseService { service } => self.unadvertise_service(&origin, &service),
-            Op::Pursue { action, pursuit } => self.pursue(&origin, &action, pursuit),
+            Op::ServeAction { action, op } => self.serve_action(&origin, &action, op),
             Op::SetLevel { verbosity, errors } => {
                 if let Some(client) = self.clients.get_mut(&origin.from) {
                     client.verbosity = verbosity;
@@ -172,7 +179,7 @@ impl Registry {
             return pace.and(Handled::at_once());
         };
         if let Some(topic) = Topic::from_name(topic) {
-            self.ear.hear(Overheard::Heard(topic, msg));
+            self.tap.pass(Tapped::Heard(topic, msg));
         }
         let (done, ended) = oneshot::channel();
         listener(TopicMessage {
@@ -211,7 +218,7 @@ impl Registry {
         let Some(client) = self.clients.get(&origin.from) else {
             return Ok(());
         };
-        let provided = client.provided.len() + client.pursued.len();
+        let provided = client.provided.len() + client.served_actions.len();
         if provided >= MAX_PROVIDED && !client.provided.contains_key(service) {
             return Err(Refusal::TooManyProvided);
         }
@@ -261,6 +268,6 @@ fn refuse_runtime_topic(topic: &str) -> Result<(), Refusal> {
 }
 
 /// Whether the runtime itself subscribes to the topic.
-pub(super) fn is_listened_to(topic: Topic) -> bool {
+pub(crate) fn is_listened_to(topic: Topic) -> bool {
     topic.direction() == Direction::Subscribed
 }

@@ -11,14 +11,14 @@ use crate::protocol::ros::rosapi::{Census, ListedService, ListedTopic, MAX_LISTE
 
 /// How a client uses a topic.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Use {
+pub(crate) enum Use {
     Advertised,
     Subscribed,
 }
 
 /// The tallies. Entries are shared with whoever asks for them: a list of thousands costs no copies.
 #[derive(Default)]
-pub(super) struct Tally {
+pub(crate) struct Tally {
     topics: BTreeMap<Arc<str>, Users>,
     services: BTreeMap<Arc<str>, Arc<ListedService>>,
     actions: BTreeMap<Arc<str>, Arc<ListedService>>,
@@ -80,7 +80,7 @@ impl Users {
 
 impl Tally {
     /// A client has begun to use a topic.
-    pub(super) fn add(&mut self, topic: &str, how: Use, type_name: Option<&str>) {
+    pub(crate) fn add(&mut self, topic: &str, how: Use, type_name: Option<&str>) {
         self.taken = None;
         if !self.topics.contains_key(topic) {
             let name = Arc::from(topic);
@@ -96,7 +96,7 @@ impl Tally {
     }
 
     /// A client that uses a topic already has named its type; true if that stays with the topic.
-    pub(super) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
+    pub(crate) fn note_type(&mut self, topic: &str, type_name: &str) -> bool {
         let users = self.topics.get_mut(topic);
         let is_noted = users.is_some_and(|users| users.note(type_name));
         if is_noted {
@@ -106,7 +106,7 @@ impl Tally {
     }
 
     /// A client has ceased to use a topic in this way.
-    pub(super) fn remove(&mut self, topic: &str, how: Use) {
+    pub(crate) fn remove(&mut self, topic: &str, how: Use) {
         self.taken = None;
         let Some(users) = self.topics.get_mut(topic) else {
             debug_assert!(false, "{topic} was not counted");
@@ -119,45 +119,45 @@ impl Tally {
     }
 
     /// The type of a topic that clients use, if one has named it and it is known.
-    pub(super) fn known_type(&self, topic: &str) -> Option<Type> {
+    pub(crate) fn known_type(&self, topic: &str) -> Option<Type> {
         self.topics.get(topic)?.known
     }
 
     /// A client provides a service.
-    pub(super) fn provide(&mut self, service: &str, type_name: Option<&str>) {
+    pub(crate) fn provide(&mut self, service: &str, type_name: Option<&str>) {
         self.taken = None;
         let listed = listed(service, type_name);
         self.services.insert(Arc::clone(&listed.name), listed);
     }
 
     /// Nobody provides it any more.
-    pub(super) fn withdraw(&mut self, service: &str) {
+    pub(crate) fn withdraw(&mut self, service: &str) {
         self.taken = None;
         self.services.remove(service);
     }
 
-    /// A client pursues an action.
-    pub(super) fn pursue(&mut self, action: &str, type_name: Option<&str>) {
+    /// A client serves an action.
+    pub(crate) fn serve_action(&mut self, action: &str, type_name: Option<&str>) {
         self.taken = None;
         let listed = listed(action, type_name);
         self.actions.insert(Arc::clone(&listed.name), listed);
     }
 
-    /// Nobody pursues it any more.
-    pub(super) fn drop_action(&mut self, action: &str) {
+    /// Nobody serves it any more.
+    pub(crate) fn drop_action(&mut self, action: &str) {
         self.taken = None;
         self.actions.remove(action);
     }
 
     /// The runtime's own services are these, if any are given.
-    pub(super) fn set_replayed(&mut self, replayed: Option<Arc<BTreeSet<Service>>>) {
+    pub(crate) fn set_replayed(&mut self, replayed: Option<Arc<BTreeSet<Service>>>) {
         self.taken = None;
         self.replayed = replayed;
     }
 
     /// All that there is, up to the limit of what is listed, unless it is more than `at_most`. It is made anew only if
     /// something has changed since.
-    pub(super) fn census(&mut self, at_most: usize) -> Option<Arc<Census>> {
+    pub(crate) fn census(&mut self, at_most: usize) -> Option<Arc<Census>> {
         if self.topics.len() + self.services.len() + self.actions.len() > at_most {
             return None;
         }
@@ -223,7 +223,7 @@ mod tests {
             |tally| tally.remove("/t", Use::Subscribed),
             |tally| tally.provide("/s", None),
             |tally| tally.provide("/s", Some("a/b")),
-            |tally| tally.pursue("/a", None),
+            |tally| tally.serve_action("/a", None),
             |tally| tally.withdraw("/s"),
             |tally| tally.drop_action("/a"),
             |tally| tally.set_replayed(Some(Arc::default())),

@@ -4,14 +4,14 @@
 
 use std::sync::Arc;
 
-use super::census::Use;
-use super::ops::is_listened_to;
-use super::refusal::Refusal;
-use super::state::{FrameOrigin, Registry};
-use super::topics::{Subscription, throttle_of};
+use super::is_listened_to;
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::MAX_SUBSCRIPTIONS;
 use crate::actors::gateway::messages::Configure;
+use crate::actors::gateway::registry::refusal::Refusal;
+use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
+use crate::actors::gateway::registry::tables::census::Use;
+use crate::actors::gateway::registry::tables::topics::{Subscription, throttle_of};
 use crate::protocol::catalog::{Topic, types};
 use crate::protocol::limits::MAX_NAME;
 use crate::protocol::messages::Level;
@@ -20,7 +20,7 @@ use crate::protocol::op::{Compression, Encoding, Subscribe};
 use crate::protocol::ros::stamps::is_ros1_name;
 
 impl Registry {
-    pub(super) fn subscribe(
+    pub(crate) fn subscribe(
         &mut self,
         origin: &FrameOrigin,
         subscribe: &Subscribe,
@@ -108,7 +108,7 @@ impl Registry {
         Ok(())
     }
 
-    pub(super) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
+    pub(crate) fn unsubscribe(&mut self, origin: &FrameOrigin, topic: &str) {
         let Some(client) = self.clients.get_mut(&origin.from) else {
             return;
         };

@@ -18,29 +18,29 @@ use crate::protocol::op::Encoding;
 
 /// One `subscribe` of a connection to a topic; `id` tells several of them apart.
 #[derive(Debug)]
-pub(super) struct Subscription {
-    pub(super) id: Option<Box<str>>,
-    pub(super) throttle: Duration,
-    pub(super) queue_length: usize,
-    pub(super) encoding: Encoding,
+pub(crate) struct Subscription {
+    pub(crate) id: Option<Box<str>>,
+    pub(crate) throttle: Duration,
+    pub(crate) queue_length: usize,
+    pub(crate) encoding: Encoding,
     /// Keeps its `fragment_size` among those that the topic has.
-    pub(super) size: Option<Arc<usize>>,
+    pub(crate) size: Option<Arc<usize>>,
     /// Its share of the account.
-    pub(super) _share: Share,
+    pub(crate) _share: Share,
 }
 
 /// A connection under a topic.
-pub(super) struct Subscriber {
-    pub(super) connection: ConnectionId,
-    pub(super) outlet: Recipient<Deliver>,
+pub(crate) struct Subscriber {
+    pub(crate) connection: ConnectionId,
+    pub(crate) outlet: Recipient<Deliver>,
     /// The encoding that its subscriptions come to.
-    pub(super) encoding: Encoding,
+    pub(crate) encoding: Encoding,
     /// Number of the newest messages that are kept, if some of them are held back or left out.
-    pub(super) newest: Option<usize>,
+    pub(crate) newest: Option<usize>,
 }
 
 /// The smallest of each value over a connection's subscriptions to one topic; `None` for none.
-pub(super) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
+pub(crate) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
     let queue_lengths = subscriptions.iter().map(|one| one.queue_length.max(1));
     Some(Throttle {
         interval: subscriptions.iter().map(|one| one.throttle).min()?,
@@ -56,7 +56,7 @@ fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
 
 /// Every topic that somebody subscribes to, by the spelling that the subscriber used.
 #[derive(Default)]
-pub(super) struct Topics {
+pub(crate) struct Topics {
     subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
     /// By absolute name: the `fragment_size`s in use, for as long as a subscription has them.
     sizes: HashMap<Box<str>, Vec<Weak<usize>>>,
@@ -65,7 +65,7 @@ pub(super) struct Topics {
 impl Topics {
     /// Adds a subscriber under its spelling of the topic. Gives the spelling, shared, and whether that is new to this
     /// subscriber.
-    pub(super) fn add(
+    pub(crate) fn add(
         &mut self,
         topic: &str,
         connection: ConnectionId,
@@ -91,7 +91,7 @@ impl Topics {
     /// A `fragment_size` to be kept by the subscription that asks for it, which gives up `given_up` then. Where the
     /// topic of that absolute name has as many others as it may have, powers of two aside, it is the power of two
     /// below: nobody is refused because of what others ask for.
-    pub(super) fn share_size(
+    pub(crate) fn share_size(
         &mut self,
         topic: &str,
         size: usize,
@@ -124,12 +124,12 @@ impl Topics {
     }
 
     /// Nobody subscribes to the topic of that absolute name any more.
-    pub(super) fn forget_sizes(&mut self, topic: &str) {
+    pub(crate) fn forget_sizes(&mut self, topic: &str) {
         self.sizes.remove(topic);
     }
 
     /// Sets how a subscriber's messages are written, by what its subscriptions come to.
-    pub(super) fn configure(
+    pub(crate) fn configure(
         &mut self,
         topic: &Arc<str>,
         connection: ConnectionId,
@@ -145,7 +145,7 @@ impl Topics {
     }
 
     /// Removes a subscriber.
-    pub(super) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+    pub(crate) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
         let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
             return;
         };
@@ -156,12 +156,12 @@ impl Topics {
     }
 
     /// Whether anybody subscribes to the topic of that absolute name, under whichever spelling.
-    pub(super) fn has_subscribers(&self, topic: &str) -> bool {
+    pub(crate) fn has_subscribers(&self, topic: &str) -> bool {
         names::spellings(topic).any(|spelling| self.subscribers.contains_key(spelling))
     }
 
     /// A spelling, shared, and those who subscribed with it, if there are any.
-    pub(super) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
+    pub(crate) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
         self.subscribers
             .get_key_value(topic)
             .map(|(name, list)| (name, list.as_slice()))

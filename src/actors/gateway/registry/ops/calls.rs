@@ -8,11 +8,11 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::time::Instant;
 
-use super::refusal::Refusal;
-use super::services::{Forwarded, Services};
-use super::state::{FrameOrigin, Registry};
 use crate::actors::gateway::limits::{CALL_BYTES, DEFAULT_TIMEOUT, MAX_BACKLOG, MAX_WAITING_CALLS};
-use crate::actors::gateway::messages::{Handled, Overheard};
+use crate::actors::gateway::messages::{Handled, Tapped};
+use crate::actors::gateway::registry::refusal::Refusal;
+use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
+use crate::actors::gateway::registry::tables::services::{Forwarded, Services};
 use crate::actors::wire::{Caller, ServiceCall};
 use crate::protocol::catalog::Service;
 use crate::protocol::messages;
@@ -22,7 +22,7 @@ use crate::protocol::wire::payload::Payload;
 
 impl Registry {
     /// Sends a call to the node or the client that serves it; whatever fails is the call's one response.
-    pub(super) fn call(
+    pub(crate) fn call(
         &mut self,
         origin: FrameOrigin,
         call: CallService,
@@ -37,7 +37,7 @@ impl Registry {
         } else if let Some(service) = own {
             match self.nodes.services.get(&service) {
                 Some(node) => {
-                    self.ear.hear(Overheard::Called {
+                    self.tap.pass(Tapped::Called {
                         from: origin.from,
                         service,
                         id: origin.id.as_ref(),
@@ -127,12 +127,12 @@ impl Registry {
                 _share: share,
             },
         );
-        self.look_at_endings(ctx);
+        self.schedule_cleanup(ctx);
         Ok(())
     }
 
     /// A provider's answer goes back under the caller's own id.
-    pub(super) fn complete(
+    pub(crate) fn complete(
         &mut self,
         origin: &FrameOrigin,
         service: &str,

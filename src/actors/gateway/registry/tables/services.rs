@@ -16,29 +16,29 @@ use crate::protocol::wire::payload::Payload;
 const LONGEST_CALL_ID: usize = 6 * (OWN_ID_PREFIX.len() + 20) + 2;
 
 /// A call that was forwarded to its provider and not answered yet.
-pub(super) struct Forwarded {
-    pub(super) caller: ConnectionId,
-    pub(super) id: Option<Payload>,
-    pub(super) provider: ConnectionId,
+pub(crate) struct Forwarded {
+    pub(crate) caller: ConnectionId,
+    pub(crate) id: Option<Payload>,
+    pub(crate) provider: ConnectionId,
     /// The service's name as the caller spells it.
-    pub(super) service: Box<str>,
+    pub(crate) service: Box<str>,
     /// When the caller's patience ends. The registry may look later than that, where the process has stood still.
-    pub(super) deadline: Instant,
+    pub(crate) deadline: Instant,
     /// Its share of its caller's account.
-    pub(super) _share: Share,
+    pub(crate) _share: Share,
 }
 
 /// Who provides a service.
 #[derive(Clone)]
-pub(super) struct Provider {
-    pub(super) connection: ConnectionId,
+pub(crate) struct Provider {
+    pub(crate) connection: ConnectionId,
     /// The service's name as the provider spells it: what it is called by.
-    pub(super) spelling: Box<str>,
+    pub(crate) spelling: Box<str>,
 }
 
 /// Providers and outstanding calls.
 #[derive(Default)]
-pub(super) struct Services {
+pub(crate) struct Services {
     /// By absolute name.
     providers: HashMap<Box<str>, Provider>,
     outstanding: BTreeMap<u64, Forwarded>,
@@ -50,16 +50,16 @@ pub(super) struct Services {
 
 impl Services {
     /// Makes `provider` the provider; the newest registration wins.
-    pub(super) fn provide(&mut self, service: &str, provider: Provider) {
+    pub(crate) fn provide(&mut self, service: &str, provider: Provider) {
         self.providers.insert(service.into(), provider);
     }
 
-    pub(super) fn provider(&self, service: &str) -> Option<&Provider> {
+    pub(crate) fn provider(&self, service: &str) -> Option<&Provider> {
         self.providers.get(service)
     }
 
     /// Withdraws the service if `connection` is its provider; true if it was.
-    pub(super) fn withdraw(&mut self, service: &str, connection: ConnectionId) -> bool {
+    pub(crate) fn withdraw(&mut self, service: &str, connection: ConnectionId) -> bool {
         let provides = self
             .provider(service)
             .is_some_and(|provider| provider.connection == connection);
@@ -70,18 +70,18 @@ impl Services {
     }
 
     /// A fresh number for a call that is about to be forwarded.
-    pub(super) fn next_call(&mut self) -> u64 {
+    pub(crate) fn next_call(&mut self) -> u64 {
         self.calls_made += 1;
         self.calls_made
     }
 
     /// The id under which call `number` goes to its provider.
-    pub(super) fn call_id(number: u64) -> String {
+    pub(crate) fn call_id(number: u64) -> String {
         format!("{OWN_ID_PREFIX}{number}")
     }
 
     /// The number of the call that has this id.
-    pub(super) fn number_of(id: &Payload) -> Option<u64> {
+    pub(crate) fn number_of(id: &Payload) -> Option<u64> {
         let id = Some(id).filter(|id| id.get().len() <= LONGEST_CALL_ID)?;
         let id: String = serde_json::from_str(id.get()).ok()?;
         let number: u64 = id.strip_prefix(OWN_ID_PREFIX)?.parse().ok()?;
@@ -89,7 +89,7 @@ impl Services {
         (id == Self::call_id(number)).then_some(number)
     }
 
-    pub(super) fn remember(&mut self, number: u64, call: Forwarded) {
+    pub(crate) fn remember(&mut self, number: u64, call: Forwarded) {
         self.by_caller.add(call.caller, number);
         self.by_provider.add(call.provider, number);
         self.by_deadline.insert((call.deadline, number));
@@ -97,12 +97,12 @@ impl Services {
     }
 
     /// Calls of `connection` that wait for a provider's answer.
-    pub(super) fn waiting_for(&self, connection: ConnectionId) -> usize {
+    pub(crate) fn waiting_for(&self, connection: ConnectionId) -> usize {
         self.by_caller.count(connection)
     }
 
     /// Takes the outstanding call that `provider` answers with `id`, if it is that provider's and of that service.
-    pub(super) fn complete(
+    pub(crate) fn complete(
         &mut self,
         id: Option<&Payload>,
         service: &str,
@@ -120,7 +120,7 @@ impl Services {
     }
 
     /// Takes an outstanding call, whoever provides it.
-    pub(super) fn take(&mut self, number: u64) -> Option<Forwarded> {
+    pub(crate) fn take(&mut self, number: u64) -> Option<Forwarded> {
         let call = self.outstanding.remove(&number)?;
         self.by_caller.remove(call.caller, number);
         self.by_provider.remove(call.provider, number);
@@ -129,30 +129,30 @@ impl Services {
     }
 
     /// Takes every outstanding call, oldest first.
-    pub(super) fn take_all(&mut self) -> Vec<Forwarded> {
+    pub(crate) fn take_all(&mut self) -> Vec<Forwarded> {
         let numbers: Vec<u64> = self.outstanding.keys().copied().collect();
         let calls = numbers.into_iter().map(|number| self.take(number));
         calls.flatten().collect()
     }
 
     /// When the first outstanding call's time will be over.
-    pub(super) fn next_deadline(&self) -> Option<Instant> {
+    pub(crate) fn next_deadline(&self) -> Option<Instant> {
         self.by_deadline.first().map(|(deadline, _)| *deadline)
     }
 
     /// Takes the call whose time has been over for longest, if there is one.
-    pub(super) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
+    pub(crate) fn take_due(&mut self, now: Instant) -> Option<Forwarded> {
         let (_, number) = *self.by_deadline.first().filter(|(due, _)| *due <= now)?;
         self.take(number)
     }
 
     /// Takes the numbers of the calls that wait for `provider`, which will not answer them.
-    pub(super) fn take_numbers(&mut self, provider: ConnectionId) -> BTreeSet<u64> {
+    pub(crate) fn take_numbers(&mut self, provider: ConnectionId) -> BTreeSet<u64> {
         self.by_provider.take(provider)
     }
 
     /// Forgets the calls that `caller` has made.
-    pub(super) fn forget_caller(&mut self, caller: ConnectionId) {
+    pub(crate) fn forget_caller(&mut self, caller: ConnectionId) {
         for number in self.by_caller.take(caller) {
             self.take(number);
         }

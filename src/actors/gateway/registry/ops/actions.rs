@@ -1,4 +1,4 @@
-//! Actions: a goal goes to the node or the client that pursues it; who sent it hears of it under its own id.
+//! Actions: a goal goes to its action server, a node or a client; the sender hears of it under its own id.
 //!
 //! **Invariant:** a goal that is refused here is answered by one `action_result`.
 
@@ -7,10 +7,10 @@ use std::sync::Arc;
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
-use super::refusal::Refusal;
-use super::state::{FrameOrigin, Registry};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::messages::{Deliver, Frames, Handled};
+use crate::actors::gateway::registry::refusal::Refusal;
+use crate::actors::gateway::registry::state::{FrameOrigin, Registry};
 use crate::actors::node::Feedback;
 use crate::actors::wire::Route;
 use crate::actors::wire::action_client::{ActionClient, ActionRequest, Canceller};
@@ -21,8 +21,8 @@ use crate::protocol::op::ActionGoal;
 use crate::protocol::wire::payload::Payload;
 
 impl Registry {
-    /// Sends a goal to the node that pursues it.
-    pub(super) fn send_action_goal(
+    /// Sends a goal to the node, or the client, that serves its action.
+    pub(crate) fn send_action_goal(
         &mut self,
         from: ConnectionId,
         id: Option<Payload>,
@@ -54,7 +54,7 @@ impl Registry {
             gone: Arc::clone(&client.outlets.gone),
             share,
         };
-        let node = match refusal.map_or_else(|| self.pursuer(&goal), Err) {
+        let node = match refusal.map_or_else(|| self.action_route(&goal), Err) {
             Ok(node) => node,
             Err(why) => {
                 action_client.refuse(&why.to_string());
@@ -71,7 +71,7 @@ impl Registry {
     }
 
     /// Ends a goal of the same client.
-    pub(super) fn cancel_action_goal(
+    pub(crate) fn cancel_action_goal(
         &mut self,
         from: ConnectionId,
         id: Option<Payload>,
@@ -98,7 +98,7 @@ impl Registry {
         Handled::by_node(ended)
     }
 
-    fn pursuer(&self, goal: &ActionGoal) -> Result<&Route<ActionRequest>, Refusal> {
+    fn action_route(&self, goal: &ActionGoal) -> Result<&Route<ActionRequest>, Refusal> {
         if let Some(why) = self.closed {
             return Err(Refusal::Closed(why));
         }
