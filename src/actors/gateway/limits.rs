@@ -54,8 +54,8 @@ pub(super) const WRITE_FRAMES: usize = 64;
 pub(super) const FREE_FRAMES: usize = 32;
 /// Subscribers of a message whose publisher waits in no queue after it.
 pub(super) const FREE_DELIVERIES: usize = 32;
-/// Pieces of messages are looked at so long after they have become too old, and so often whether a client that has
-/// enough has taken some of it.
+/// How long after their time pieces of messages are forgotten, and how often a client that has enough waiting is looked
+/// at again.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

@@ -77,8 +77,8 @@ pub enum Refused {
     Closed,
 }
 
-/// The client's stream has ended; frames that came before may still wait. From its connection: it only waits now, and
-/// where all places are taken, the oldest such client gives way to one that comes.
+/// The client's stream has ended; frames that came before may still wait. From its connection. Where all places are
+/// taken, the oldest client that only waits gives way to one that comes.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Ended(pub ConnectionId);
@@ -250,8 +250,7 @@ pub type Underway = Arc<oneshot::Sender<()>>;
 pub enum Frames {
     /// A whole frame, or a [series](crate::protocol::wire::series) of them.
     Plain(Bytes),
-    /// Frames in another form, made when the client has room. Where throttling keeps only so many, the others but the
-    /// first need not come.
+    /// Frames in another encoding, made on demand. With `Some(n)`, all but the first and the last n may be skipped.
     Encoded(Arc<Encoded>, Option<usize>),
     /// Feedback of a goal: it waits for no message that is to be encoded, as the goal's result does not either.
     Feedback(Bytes),

@@ -1,7 +1,7 @@
 //! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the state of things on `/ik_trial/status`.
 //!
 //! The rules are `math::trial`'s. The node asks the arm for lengths and simulation time before it does anything, and
-//! moves it through `ik_action` only. What it wants done there it does whole before it hears of anything else.
+//! moves it through `ik_action` only. What it asks for there is done to the end before it takes its next message.
 //!
 //! **Invariant:** time and goals' news are taken in the order in which the arm gave them; nothing ticks while no trial
 //! runs and nobody watches.

@@ -168,8 +168,7 @@ impl Client {
 }
 
 impl Registry {
-    /// Hands over all that a client has registered, to be withdrawn; the calls that wait for it as provider, and the
-    /// goals that it serves, will be ended.
+    /// Leaves all that a client has registered to the cleanup, with the calls and goals that wait for its answer.
     pub(super) fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;

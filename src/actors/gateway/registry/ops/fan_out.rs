@@ -20,7 +20,7 @@ use crate::protocol::names;
 use crate::protocol::op::{Compression, Encoding};
 use crate::protocol::wire::series;
 
-/// Paces who publishes: it goes on when its message has been offered to the socket of every subscriber.
+/// Holds a publisher back until its message has been offered to the socket of every subscriber.
 #[derive(Default)]
 pub(crate) struct Pace {
     underway: Option<(Underway, oneshot::Receiver<()>)>,

@@ -88,9 +88,9 @@ impl Topics {
         (name, new)
     }
 
-    /// A `fragment_size` to be kept by the subscription that asks for it, which gives up `given_up` then. Where the
-    /// topic of that absolute name has as many others as it may have, powers of two aside, it is the power of two
-    /// below: nobody is refused because of what others ask for.
+    /// The `fragment_size` that a subscription gets which asks for `size` and gives up `given_up`; the subscription
+    /// keeps it. If the topic of that absolute name has [`MAX_FRAGMENT_SIZES`] others, powers of two aside, it is the
+    /// power of two below: nobody is refused because of what others ask for.
     pub(crate) fn share_size(
         &mut self,
         topic: &str,
