@@ -34,7 +34,7 @@ use crate::actors::gateway::registry::{Attach, Registry};
 use crate::actors::node::ShutDown;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::ros::parameters::Parameters;
-use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
+use crate::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
@@ -247,8 +247,8 @@ where
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
     Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
-    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
-    Rosapi::attach(&rosapi, nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
 

@@ -20,7 +20,7 @@ use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::work_clock;
-use pendularm::actors::ros::rosapi::{ArmParameters, Rosapi};
+use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::{Node, Service, Topic};
@@ -220,8 +220,8 @@ where
         integrator: tap.clone().recipient(),
         time: tap.clone().recipient(),
     };
-    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
-    Rosapi::attach(&rosapi, nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
     let study = Study::<N>::new(arm.clone().recipient(), pool.clone()).start();
     Study::attach(&study, nodes);
     arm.do_send(Consult(study.recipient()));
