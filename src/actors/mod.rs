@@ -29,6 +29,9 @@
 //! - [`SetTap`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
 //!
+//! To the registry, from the runtime: [`Attach`], which node serves what; [`RefuseCalls`], [`FinishAll`], the end of
+//! calls and of connections.
+//!
 //! To a connection, from the registry: [`Deliver`], [`Response`], [`Finish`], bytes to send and the end; [`Configure`],
 //! how a topic is throttled for it.
 //!
@@ -100,6 +103,9 @@
 //! [`Request`]: gateway::messages::Request
 //! [`SetTap`]: gateway::messages::SetTap
 //! [`TakeCensus`]: gateway::messages::TakeCensus
+//! [`Attach`]: gateway::registry::Attach
+//! [`RefuseCalls`]: gateway::messages::RefuseCalls
+//! [`FinishAll`]: gateway::messages::FinishAll
 //! [`Deliver`]: gateway::messages::Deliver
 //! [`Response`]: gateway::messages::Response
 //! [`Configure`]: gateway::messages::Configure

@@ -1,5 +1,5 @@
 //! The registry: every client, topic and service; fans published topics out to subscribed connections, and routes
-//! calls.
+//! calls. `state.rs` has its state, which is made of `tables/`; `ops/` are the methods that change it.
 //!
 //! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
 

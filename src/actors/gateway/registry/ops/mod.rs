@@ -1,4 +1,5 @@
-//! The rosbridge ops, in the order of the protocol's table, but for subscriptions, calls and actions.
+//! The rosbridge ops. Those of subscriptions, calls, actions and action servers have a file each; `fan_out.rs` delivers
+//! what is published, and `cleanup.rs` ends what nobody will answer.
 //!
 //! **Invariant:** what is refused is answered, by an error status or by the call's one response, and changes nothing.
 
