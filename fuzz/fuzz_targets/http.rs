@@ -11,10 +11,10 @@
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::actors::gateway::connection::gate::{Admission, Gate};
+use pendularm::actors::gateway::connection::admission::{Newcomers, Admission};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::op::token::Token;
-use pendularm::web::Door;
+use pendularm::web::Site;
 use pendularm::web::access::Access;
 use pendularm::web::authority::Authority;
 use pendularm_client::codec::{Codec, Framing};
@@ -77,7 +77,7 @@ fn check(input: &[u8]) {
         allows_null: settings & 4 != 0,
         is_strict: settings & 8 != 0,
     };
-    let answer = run(converse(gate(rules), bytes, piece.max(1).into()));
+    let answer = run(converse(admission(rules), bytes, piece.max(1).into()));
     let expected = judge(bytes, rules);
     if answer.starts_with(b"HTTP/") {
         check_answer(&answer, expected);
@@ -107,7 +107,7 @@ fn check(input: &[u8]) {
     }
 }
 
-fn gate(rules: Rules<'_>) -> Gate {
+fn admission(rules: Rules<'_>) -> Admission {
     let token = rules.token.map(|token| Token::new(token).expect("a token"));
     let named = Authority::parse("arm.example:80").expect("a host");
     let access = Access {
@@ -124,16 +124,16 @@ fn gate(rules: Rules<'_>) -> Gate {
         },
         strict_origin: rules.is_strict,
     };
-    Gate {
+    Admission {
         token,
-        door: Door::new(access, FOLDER.into()),
-        admission: Admission::default(),
+        site: Site::new(access, FOLDER.into()),
+        newcomers: Newcomers::default(),
     }
 }
 
 /// Sends all of it, then the end; gives what comes up to the end.
-async fn converse(gate: Gate, bytes: &[u8], piece: usize) -> Vec<u8> {
-    let stage = Stage::new(gate, Memory::default()).await;
+async fn converse(admission: Admission, bytes: &[u8], piece: usize) -> Vec<u8> {
+    let stage = Stage::new(admission, Memory::default()).await;
     let (mut input, mut output) = split(stage.connect(256));
     let mut answer = Vec::new();
     let talk = async {

@@ -16,7 +16,7 @@ use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages::trajectory::joint_trajectory;
 use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::{
-    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, PursuerOp,
+    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, ActionServerOp,
 };
 use pendularm::protocol::wire::frame::FrameReader;
 use pendularm::protocol::wire::payload::Payload;
@@ -152,15 +152,15 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
         }
         Op::SendActionGoal(goal) => check_name(json, "action", &goal.action),
         Op::CancelActionGoal { action } => check_name(json, "action", action),
-        Op::Pursue { action, pursuit } => {
+        Op::ServeAction { action, op } => {
             check_name(json, "action", action);
-            match pursuit {
-                PursuerOp::Advertise { .. } | PursuerOp::Unadvertise => {}
-                PursuerOp::Feedback { values } => {
+            match op {
+                ActionServerOp::Advertise { .. } | ActionServerOp::Unadvertise => {}
+                ActionServerOp::Feedback { values } => {
                     let line = check_line(&messages::action_feedback_raw(action, id, values));
                     check_passed_on(json.get("values"), line.get("values"));
                 }
-                PursuerOp::End {
+                ActionServerOp::End {
                     values,
                     status,
                     result,

@@ -17,12 +17,12 @@ use pendularm::actors::arm::ik_action::{GoalTracker, IkAction};
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
 use pendularm::actors::arm::sim::ArmSim;
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::connection::gate::Gate;
+use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::node::{Interest, Publish};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::actors::ros::rosapi::{ArmParameters, Rosapi};
+use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
@@ -89,23 +89,23 @@ pub fn scarce() -> Memory {
 pub struct Stage {
     pub registry: Addr<Registry>,
     pub gauges: Arc<Gauges>,
-    gate: Arc<Gate>,
+    admission: Arc<Admission>,
     node_state: Rc<NodeState>,
 }
 
 impl Stage {
     /// A gateway whose one node answers at once.
-    pub async fn new(gate: Gate, memory: Memory) -> Self {
-        Self::raised(gate, memory, |_, _, _| {}).await
+    pub async fn new(admission: Admission, memory: Memory) -> Self {
+        Self::raised(admission, memory, |_, _, _| {}).await
     }
 
     /// A gateway with the runtime's own nodes. Computations, which have threads of their own, are left to the one node.
-    pub async fn with_arm(gate: Gate, memory: Memory) -> Self {
-        Self::raised(gate, memory, start_nodes).await
+    pub async fn with_arm(admission: Admission, memory: Memory) -> Self {
+        Self::raised(admission, memory, start_nodes).await
     }
 
     async fn raised(
-        gate: Gate,
+        admission: Admission,
         memory: Memory,
         start: impl FnOnce(&Addr<Registry>, &Arc<Gauges>, &mut Nodes),
     ) -> Self {
@@ -133,7 +133,7 @@ impl Stage {
         Self {
             registry,
             gauges,
-            gate: Arc::new(gate),
+            admission: Arc::new(admission),
             node_state,
         }
     }
@@ -142,9 +142,9 @@ impl Stage {
     #[must_use]
     pub fn connect(&self, room: usize) -> DuplexStream {
         let (ours, theirs) = duplex(room);
-        let (gate, local) = (Arc::clone(&self.gate), SocketAddr::from(LOCAL));
+        let (admission, local) = (Arc::clone(&self.admission), SocketAddr::from(LOCAL));
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        Connection::start_behind(gate, local, theirs, registry, gauges);
+        Connection::start_with(admission, local, theirs, registry, gauges);
         ours
     }
 
@@ -197,8 +197,8 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
     .start();
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
-    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
-    Rosapi::attach(&rosapi, nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
     let ik = Ik::<2>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
     let tracker = GoalTracker {

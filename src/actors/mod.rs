@@ -27,8 +27,11 @@
 //! - [`node::Publish`], [`node::Respond`]: a topic message; an answer. The registry writes what nodes
 //!   say; what the player has from a record comes written.
 //! - [`node::Feedback`], from `ik_action`, `follow` and `tf_web`: feedback of a goal, for the client that sent it.
-//! - [`Overhear`], from `recorder`: who hears all that passes, while it is recorded.
+//! - [`SetTap`], from `recorder`: who hears all that passes, while it is recorded.
 //! - [`TakeCensus`], from `rosapi`: which topics and services clients have.
+//!
+//! To the registry, from the runtime: [`Attach`], which node serves what; [`RefuseCalls`], [`FinishAll`], the end of
+//! calls and of connections.
 //!
 //! To a connection, from the registry: [`Deliver`], [`Response`], [`Finish`], bytes to send and the end; [`Configure`],
 //! how a topic is throttled for it.
@@ -98,8 +101,11 @@
 //! [`Ended`]: gateway::messages::Ended
 //! [`Retire`]: gateway::messages::Retire
 //! [`Request`]: gateway::messages::Request
-//! [`Overhear`]: gateway::messages::Overhear
+//! [`SetTap`]: gateway::messages::SetTap
 //! [`TakeCensus`]: gateway::messages::TakeCensus
+//! [`Attach`]: gateway::registry::Attach
+//! [`RefuseCalls`]: gateway::messages::RefuseCalls
+//! [`FinishAll`]: gateway::messages::FinishAll
 //! [`Deliver`]: gateway::messages::Deliver
 //! [`Response`]: gateway::messages::Response
 //! [`Configure`]: gateway::messages::Configure

@@ -26,7 +26,7 @@ use crate::actors::arm::sim::{ArmSim, Consult};
 use crate::actors::compute::integration::Integration;
 use crate::actors::compute::study::Study;
 use crate::actors::compute::workers::WorkerPool;
-use crate::actors::gateway::connection::gate::{Admission, Gate};
+use crate::actors::gateway::connection::admission::{Admission, Newcomers};
 use crate::actors::gateway::files;
 use crate::actors::gateway::listener::{Listener, StopListening};
 use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
@@ -34,7 +34,7 @@ use crate::actors::gateway::registry::{Attach, Registry};
 use crate::actors::node::ShutDown;
 use crate::actors::resources::gauges::Gauges;
 use crate::actors::ros::parameters::Parameters;
-use crate::actors::ros::rosapi::{ArmParameters, Rosapi};
+use crate::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use crate::actors::ros::rosout::Rosout;
 use crate::actors::ros::tf_web::TfRepublisher;
 use crate::actors::wire::Nodes;
@@ -49,7 +49,7 @@ use crate::{
 #[cfg(feature = "web")]
 use crate::{
     options::WebOptions,
-    web::{Door, access::Access, authority::Host},
+    web::{Site, access::Access, authority::Host},
 };
 
 /// The answer to waiting calls when the runtime ends.
@@ -144,12 +144,12 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     #[cfg(feature = "record")]
     ends.record(options).await?;
 
-    let gate = Arc::new(gate(options, room.unauthenticated));
+    let admission = Arc::new(admission(options, room.unauthenticated));
     let listeners: Vec<Addr<Listener>> = sockets
         .into_iter()
         .map(|socket| {
             let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
-            Listener::behind(Arc::clone(&gate), socket, registry, gauges).start()
+            Listener::with(Arc::clone(&admission), socket, registry, gauges).start()
         })
         .collect();
     announce(address);
@@ -167,12 +167,12 @@ async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError>
     Ok(())
 }
 
-/// The gate: it asks clients for the token, and has the door of the web behind it.
-fn gate(options: &Options, unauthenticated: usize) -> Gate {
-    Gate {
+/// The conditions under which clients are admitted, by the options.
+fn admission(options: &Options, unauthenticated: usize) -> Admission {
+    Admission {
         token: options.token.clone(),
         #[cfg(feature = "web")]
-        door: {
+        site: {
             let WebOptions {
                 hosts,
                 origins,
@@ -186,9 +186,9 @@ fn gate(options: &Options, unauthenticated: usize) -> Gate {
                 origins,
                 strict_origin,
             };
-            Door::new(access, report)
+            Site::new(access, report)
         },
-        admission: Admission::of(unauthenticated),
+        newcomers: Newcomers::of(unauthenticated),
     }
 }
 
@@ -247,8 +247,8 @@ where
     ArmSim::attach(&arm, nodes);
     let parameters = ArmParameters::of(&arm);
     Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
-    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
-    Rosapi::attach(&rosapi, nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
     let rosout = Rosout::new(arm.clone().recipient(), registry.clone().recipient());
     Rosout::attach(&rosout.start(), nodes);
 

@@ -9,9 +9,10 @@ use super::asked::Asked;
 use super::error::{CommandError, plain};
 use super::output::print;
 use super::verbs::verb;
+use crate::protocol::catalog::Topic;
 
 /// The topic that tells.
-const TOPIC: &str = "/diagnostics";
+const TOPIC: &str = Topic::Diagnostics.name();
 /// The levels of `diagnostic_msgs/msg/DiagnosticStatus`, by their numbers.
 const LEVELS: [&str; 4] = ["OK", "WARN", "ERROR", "STALE"];
 

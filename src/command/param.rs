@@ -11,6 +11,7 @@ use super::asked::Asked;
 use super::error::{CommandError, plain};
 use super::output::print;
 use super::verbs::{required, subject, verb};
+use crate::protocol::catalog::{Rosapi, Service};
 use crate::protocol::ros::parameters::NO_SUCH;
 
 pub(super) fn command() -> Command {
@@ -68,11 +69,7 @@ pub(super) fn list(asked: &Asked) -> Result<(), CommandError> {
 }
 
 pub(super) fn get(asked: &Asked) -> Result<(), CommandError> {
-    let values = call(
-        asked,
-        "/rosapi/get_param",
-        &json!({"name": full_name(asked)}),
-    )?;
+    let values = call(asked, Rosapi::GetParam, &json!({"name": full_name(asked)}))?;
     // JSON within JSON.
     match serde_json::from_str::<Value>(&values.value) {
         Ok(Value::String(text)) if !asked.has("json") => print(&format!("{text}\n")),
@@ -86,7 +83,7 @@ pub(super) fn get(asked: &Asked) -> Result<(), CommandError> {
 pub(super) fn set(asked: &Asked) -> Result<(), CommandError> {
     let value = asked.value("value", "VALUE")?.to_string();
     let args = json!({"name": full_name(asked), "value": value});
-    call(asked, "/rosapi/set_param", &args).map(drop)
+    call(asked, Rosapi::SetParam, &args).map(drop)
 }
 
 /// Values that say themselves whether it was done.
@@ -98,7 +95,8 @@ struct ParameterAnswer {
     value: String,
 }
 
-fn call(asked: &Asked, service: &str, args: &Value) -> Result<ParameterAnswer, CommandError> {
+fn call(asked: &Asked, question: Rosapi, args: &Value) -> Result<ParameterAnswer, CommandError> {
+    let service = Service::Rosapi(question).name();
     let values = asked.open()?.call(service, args)?;
     let answer: ParameterAnswer = serde_json::from_str(values.get())
         .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))?;

@@ -18,6 +18,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::error::CommandError;
 use super::output::hint;
+use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::same_type;
 use crate::protocol::op::token::Token;
 
@@ -171,12 +172,12 @@ impl Session {
         args: &Value,
         member: &str,
     ) -> Result<T, CommandError> {
-        let values = self.call(&format!("/rosapi/{question}"), args)?;
+        let service = format!("{PREFIX}{question}");
+        let values = self.call(&service, args)?;
         let mut values: Value = serde_json::from_str(values.get()).unwrap_or_default();
         let member = values.get_mut(member).map(Value::take).unwrap_or_default();
-        serde_json::from_value(member).map_err(|error| {
-            CommandError::refused(&format!("/rosapi/{question} answered: {error}"))
-        })
+        serde_json::from_value(member)
+            .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))
     }
 
     /// The type of a topic or service, empty if the runtime knows none. A type that was given has to be the same.

@@ -16,6 +16,7 @@ use super::field::read_path;
 use super::output::print;
 use super::session::end_on_signal;
 use super::verbs::{flag, number, required, show_types, subject, typed_value, verb};
+use crate::protocol::catalog::{Rosapi, Service};
 
 /// How often `hz` says what it has measured.
 const REPORT: Duration = Duration::from_secs(1);
@@ -191,7 +192,7 @@ pub(super) fn publish(asked: &Asked) -> Result<(), CommandError> {
     loop {
         session.send(&publish)?;
         // Answered once the message has been taken; a refusal comes before.
-        session.call("/rosapi/get_time", &json!({}))?;
+        session.call(Service::Rosapi(Rosapi::GetTime).name(), &json!({}))?;
         count += 1;
         if let Some(spelled) = &spelled {
             if asked.has("json") {

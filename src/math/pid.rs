@@ -15,7 +15,7 @@
 //! The derivative acts on the measured velocity, which is known, instead of differencing the error. Nothing else
 //! compensates gravity: with ki = 0 the arm sags until kp e carries its load.
 //!
-//! **Invariant:** the law is a pure function of the state at the start of a step; the integral that it reckoned
+//! **Invariant:** the law is a pure function of the state at the start of a step; the integral that it computed
 //! counts only once the caller commits it, so that a step that is not taken leaves nothing behind.
 
 #![allow(

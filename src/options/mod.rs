@@ -61,11 +61,11 @@ const BUILD: &str = if cfg!(feature = "web") {
 };
 
 #[cfg(feature = "web")]
-const DOORS: &str = "\
+const TRANSPORTS: &str = "\
 This build has the web feature: the port speaks rosbridge JSON over TCP and over WebSocket, and serves a page \
 over HTTP.";
 #[cfg(not(feature = "web"))]
-const DOORS: &str = "\
+const TRANSPORTS: &str = "\
 This build is without the web feature: the port speaks rosbridge JSON over TCP, and neither WebSocket nor HTTP.";
 
 const AFTER_HELP: &str = "\
@@ -151,7 +151,7 @@ pub struct Options {
     /// About runs on record.
     #[cfg(feature = "record")]
     pub record: RecordOptions,
-    /// About the web door.
+    /// About the site.
     #[cfg(feature = "web")]
     pub web: WebOptions,
 }
@@ -311,7 +311,7 @@ pub fn command_line() -> Command {
     let command = Command::new(env!("CARGO_PKG_NAME"))
         .version(BUILD)
         .about(env!("CARGO_PKG_DESCRIPTION"))
-        .after_help(format!("{DOORS}\n{AFTER_HELP}"))
+        .after_help(format!("{TRANSPORTS}\n{AFTER_HELP}"))
         .args(arguments(|_| true))
         .disable_help_subcommand(true)
         .subcommand(plan::command());

@@ -1,4 +1,4 @@
-//! The options of the web door.
+//! The options of the site.
 //!
 //! **Invariant:** without any of them, only this machine and its own pages are let in.
 
@@ -45,7 +45,7 @@ pub(super) const REPORT: LaunchOption = LaunchOption {
     is_switch: false,
 };
 
-/// The options of the web door, as chosen at launch.
+/// The options of the site, as chosen at launch.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WebOptions {
     /// Names that a browser may find the runtime under, besides loopback's and the address bound.

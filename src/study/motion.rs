@@ -71,7 +71,7 @@ impl Motion {
         } else {
             by_energy
         };
-        // NaN, of an arm too extreme to reckon with, limits nothing.
+        // NaN, of an arm too extreme to compute with, limits nothing.
         let timestep = method.turn_per_step() / speed;
         if speed > 0.0 && timestep > 0.0 {
             Self { speed, timestep }

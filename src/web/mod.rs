@@ -1,4 +1,4 @@
-//! The web door: HTTP and the WebSocket upgrade, on the port that also speaks raw JSON.
+//! The site: HTTP and the WebSocket upgrade, on the port that also speaks raw JSON.
 //!
 //! | file | what |
 //! | --- | --- |
@@ -47,7 +47,7 @@ pub(crate) const ROOM: u64 = 64 * 1024;
 
 /// The files that are served over HTTP, and the rules for whom.
 #[derive(Debug)]
-pub struct Door {
+pub struct Site {
     /// Who may ask.
     pub access: Access,
     /// Folder of the last report.
@@ -56,8 +56,8 @@ pub struct Door {
     pub(crate) room: Arc<Semaphore>,
 }
 
-impl Door {
-    /// A door with these rules, and the report that is in that folder.
+impl Site {
+    /// A site with these rules, and the report that is in that folder.
     #[must_use]
     pub fn new(access: Access, report: PathBuf) -> Self {
         Self {
@@ -70,7 +70,7 @@ impl Door {
     }
 }
 
-impl Default for Door {
+impl Default for Site {
     fn default() -> Self {
         Self::new(Access::default(), DEFAULT_REPORT.into())
     }

@@ -18,7 +18,7 @@ use super::access::AccessError;
 use super::authority::Authority;
 use super::head::{self, HeadError, MAX_HEAD, RequestHead};
 use super::response::{HttpResponse, HttpStatus};
-use super::{Door, ROOM, page, report, upgrade};
+use super::{ROOM, Site, page, report, upgrade};
 
 /// How long a client may take no byte of an answer.
 pub const TAKE_TIME: Duration = Duration::from_secs(10);
@@ -59,13 +59,16 @@ pub struct Declined {
     /// Why.
     pub response: HttpResponse,
     /// It showed a token that is not ours.
-    pub is_guess: bool,
+    pub is_wrong_token: bool,
 }
 
 impl From<HttpResponse> for Declined {
     fn from(response: HttpResponse) -> Self {
-        let is_guess = false;
-        Self { response, is_guess }
+        let is_wrong_token = false;
+        Self {
+            response,
+            is_wrong_token,
+        }
     }
 }
 
@@ -75,12 +78,12 @@ impl From<HttpResponse> for Declined {
 pub async fn receive<S: AsyncRead + Unpin>(
     stream: &mut S,
     bytes: &mut BytesMut,
-    door: &Door,
+    site: &Site,
     local: SocketAddr,
     due: Instant,
 ) -> Option<Result<Served, Declined>> {
     match timeout_at(due, read_head(stream, bytes)).await {
-        Ok(Some(Ok(request))) => Some(judge(&request, door, local)),
+        Ok(Some(Ok(request))) => Some(judge(&request, site, local)),
         Ok(Some(Err(error))) => Some(Err(malformed(&error).into())),
         Ok(None) => None,
         Err(_) => {
@@ -99,7 +102,7 @@ pub async fn receive<S: AsyncRead + Unpin>(
 pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
     stream: &mut S,
     outcome: Served,
-    door: &Door,
+    site: &Site,
     make_room: impl Fn() -> bool,
 ) -> bool {
     let (resource, cookie) = match outcome {
@@ -109,8 +112,8 @@ pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
     // The room of a file is given back once it has been sent.
     let (response, _room) = match resource {
         Resource::Said(response) => (response, None),
-        Resource::Page(file) => (file.answer(&door.report).await, None),
-        Resource::Report(name) => read_report(name, door, make_room).await,
+        Resource::Page(file) => (file.answer(&site.report).await, None),
+        Resource::Report(name) => read_report(name, site, make_room).await,
     };
     answer(stream, &with_cookie(response, cookie)).await;
     false
@@ -154,14 +157,14 @@ fn malformed(error: &HeadError) -> HttpResponse {
 }
 
 /// Judges a request: may it be served, and how.
-fn judge(request: &RequestHead, door: &Door, local: SocketAddr) -> Result<Served, Declined> {
-    let own = door.access.host(request, local)?;
+fn judge(request: &RequestHead, site: &Site, local: SocketAddr) -> Result<Served, Declined> {
+    let own = site.access.host(request, local)?;
     let opens_socket = upgrade::is_wanted(request);
     if opens_socket {
-        door.access.origin(request, &own)?;
+        site.access.origin(request, &own)?;
     }
-    let is_shown = door.access.token(request, local)?;
-    let cookie = is_shown.then(|| door.access.cookie(local)).flatten();
+    let is_shown = site.access.token(request, local)?;
+    let cookie = is_shown.then(|| site.access.cookie(local)).flatten();
     if opens_socket {
         return Ok(open_socket(request, cookie.as_deref()));
     }
@@ -177,7 +180,7 @@ impl From<AccessError> for Declined {
         };
         Self {
             response: HttpResponse::text(status, &why.to_string()),
-            is_guess: why == AccessError::WrongToken,
+            is_wrong_token: why == AccessError::WrongToken,
         }
     }
 }
@@ -230,21 +233,21 @@ const NO_SUCH_FILE: &str = "there is no such file in the report; the report is a
 /// Reads a file where waiting for the disk holds up nobody, once there is room for it.
 async fn read_report(
     name: report::FileName,
-    door: &Door,
+    site: &Site,
     make_room: impl Fn() -> bool,
 ) -> (HttpResponse, Option<OwnedSemaphorePermit>) {
     let not_found = || (HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE), None);
-    let (named, folder) = (name.clone(), door.report.clone());
+    let (named, folder) = (name.clone(), site.report.clone());
     let Ok(Some(length)) = spawn_blocking(move || named.length(&folder)).await else {
         return not_found();
     };
-    let Some(taken) = take_room(&door.room, length, make_room).await else {
+    let Some(taken) = take_room(&site.room, length, make_room).await else {
         return (
             HttpResponse::text(HttpStatus::Unavailable, TOO_MANY_FILES),
             None,
         );
     };
-    let folder = door.report.clone();
+    let folder = site.report.clone();
     // The room goes with the reading, which goes on where nobody waits for it any more.
     let read = spawn_blocking(move || name.read(&folder).map(|file| (file, taken)));
     match read.await {

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, WIDE, assert_elapsed, settle};
-use pendularm::actors::gateway::connection::gate::{
-    FREE_GUESSES, GUESS_INTERVAL, Gate, MAX_UNAUTHENTICATED,
+use pendularm::actors::gateway::connection::admission::{
+    ATTEMPT_INTERVAL, Admission, FREE_ATTEMPTS, MAX_UNAUTHENTICATED,
 };
 use pendularm::actors::gateway::connection::{Connection, Ends};
 use pendularm::actors::gateway::limits::{HEAD_TIME, MAX_CONNECTIONS};
@@ -24,30 +24,30 @@ const LOCAL: ([u8; 4], u16) = ([127, 0, 0, 1], 9095);
 /// A gateway whose clients have to show the token.
 struct Guarded {
     gateway: Gateway,
-    gate: Arc<Gate>,
+    admission: Arc<Admission>,
 }
 
 impl Guarded {
     async fn new() -> Self {
         let token = Some(Token::new(TOKEN).unwrap());
         #[cfg(feature = "web")]
-        let door = {
-            use pendularm::web::{Door, access::Access};
+        let site = {
+            use pendularm::web::{Site, access::Access};
             let access = Access {
                 token: token.clone(),
                 ..Access::default()
             };
-            Door::new(access, "none".into())
+            Site::new(access, "none".into())
         };
-        let gate = Gate {
+        let admission = Admission {
             token,
             #[cfg(feature = "web")]
-            door,
-            ..Gate::default()
+            site,
+            ..Admission::default()
         };
         Self {
             gateway: Gateway::bare().await,
-            gate: Arc::new(gate),
+            admission: Arc::new(admission),
         }
     }
 
@@ -66,7 +66,7 @@ impl Guarded {
             local: LOCAL.into(),
             peer: peer.parse().unwrap(),
         };
-        Connection::start_behind(Arc::clone(&self.gate), ends, theirs, registry, gauges);
+        Connection::start_with(Arc::clone(&self.admission), ends, theirs, registry, gauges);
         ours
     }
 
@@ -229,7 +229,7 @@ fn wrong_tokens_of_one_address_are_answered_ten_a_second_and_the_right_one_at_on
         let guarded = Guarded::new().await;
         let began = Instant::now();
         let mut guesses = Vec::new();
-        let count = 20 + FREE_GUESSES;
+        let count = 20 + FREE_ATTEMPTS;
         for _ in 0..count {
             let mut client = guarded.connect();
             client.write_all(WRONG.as_bytes()).await.unwrap();
@@ -246,13 +246,13 @@ fn wrong_tokens_of_one_address_are_answered_ten_a_second_and_the_right_one_at_on
         for mut client in guesses {
             assert!(rest(&mut client).await.contains("not this runtime's"));
         }
-        let least = GUESS_INTERVAL * (count - FREE_GUESSES);
+        let least = ATTEMPT_INTERVAL * (count - FREE_ATTEMPTS);
         assert!(
-            began.elapsed() + GUESS_INTERVAL > least,
+            began.elapsed() + ATTEMPT_INTERVAL > least,
             "{:?}",
             began.elapsed()
         );
-        assert!(began.elapsed() < least + 2 * GUESS_INTERVAL);
+        assert!(began.elapsed() < least + 2 * ATTEMPT_INTERVAL);
     });
 }
 
@@ -262,7 +262,7 @@ fn wrong_tokens_over_http_are_slowed_down_with_the_others() {
     in_virtual_time(async {
         let guarded = Guarded::new().await;
         let began = Instant::now();
-        for number in 0..FREE_GUESSES + 10 {
+        for number in 0..FREE_ATTEMPTS + 10 {
             let mut client = guarded.connect();
             let cookie = "Cookie: pendularm_9095=open-barley\r\n";
             let (query, cookie) = if number % 2 == 0 {
@@ -274,18 +274,18 @@ fn wrong_tokens_over_http_are_slowed_down_with_the_others() {
             client.write_all(request.as_bytes()).await.unwrap();
             assert!(rest(&mut client).await.starts_with("HTTP/1.1 403 "));
         }
-        assert_elapsed(began, 10 * GUESS_INTERVAL);
+        assert_elapsed(began, 10 * ATTEMPT_INTERVAL);
         // One that shows nothing is no guess.
         let mut client = guarded.connect();
         let request = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n\r\n";
         client.write_all(request).await.unwrap();
         assert!(rest(&mut client).await.starts_with("HTTP/1.1 403 "));
-        assert_elapsed(began, 10 * GUESS_INTERVAL);
+        assert_elapsed(began, 10 * ATTEMPT_INTERVAL);
         let mut client = guarded.connect();
         let right = format!("GET /?token={TOKEN} HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n\r\n");
         client.write_all(right.as_bytes()).await.unwrap();
         assert!(rest(&mut client).await.starts_with("HTTP/1.1 200 "));
-        assert_elapsed(began, 10 * GUESS_INTERVAL);
+        assert_elapsed(began, 10 * ATTEMPT_INTERVAL);
     });
 }
 

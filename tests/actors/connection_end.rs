@@ -198,15 +198,15 @@ fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_str
 fn at_the_end_of_the_runtime_forwarded_goals_have_their_results() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let (mut pursuer, mut client) = (gateway.connect(WIDE), gateway.connect(WIDE));
-        pursuer
+        let (mut server, mut client) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        server
             .send(json!({"op": "advertise_action", "action": "/a", "type": "t/A"}))
             .await;
-        pursuer.receive().await;
+        server.receive().await;
         for n in 0..3 {
             let goal = json!({"op": "send_action_goal", "action": "/a", "id": n, "args": {}});
             client.send(goal).await;
-            pursuer.receive().await;
+            server.receive().await;
         }
         let refuse = RefuseCalls("shutting down");
         gateway.registry.send(refuse).await.unwrap();

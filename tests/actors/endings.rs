@@ -87,7 +87,7 @@ fn calls_whose_time_is_over() {
 }
 
 #[test]
-fn goals_whose_pursuer_goes() {
+fn goals_whose_action_server_goes() {
     let goal = |n| json!({"op": "send_action_goal", "action": "/a", "action_type": "t/A", "id": n, "args": {}});
     let aborted = |result: &Value| result["op"] == "action_result" && result["status"] == 6;
     assert_ends_in_turns(

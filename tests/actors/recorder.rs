@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use pendularm::actors::arm::sim::Tell;
-use pendularm::actors::gateway::messages::Overhear;
+use pendularm::actors::gateway::messages::SetTap;
 use pendularm::actors::recorder::limits::MAX_RECORDED_FRAME;
 use pendularm::actors::recorder::listeners;
 use pendularm::math::integrator::Method;
@@ -53,13 +53,13 @@ impl Notes {
             true
         });
         stage.arm.send(Tell(Some(listener))).await.unwrap();
-        let eavesdropper = listeners::registry(move |content| {
+        let tap = listeners::registry(move |content| {
             if let Some(content) = content {
                 of_registry.put(content);
             }
         });
-        let overhear = Overhear(Some(eavesdropper));
-        stage.registry.send(overhear).await.unwrap();
+        let set_tap = SetTap(Some(tap));
+        stage.registry.send(set_tap).await.unwrap();
     }
 }
 
@@ -93,7 +93,7 @@ where
     Gains<N>: Default,
 {
     stage.arm.send(Tell::<N>(None)).await.unwrap();
-    stage.registry.send(Overhear(None)).await.unwrap();
+    stage.registry.send(SetTap(None)).await.unwrap();
 }
 
 /// Something that a client may do, out of everything that changes the arm's steps.
@@ -387,14 +387,14 @@ fn calls_are_recorded_with_their_answers() {
 #[test]
 fn a_frame_that_is_too_long_is_left_out_and_counted() {
     use pendularm::actors::ConnectionId;
-    use pendularm::actors::gateway::messages::Overheard;
+    use pendularm::actors::gateway::messages::Tapped;
     use pendularm::protocol::catalog::Service;
     use pendularm::protocol::wire::payload::Payload;
     use serde_json::value::RawValue;
 
     let counts = Arc::new(Mutex::new((0, 0)));
     let counted = Arc::clone(&counts);
-    let mut eavesdropper = listeners::registry(move |content| {
+    let mut tap = listeners::registry(move |content| {
         let mut counts = counted.lock().unwrap();
         match content {
             Some(_) => counts.0 += 1,
@@ -402,7 +402,7 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
         }
     });
     for length in [MAX_RECORDED_FRAME, MAX_RECORDED_FRAME + 1] {
-        eavesdropper(Overheard::Answered {
+        tap(Tapped::Answered {
             to: ConnectionId(1),
             service: Service::Rollout,
             frame: &vec![b' '; length].into(),
@@ -414,7 +414,7 @@ fn a_frame_that_is_too_long_is_left_out_and_counted() {
     let args = payload("{}".to_owned());
     for length in [MAX_RECORDED_FRAME - 2, MAX_RECORDED_FRAME - 1] {
         let id = payload(format!("\"{}\"", "x".repeat(length - 2)));
-        eavesdropper(Overheard::Called {
+        tap(Tapped::Called {
             from: ConnectionId(1),
             service: Service::Rollout,
             id: Some(&id),

@@ -14,7 +14,7 @@ use pendularm::actors::recorder::Recorder;
 use pendularm::actors::resources::aside::{Errand, PLACES, aside};
 use pendularm::actors::ros::parameters::Parameters;
 use pendularm::actors::ros::rosapi::{
-    ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, Rosapi, SetParam,
+    ArmParameters, GetParam, NotSet, ParamChange, ParameterValue, RosapiNode, SetParam,
 };
 use pendularm::actors::ros::tf_web::TfRepublisher;
 use pendularm::actors::wire::Nodes;
@@ -28,15 +28,15 @@ use crate::stage::start_goal_nodes;
 use crate::virtual_time::{Gateway, Peer, WIDE};
 
 /// A gateway with the arm and `rosapi` behind it.
-async fn start() -> (Gateway, Addr<Rosapi<2>>) {
+async fn start() -> (Gateway, Addr<RosapiNode<2>>) {
     let gateway = Gateway::bare().await;
     let publish = gateway.registry.clone().recipient();
     let gauges = std::sync::Arc::clone(&gateway.gauges);
     let arm = ArmSim::<2>::new(Arm::default(), Gains::default(), publish, gauges).start();
     let parameters = ArmParameters::of(&arm);
-    let rosapi = Rosapi::new(gateway.registry.clone().recipient(), parameters).start();
+    let rosapi = RosapiNode::new(gateway.registry.clone().recipient(), parameters).start();
     let mut nodes = Nodes::default();
-    Rosapi::attach(&rosapi, &mut nodes);
+    RosapiNode::attach(&rosapi, &mut nodes);
     gateway.registry.send(Attach(nodes)).await.unwrap();
     (gateway, rosapi)
 }
@@ -87,8 +87,8 @@ fn every_service_that_is_listed_is_served() {
         Integration::attach(&Integration::new(pool).start(), &mut nodes);
         let parameters = ArmParameters::of(&arm);
         Parameters::attach(&Parameters::new(parameters.clone()).start(), &mut nodes);
-        let rosapi = Rosapi::new(gateway.registry.clone().recipient(), parameters).start();
-        Rosapi::attach(&rosapi, &mut nodes);
+        let rosapi = RosapiNode::new(gateway.registry.clone().recipient(), parameters).start();
+        RosapiNode::attach(&rosapi, &mut nodes);
         let frames = TfRepublisher::new(arm.clone().recipient(), publish()).start();
         TfRepublisher::attach(&frames, &mut nodes);
         #[cfg(feature = "record")]

@@ -1,4 +1,4 @@
-//! The web door where time matters: heads that do not come, peers that show no sign of life, clients that do not read.
+//! HTTP and WebSocket where time matters: heads that do not come, peers that show no sign of life, clients that do not read.
 //!
 //! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
 
@@ -13,14 +13,14 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
 use bytes::Bytes;
 use pendularm::actors::gateway::connection::Connection;
-use pendularm::actors::gateway::connection::gate::{Gate, MAX_HEADS};
+use pendularm::actors::gateway::connection::admission::{Admission, MAX_HEADS};
 use pendularm::actors::gateway::limits::{FRAME_TIME, STALL_LIMIT};
 use pendularm::actors::gateway::messages::{FinishAll, Publish};
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::web::access::Access;
-use pendularm::web::{Door, MAX_FILES_TOTAL, MAX_REQUESTS};
+use pendularm::web::{MAX_FILES_TOTAL, MAX_REQUESTS, Site};
 use pendularm_client::Error;
 use pendularm_client::codec::Event;
 use pendularm_client::pipe::Client;
@@ -40,12 +40,12 @@ fn connect(gateway: &Gateway, room: usize) -> DuplexStream {
     connect_through(gateway, &Arc::default(), room)
 }
 
-/// The same through a gate that is shared with others.
-fn connect_through(gateway: &Gateway, gate: &Arc<Gate>, room: usize) -> DuplexStream {
+/// The same, on conditions that are shared with others.
+fn connect_through(gateway: &Gateway, admission: &Arc<Admission>, room: usize) -> DuplexStream {
     let (ours, theirs) = duplex(room);
     let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
     let local = SocketAddr::from(([127, 0, 0, 1], 9095));
-    Connection::start_behind(Arc::clone(gate), local, theirs, registry, gauges);
+    Connection::start_with(Arc::clone(admission), local, theirs, registry, gauges);
     ours
 }
 
@@ -221,26 +221,26 @@ fn files_of_a_report_that_are_being_sent_have_a_total() {
         // It has a length, and no content on the disk.
         let file = std::fs::File::create(folder.join("a.csv")).unwrap();
         file.set_len(MAX_FILES_TOTAL / 2 - 100_000).unwrap();
-        let door = Door::new(Access::default(), folder.clone());
-        let gate = Arc::new(Gate {
+        let site = Site::new(Access::default(), folder.clone());
+        let admission = Arc::new(Admission {
             token: None,
-            door,
-            ..Gate::default()
+            site,
+            ..Admission::default()
         });
         let request = HEAD.replace("GET /", "GET /report/a.csv") + "\r\n";
         let mut deaf = Vec::new();
         for _ in 0..2 {
-            let mut stream = connect_through(&gateway, &gate, 1024);
+            let mut stream = connect_through(&gateway, &admission, 1024);
             stream.write_all(request.as_bytes()).await.unwrap();
             assert_eq!(stream.read_u8().await.unwrap(), b'H');
             deaf.push(stream);
         }
-        let mut page = connect_through(&gateway, &gate, WIDE);
+        let mut page = connect_through(&gateway, &admission, WIDE);
         page.write_all(format!("{HEAD}\r\n").as_bytes())
             .await
             .unwrap();
         assert!(rest(&mut page).await.starts_with("HTTP/1.1 200 "));
-        let mut late = connect_through(&gateway, &gate, WIDE);
+        let mut late = connect_through(&gateway, &admission, WIDE);
         late.write_all(request.as_bytes()).await.unwrap();
         let length = usize::try_from(MAX_FILES_TOTAL / 2 - 100_000).unwrap();
         let answer = rest(&mut late).await;
@@ -261,11 +261,11 @@ fn files_of_a_report_that_are_being_sent_have_a_total() {
 fn of_too_many_requests_at_once_the_oldest_makes_room() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let gate = Arc::default();
+        let admission = Arc::default();
         let request = format!("{HEAD}\r\n");
         let mut begun = Vec::new();
         for _ in 0..=MAX_HEADS {
-            let mut stream = connect_through(&gateway, &gate, WIDE);
+            let mut stream = connect_through(&gateway, &admission, WIDE);
             stream.write_all(HEAD.as_bytes()).await.unwrap();
             begun.push(stream);
         }
@@ -274,12 +274,12 @@ fn of_too_many_requests_at_once_the_oldest_makes_room() {
         // The page is longer than the pipe.
         let mut deaf = Vec::new();
         for _ in 0..MAX_REQUESTS {
-            let mut stream = connect_through(&gateway, &gate, 512);
+            let mut stream = connect_through(&gateway, &admission, 512);
             stream.write_all(request.as_bytes()).await.unwrap();
             deaf.push(stream);
         }
         settle().await;
-        let mut stream = connect_through(&gateway, &gate, WIDE);
+        let mut stream = connect_through(&gateway, &admission, WIDE);
         stream.write_all(request.as_bytes()).await.unwrap();
         let page = rest(&mut stream).await;
         assert!(page.starts_with("HTTP/1.1 200 "), "{page}");

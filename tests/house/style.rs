@@ -129,9 +129,16 @@ fn names(tokens: TokenStream, found: &mut Vec<String>) {
     }
 }
 
-/// The types that a file defines. A `type` within a trait or its implementation defines none.
+/// The types that a file defines, in the body of a macro too. A `type` within a trait or its implementation defines none.
 fn types(tokens: TokenStream, found: &mut Vec<String>) {
     let tokens: Vec<TokenTree> = tokens.into_iter().collect();
+    for pair in tokens.windows(2) {
+        if let [TokenTree::Punct(mark), TokenTree::Group(body)] = pair
+            && mark.as_char() == '!'
+        {
+            types(body.stream(), found);
+        }
+    }
     for pair in tokens.windows(2) {
         if let [TokenTree::Ident(keyword), TokenTree::Ident(name)] = pair
             && ["struct", "enum", "trait", "type"].contains(&keyword.to_string().as_str())
@@ -139,6 +146,15 @@ fn types(tokens: TokenStream, found: &mut Vec<String>) {
             found.push(name.to_string());
         }
     }
+}
+
+#[test]
+fn types_are_found_in_the_bodies_of_macros_and_nowhere_else_within() {
+    let text = "struct A; table! { /// A row.\n pub enum B of Row { C = 1, } } impl A { type D = (); } mod e { enum F {} }";
+    let mut found = Vec::new();
+    types(text.parse().unwrap(), &mut found);
+    found.sort();
+    assert_eq!(found, ["A", "B"]);
 }
 
 #[test]

@@ -6,7 +6,8 @@ use glam::dvec2;
 use pendularm::math::goal::{Criteria, Outcome};
 use pendularm::math::kinematics::{Reach, Target, forward, solve};
 use pendularm::math::trial::{
-    ATTEMPTS, Action, ActionStatus, Changes, Conclusion, Rejection, Settings, Status, Trial, sample,
+    ATTEMPTS, ActionStatus, Changes, Conclusion, Rejection, Settings, Status, Trial, TrialCommand,
+    sample,
 };
 use proptest::prelude::*;
 
@@ -26,16 +27,16 @@ fn unwanted() -> Option<Target> {
     panic!("no target is wanted here")
 }
 
-fn send(ticket: u64, n: u32) -> Action {
-    Action::SendGoal {
+fn send(ticket: u64, n: u32) -> TrialCommand {
+    TrialCommand::SendGoal {
         ticket,
         target: target(n),
         criteria: Criteria::default(),
     }
 }
 
-fn cancel(goal_id: &str) -> Action {
-    Action::CancelGoal {
+fn cancel(goal_id: &str) -> TrialCommand {
+    TrialCommand::CancelGoal {
         goal_id: goal_id.to_owned(),
     }
 }
@@ -63,9 +64,12 @@ fn status(trial: &Trial) -> Status {
 /// A trial started at 10 s, whose first goal is in flight as `g1` and has reported once.
 fn in_flight() -> Trial {
     let mut trial = Trial::default();
-    let actions = trial.start(10.0, Changes::default(), some(1)).unwrap();
-    assert_eq!(actions, [send(1, 1)]);
-    assert_eq!(trial.accepted(1, "g1", unwanted), [Action::PublishStatus]);
+    let commands = trial.start(10.0, Changes::default(), some(1)).unwrap();
+    assert_eq!(commands, [send(1, 1)]);
+    assert_eq!(
+        trial.accepted(1, "g1", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     trial.feedback("g1", 0.8, &[0.1, 0.2]);
     trial
 }
@@ -110,14 +114,14 @@ fn a_start_sends_a_first_goal_with_the_settings_in_force() {
         epsilon: Some(0.1),
         success_hold: Some(0.0),
     };
-    let actions = trial.start(10.0, changes, some(1)).unwrap();
+    let commands = trial.start(10.0, changes, some(1)).unwrap();
     let criteria = Criteria {
         epsilon: 0.1,
         success_hold: 0.0,
     };
     assert_eq!(
-        actions,
-        [Action::SendGoal {
+        commands,
+        [TrialCommand::SendGoal {
             ticket: 1,
             target: target(1),
             criteria
@@ -197,18 +201,24 @@ fn a_start_without_a_reachable_target_changes_nothing() {
 fn a_start_while_running_cancels_the_goal_and_counts_and_times_afresh() {
     let mut trial = in_flight();
     assert_eq!(trial.concluded(reached("g1"), some(2)).len(), 2);
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     trial.feedback("g2", 0.3, &[0.0, 0.0]);
     assert_eq!(trial.tick(30.0), []);
-    let actions = trial.start(30.0, Changes::default(), some(3)).unwrap();
-    assert_eq!(actions, [cancel("g2"), send(3, 3)]);
+    let commands = trial.start(30.0, Changes::default(), some(3)).unwrap();
+    assert_eq!(commands, [cancel("g2"), send(3, 3)]);
     let status = status(&trial);
     assert!(status.running);
     assert_eq!((status.elapsed, status.targets_reached), (0.0, 0));
     assert_cleared(&status);
     // The end of the goal of the trial before is nobody's success.
     assert_eq!(trial.concluded(preempted("g2"), unwanted), []);
-    assert_eq!(trial.accepted(3, "g3", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(3, "g3", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     assert_eq!(trial.concluded(reached("g2"), unwanted), []);
     assert_eq!(self::status(&trial).targets_reached, 0);
 }
@@ -219,7 +229,10 @@ fn a_start_while_running_cancels_the_goal_and_counts_and_times_afresh() {
 fn an_accepted_goal_is_shown_as_active() {
     let mut trial = Trial::default();
     trial.start(0.0, Changes::default(), some(1)).unwrap();
-    assert_eq!(trial.accepted(1, "g1", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(1, "g1", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     let status = status(&trial);
     assert_eq!(status.action_status, ActionStatus::Active);
     assert_eq!(status.target, Some(target(1)));
@@ -247,7 +260,7 @@ fn a_reached_target_is_counted_and_the_next_one_sent() {
     let mut trial = in_flight();
     assert_eq!(
         trial.concluded(reached("g1"), some(2)),
-        [Action::PublishStatus, send(2, 2)]
+        [TrialCommand::PublishStatus, send(2, 2)]
     );
     let shown = status(&trial);
     assert_eq!(
@@ -255,7 +268,10 @@ fn a_reached_target_is_counted_and_the_next_one_sent() {
         (1, ActionStatus::Reached)
     );
     assert_eq!((shown.target, shown.error), (Some(target(1)), Some(0.015)));
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     let shown = status(&trial);
     assert_eq!(
         (shown.targets_reached, shown.action_status),
@@ -268,7 +284,7 @@ fn a_reached_target_is_counted_and_the_next_one_sent() {
         let next = format!("g{}", n + 1);
         assert_eq!(
             trial.accepted(u64::from(n) + 1, &next, unwanted),
-            [Action::PublishStatus]
+            [TrialCommand::PublishStatus]
         );
     }
     assert_eq!(status(&trial).targets_reached, 49);
@@ -279,7 +295,10 @@ fn a_result_counts_once() {
     let mut trial = in_flight();
     assert_eq!(trial.concluded(reached("g1"), some(2)).len(), 2);
     assert_eq!(trial.concluded(reached("g1"), unwanted), []);
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     assert_eq!(trial.concluded(reached("g1"), unwanted), []);
     assert_eq!(status(&trial).targets_reached, 1);
 }
@@ -289,7 +308,7 @@ fn a_reached_target_without_a_next_one_waits_for_a_skip() {
     let mut trial = in_flight();
     assert_eq!(
         trial.concluded(reached("g1"), || None),
-        [Action::PublishStatus]
+        [TrialCommand::PublishStatus]
     );
     assert!(trial.running());
     assert_eq!(status(&trial).targets_reached, 1);
@@ -306,7 +325,11 @@ fn a_result_that_overtakes_the_acceptance_counts_all_the_same() {
     assert_eq!(status(&trial).targets_reached, 0);
     assert_eq!(
         trial.accepted(2, "g2", some(3)),
-        [Action::PublishStatus, Action::PublishStatus, send(3, 3)]
+        [
+            TrialCommand::PublishStatus,
+            TrialCommand::PublishStatus,
+            send(3, 3)
+        ]
     );
     assert_eq!(status(&trial).targets_reached, 1);
     assert_eq!(status(&trial).action_status, ActionStatus::Reached);
@@ -330,7 +353,7 @@ fn a_goal_preempted_by_somebody_else_is_shown_and_not_replaced() {
     let mut trial = in_flight();
     assert_eq!(
         trial.concluded(preempted("g1"), unwanted),
-        [Action::PublishStatus]
+        [TrialCommand::PublishStatus]
     );
     let shown = status(&trial);
     assert!(shown.running);
@@ -351,7 +374,10 @@ fn a_skip_goes_on_after_a_preemption_and_cancels_nobody_elses_goal() {
     let mut trial = in_flight();
     let _ = trial.concluded(preempted("g1"), unwanted);
     assert_eq!(trial.skip(some(2)), Ok(vec![send(2, 2)]));
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     assert_eq!(trial.concluded(reached("g2"), some(3)).len(), 2);
     assert_eq!(status(&trial).targets_reached, 1);
 }
@@ -364,13 +390,13 @@ fn after_a_preemption_stop_start_and_the_end_work_as_ever() {
         trial
     };
     let mut stopped = waiting();
-    assert_eq!(stopped.stop(), Ok(vec![Action::PublishStatus]));
+    assert_eq!(stopped.stop(), Ok(vec![TrialCommand::PublishStatus]));
     assert_cleared(&status(&stopped));
     let mut restarted = waiting();
-    let actions = restarted.start(20.0, Changes::default(), some(2)).unwrap();
-    assert_eq!(actions, [send(2, 2)]);
+    let commands = restarted.start(20.0, Changes::default(), some(2)).unwrap();
+    assert_eq!(commands, [send(2, 2)]);
     let mut over = waiting();
-    assert_eq!(over.tick(70.0), [Action::PublishStatus]);
+    assert_eq!(over.tick(70.0), [TrialCommand::PublishStatus]);
     assert_cleared(&status(&over));
 }
 
@@ -385,7 +411,10 @@ fn a_refused_target_is_replaced_by_another_one() {
         [],
         "an answer to a request that no longer matters"
     );
-    assert_eq!(trial.accepted(2, "g1", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g1", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     assert_eq!(trial.refused(2, unwanted), []);
     assert_eq!(status(&trial).action_status, ActionStatus::Active);
 }
@@ -399,14 +428,17 @@ fn refusals_without_end_leave_the_trial_waiting() {
     }
     assert_eq!(
         trial.refused(u64::from(ATTEMPTS), unwanted),
-        [Action::PublishStatus]
+        [TrialCommand::PublishStatus]
     );
     assert!(trial.running());
     assert_cleared(&status(&trial));
     let ticket = u64::from(ATTEMPTS) + 1;
     assert_eq!(trial.skip(some(6)), Ok(vec![send(ticket, 6)]));
     // As does a refusal for which there is no other target.
-    assert_eq!(trial.refused(ticket, || None), [Action::PublishStatus]);
+    assert_eq!(
+        trial.refused(ticket, || None),
+        [TrialCommand::PublishStatus]
+    );
     assert_cleared(&status(&trial));
 }
 
@@ -428,14 +460,17 @@ fn skip_and_stop_are_for_running_trials() {
 #[test]
 fn a_skip_abandons_the_target_uncounted_and_sends_another_one() {
     let mut trial = in_flight();
-    let actions = trial.skip(some(2)).unwrap();
-    assert_eq!(actions, [cancel("g1"), send(2, 2)]);
+    let commands = trial.skip(some(2)).unwrap();
+    assert_eq!(commands, [cancel("g1"), send(2, 2)]);
     let shown = status(&trial);
     assert_eq!((shown.running, shown.targets_reached), (true, 0));
     assert_cleared(&shown);
     // A success that was on its way when the target was abandoned does not count, before or after the next acceptance.
     assert_eq!(trial.concluded(reached("g1"), unwanted), []);
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     assert_eq!(trial.concluded(reached("g1"), unwanted), []);
     assert_eq!(status(&trial).targets_reached, 0);
     assert_eq!(status(&trial).action_status, ActionStatus::Active);
@@ -456,7 +491,10 @@ fn a_skip_while_a_goal_is_being_asked_for_cancels_it_once_it_has_a_name() {
     trial.start(0.0, Changes::default(), some(1)).unwrap();
     assert_eq!(trial.skip(some(2)), Ok(vec![send(2, 2)]));
     assert_eq!(trial.accepted(1, "g1", unwanted), [cancel("g1")]);
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
     assert_eq!(trial.concluded(preempted("g1"), unwanted), []);
     assert_eq!(status(&trial).action_status, ActionStatus::Active);
     assert_eq!(status(&trial).target, Some(target(2)));
@@ -469,7 +507,10 @@ fn a_stop_abandons_the_target_and_keeps_the_count() {
     let _ = trial.accepted(2, "g2", unwanted);
     trial.feedback("g2", 0.2, &[0.0, 1.0]);
     assert_eq!(trial.tick(15.0), []);
-    assert_eq!(trial.stop(), Ok(vec![cancel("g2"), Action::PublishStatus]));
+    assert_eq!(
+        trial.stop(),
+        Ok(vec![cancel("g2"), TrialCommand::PublishStatus])
+    );
     let shown = status(&trial);
     assert!(!shown.running);
     assert_cleared(&shown);
@@ -485,14 +526,17 @@ fn a_stop_abandons_the_target_and_keeps_the_count() {
 fn a_goal_accepted_after_the_stop_is_cancelled() {
     let mut trial = Trial::default();
     trial.start(0.0, Changes::default(), some(1)).unwrap();
-    assert_eq!(trial.stop(), Ok(vec![Action::PublishStatus]));
+    assert_eq!(trial.stop(), Ok(vec![TrialCommand::PublishStatus]));
     assert_eq!(trial.accepted(1, "g1", unwanted), [cancel("g1")]);
     assert_eq!(trial.refused(1, unwanted), []);
     assert_cleared(&status(&trial));
     // Nor does the next trial take it for its own.
     trial.start(1.0, Changes::default(), some(2)).unwrap();
     assert_eq!(trial.accepted(1, "g1", unwanted), [cancel("g1")]);
-    assert_eq!(trial.accepted(2, "g2", unwanted), [Action::PublishStatus]);
+    assert_eq!(
+        trial.accepted(2, "g2", unwanted),
+        [TrialCommand::PublishStatus]
+    );
 }
 
 // --------------------------------------------------------------------------------------------------------------- time
@@ -502,7 +546,10 @@ fn the_end_of_the_duration_cancels_the_target_in_flight_uncounted() {
     let mut trial = in_flight();
     assert_eq!(trial.tick(69.9), []);
     assert!((trial.remaining().unwrap() - 0.1).abs() < 1e-12);
-    assert_eq!(trial.tick(70.0), [cancel("g1"), Action::PublishStatus]);
+    assert_eq!(
+        trial.tick(70.0),
+        [cancel("g1"), TrialCommand::PublishStatus]
+    );
     let shown = status(&trial);
     assert!(!shown.running);
     assert_cleared(&shown);
@@ -520,7 +567,7 @@ fn the_end_of_the_duration_cancels_the_target_in_flight_uncounted() {
 fn the_end_of_the_duration_drops_a_target_that_is_being_asked_for() {
     let mut trial = Trial::default();
     trial.start(0.0, Changes::default(), some(1)).unwrap();
-    assert_eq!(trial.tick(60.0), [Action::PublishStatus]);
+    assert_eq!(trial.tick(60.0), [TrialCommand::PublishStatus]);
     assert_eq!(trial.accepted(1, "g1", unwanted), [cancel("g1")]);
     assert_cleared(&status(&trial));
 }
@@ -545,7 +592,7 @@ fn the_end_is_not_missed_by_rounding() {
         let at = |k: u32| f64::from(steps + k) * 0.001;
         trial.start(at(0), changes, some(1)).unwrap();
         assert_eq!(trial.tick(at(60_099)), []);
-        assert_eq!(trial.tick(at(60_100)), [Action::PublishStatus]);
+        assert_eq!(trial.tick(at(60_100)), [TrialCommand::PublishStatus]);
     }
 }
 
@@ -574,7 +621,10 @@ fn a_reset_of_the_simulation_clock_adds_nothing_and_takes_nothing_away() {
     assert_eq!(trial.tick(2.0), [], "another one");
     assert_eq!(trial.tick(41.0), []);
     assert_eq!(status(&trial).elapsed, 59.0);
-    assert_eq!(trial.tick(42.0), [cancel("g1"), Action::PublishStatus]);
+    assert_eq!(
+        trial.tick(42.0),
+        [cancel("g1"), TrialCommand::PublishStatus]
+    );
 }
 
 #[test]
@@ -629,7 +679,7 @@ proptest! {
             let next = || { sampled += 1; Some(target(1)) };
             // Goal n is the one sent under ticket n.
             let id = |n: u64| format!("g{n}");
-            let actions = match event {
+            let commands = match event {
                 Event::Start => { elapsed = 0.0; counted = 0; trial.start(0.0, Changes::default(), next).unwrap() }
                 Event::Skip => trial.skip(next).unwrap_or_default(),
                 Event::Stop => trial.stop().unwrap_or_default(),
@@ -640,7 +690,7 @@ proptest! {
                 Event::Preempted(n) => trial.concluded(preempted(&id(n)), next),
                 Event::Feedback(n) => { trial.feedback(&id(n), 0.1, &[0.0]); Vec::new() }
             };
-            let sent = actions.iter().filter(|a| matches!(a, Action::SendGoal { .. })).count();
+            let sent = commands.iter().filter(|a| matches!(a, TrialCommand::SendGoal { .. })).count();
             prop_assert_eq!(sent, sampled, "every target that is sampled is sent, and no other");
             let Some(status) = trial.status() else { continue };
             prop_assert!(status.elapsed >= elapsed && status.elapsed <= status.duration);

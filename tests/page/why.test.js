@@ -43,7 +43,7 @@ test("nothing is said of a loop that is not known", () => {
   assert.equal(limitsKey(arm({ gains: null })), "");
 });
 
-test("limits are reckoned anew when gains change, and not when the timestep does", () => {
+test("limits are computed anew when gains change, and not when the timestep does", () => {
   const key = limitsKey(arm());
   assert.equal(limitsKey(arm({ integrator: { method: "euler", timestep: 0.02 } })), key);
   assert.notEqual(limitsKey(arm({ gains: { kp: [1, 1], ki: [0, 0], kd: [1, 1] } })), key);

@@ -29,23 +29,23 @@ FAULTS = [
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));",
      "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));\n"
      "        let last = self.topics.len() - 1;\n        if last > 1 && R(4) { self.topics.swap(last - 1, last); }"),
-    ("two messages of a client's are swapped before anybody has them, one in 20", f"{REGISTRY}/fan_out.rs",
+    ("two messages of a client's are swapped before anybody has them, one in 20", f"{REGISTRY}/ops/fan_out.rs",
      "            let plain = self.count(encode(spelling));",
      "            let mut plain = encode(spelling);\n"
      "            let first = series::first_message(&plain);\n"
      "            if first < plain.len() && R(20) { let end = plain.split_off(first);\n"
      "                plain = [&end[..], &plain[..]].concat().into(); }\n"
      "            let plain = self.count(plain);"),
-    ("a message is lost, one in 200", f"{REGISTRY}/fan_out.rs",
+    ("a message is lost, one in 200", f"{REGISTRY}/ops/fan_out.rs",
      "    subscriber.outlet.do_send(Deliver {", "    if R(200) { return; }\n    subscriber.outlet.do_send(Deliver {"),
     ("a message comes twice, one in 200", f"{CONNECTION}/mod.rs",
      "            outgoing.accept(message);",
      "            if R(200) { outgoing.accept(message.clone()); }\n            outgoing.accept(message);"),
-    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/ops.rs",
+    ("a digit of a payload is changed, one message in 500", f"{REGISTRY}/ops/mod.rs",
      "                messages::respelled(topic, spelling, &lines.frames)",
      "                let frame = messages::respelled(topic, spelling, &lines.frames);\n"
      "                if R(500) { crate::fault_changed(&frame) } else { frame }"),
-    ("a provider's answer is changed by a byte, one in 10", f"{REGISTRY}/ops.rs",
+    ("a provider's answer is changed by a byte, one in 10", f"{REGISTRY}/ops/mod.rs",
      "messages::response_raw(service, id, &values, result, &status)",
      "{ let frame = messages::response_raw(service, id, &values, result, &status);\n"
      "                      if R(10) { crate::fault_changed(&frame) } else { frame } }"),
@@ -54,12 +54,12 @@ FAULTS = [
      "        let to = if R(200) { self.clients.keys().find(|id| **id != respond.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(respond.connection))\n            && respond"),
     ("a call is answered twice, one in 200", f"{CONNECTION}/mod.rs",
-     "            let of_arm = service.is_some_and",
-     "            if service.is_some() && R(200) { shared.outgoing.push_response(response.frame.clone(), &[]); }\n            let of_arm = service.is_some_and"),
+     "            let superseded = service",
+     "            if service.is_some() && R(200) { shared.outgoing.push_response(response.frame.clone(), &[]); }\n            let superseded = service"),
     ("a call is never answered, one in 200", f"{CONNECTION}/mod.rs",
      "            shared.outgoing.push_response(response.frame, superseded);",
      "            if !(service.is_some() && R(200)) { shared.outgoing.push_response(response.frame, superseded); }"),
-    ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/actions.rs",
+    ("feedback of a goal goes to another client, one in 20", f"{REGISTRY}/ops/actions.rs",
      "        if let Some(client) = self.clients.get(&feedback.connection) {",
      "        let to = if R(20) { self.clients.keys().find(|id| **id != feedback.connection).copied() } else { None };\n"
      "        if let Some(client) = self.clients.get(&to.unwrap_or(feedback.connection)) {"),
@@ -74,7 +74,7 @@ FAULTS = [
      "    pub fn set_setpoint(&mut self, setpoint: Setpoint<N>) {",
      "    pub fn set_setpoint(&mut self, mut setpoint: Setpoint<N>) {\n"
      "        if R(50) { setpoint.position[0] = f64::from_bits(setpoint.position[0].to_bits() ^ 1); }"),
-    ("whoever unsubscribes takes another with it, one in 10", f"{REGISTRY}/topics.rs",
+    ("whoever unsubscribes takes another with it, one in 10", f"{REGISTRY}/tables/topics.rs",
      "        entry.get_mut().retain(|one| one.connection != connection);",
      "        entry.get_mut().retain(|one| one.connection != connection);\n        if R(10) { entry.get_mut().pop(); }"),
     ("memory is not given back to the account, one share in 5000", "src/actors/resources/budget/share.rs",
@@ -88,7 +88,7 @@ FAULTS = [
     ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/state.rs",
      "        for call in self.services.take_provided_by(id) {",
      "        if R(4) { return; }\n        for call in self.services.take_provided_by(id) {"),
-    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/calls.rs",
+    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops/calls.rs",
      "            sleep_until(deadline).await;",
      "            sleep_until(deadline + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
     ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle.rs",

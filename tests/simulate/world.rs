@@ -20,7 +20,7 @@ use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::actors::resources::gauges::Gauges;
 use pendularm::actors::resources::work_clock;
-use pendularm::actors::ros::rosapi::{ArmParameters, Rosapi};
+use pendularm::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use pendularm::math::arm::Arm;
 use pendularm::math::pid::Gains;
 use pendularm::protocol::catalog::{Node, Service, Topic};
@@ -106,7 +106,7 @@ impl World {
         };
         let local = SocketAddr::from(LOCAL);
         let (registry, gauges) = (self.registry.clone(), Arc::clone(&self.gauges));
-        Connection::start_behind(Arc::default(), local, pipe, registry, gauges);
+        Connection::start_with(Arc::default(), local, pipe, registry, gauges);
         (ours, fate)
     }
 
@@ -220,8 +220,8 @@ where
         integrator: tap.clone().recipient(),
         time: tap.clone().recipient(),
     };
-    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
-    Rosapi::attach(&rosapi, nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
     let study = Study::<N>::new(arm.clone().recipient(), pool.clone()).start();
     Study::attach(&study, nodes);
     arm.do_send(Consult(study.recipient()));

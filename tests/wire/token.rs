@@ -8,8 +8,8 @@ use std::net::SocketAddr;
 use crate::common::{Client, Runtime};
 #[cfg(feature = "web")]
 use crate::web_client::{Socket, get, handshake, request, try_handshake};
-use pendularm::actors::gateway::connection::gate::{
-    FREE_GUESSES, GUESS_INTERVAL, MAX_LOCKED, MAX_UNAUTHENTICATED,
+use pendularm::actors::gateway::connection::admission::{
+    ATTEMPT_INTERVAL, FREE_ATTEMPTS, MAX_AUTH_BYTES, MAX_UNAUTHENTICATED,
 };
 use serde_json::json;
 
@@ -111,7 +111,7 @@ fn a_client_that_sends_much_before_the_token_is_closed() {
     );
     let mut client = runtime.connect();
     client.send_bytes("{\"pad\":\"".as_bytes());
-    client.send_bytes(&vec![b'x'; MAX_LOCKED]);
+    client.send_bytes(&vec![b'x'; MAX_AUTH_BYTES]);
     assert!(explanation(&mut client).contains("16384 bytes"));
 }
 
@@ -323,7 +323,7 @@ fn the_token_is_shown_in_one_way_and_no_other_spelling_counts() {
 #[test]
 fn a_loop_of_guesses_is_slow_and_the_holder_is_not_kept_out_by_it() {
     let runtime = guarded();
-    let guesses = 3 * FREE_GUESSES;
+    let guesses = 3 * FREE_ATTEMPTS;
     let began = std::time::Instant::now();
     for number in 0..guesses {
         let mut client = runtime.connect();
@@ -334,7 +334,7 @@ fn a_loop_of_guesses_is_slow_and_the_holder_is_not_kept_out_by_it() {
         }
     }
     // A lower bound: no machine is too slow for it.
-    let least = GUESS_INTERVAL * (guesses - FREE_GUESSES);
+    let least = ATTEMPT_INTERVAL * (guesses - FREE_ATTEMPTS);
     assert!(
         began.elapsed() > least.mul_f64(0.9),
         "{:?}",

@@ -25,7 +25,7 @@ use std::rc::Rc;
 use std::time::Duration;
 
 use arbitrary::Arbitrary;
-use pendularm::actors::gateway::connection::gate::Gate;
+use pendularm::actors::gateway::connection::admission::Admission;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
@@ -58,7 +58,7 @@ const LAST_TOPIC: &str = "/in/the/end";
 /// Plays a script with clients of one kind, and one node that serves everything.
 pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run(async {
-        let stage = Stage::new(Gate::default(), memory(is_scarce)).await;
+        let stage = Stage::new(Admission::default(), memory(is_scarce)).await;
         Session::new(door, Cast::Stub, is_scarce, stage)
             .perform_all(steps)
             .await;
@@ -68,7 +68,7 @@ pub fn play(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
 /// Plays a script with the runtime's own nodes. In less time: an arm of tiny timesteps computes for as long as it may.
 pub fn play_with_arm(door: Door, is_scarce: bool, steps: &[Step<'_>]) {
     run_apart(async {
-        let stage = Stage::with_arm(Gate::default(), memory(is_scarce)).await;
+        let stage = Stage::with_arm(Admission::default(), memory(is_scarce)).await;
         Session::new(door, Cast::Arm, is_scarce, stage)
             .perform_all(steps)
             .await;

@@ -22,8 +22,8 @@ use crate::protocol::wire::{fragments, series};
 /// Longest message, or series of them, that is encoded where it is heard: in all the forms that there may be it takes
 /// a fraction of a millisecond.
 const SHORT: usize = 4 * 1024;
-/// Bytes of memory that encoding takes for each of a message, beside its tree: the names of ROS 1 may double it, what
-/// is made grows by doubling, and names are put in order.
+/// Bytes of memory that encoding takes per byte of a message, beside its tree: the names of ROS 1 may double the
+/// message, the buffer grows by doubling, and names are put in order.
 const ENCODING_BYTES: usize = 4;
 
 /// The messages in their form.

@@ -5,7 +5,7 @@
 //!
 //! **Invariant:** the clients that are served never need all files that there may be.
 
-use super::connection::gate::MAX_UNAUTHENTICATED;
+use super::connection::admission::MAX_UNAUTHENTICATED;
 use super::limits::MAX_CONNECTIONS;
 
 /// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a

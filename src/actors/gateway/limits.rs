@@ -20,7 +20,7 @@ pub const MAX_ADVERTISED: usize = 1024;
 pub const MAX_PROVIDED: usize = 256;
 /// Calls of one connection that wait for clients to answer.
 pub const MAX_WAITING_CALLS: usize = 256;
-/// Goals of one connection that other clients pursue.
+/// Goals of one connection that other clients carry out.
 pub const MAX_WAITING_GOALS: usize = 256;
 /// How long a provider may take when its caller does not say.
 pub const DEFAULT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -54,8 +54,8 @@ pub(super) const WRITE_FRAMES: usize = 64;
 pub(super) const FREE_FRAMES: usize = 32;
 /// Subscribers of a message whose publisher waits in no queue after it.
 pub(super) const FREE_DELIVERIES: usize = 32;
-/// Pieces of messages are looked at so long after they have become too old, and so often whether a client that has
-/// enough has taken some of it.
+/// How long after their time pieces of messages are forgotten, and how often a client that has enough waiting is looked
+/// at again.
 pub(super) const LOOK_AGAIN: Duration = Duration::from_millis(20);
 /// Computations of one connection that wait behind the one that runs; while so many do, the client is not read.
 pub const MAX_COMPUTATIONS_WAITING: usize = 16;

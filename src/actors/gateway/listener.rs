@@ -12,7 +12,7 @@ use socket2::{SockRef, TcpKeepalive};
 use tokio::net::{TcpListener, TcpStream};
 
 use super::connection::Connection;
-use super::connection::gate::Gate;
+use super::connection::admission::Admission;
 use super::ends::Ends;
 use super::registry::Registry;
 use crate::actors::resources::gauges::Gauges;
@@ -34,20 +34,20 @@ pub struct Listener {
     socket: Arc<TcpListener>,
     registry: Addr<Registry>,
     gauges: Arc<Gauges>,
-    gate: Arc<Gate>,
+    admission: Arc<Admission>,
 }
 
 impl Listener {
     /// A listener on a socket that is bound already; nothing is asked of its clients first.
     #[must_use]
     pub fn new(socket: TcpListener, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
-        Self::behind(Arc::default(), socket, registry, gauges)
+        Self::with(Arc::default(), socket, registry, gauges)
     }
 
-    /// A listener whose clients come through a gate.
+    /// A listener that admits clients on these conditions.
     #[must_use]
-    pub fn behind(
-        gate: Arc<Gate>,
+    pub fn with(
+        admission: Arc<Admission>,
         socket: TcpListener,
         registry: Addr<Registry>,
         gauges: Arc<Gauges>,
@@ -56,7 +56,7 @@ impl Listener {
             socket: Arc::new(socket),
             registry,
             gauges,
-            gate,
+            admission,
         }
     }
 }
@@ -78,7 +78,7 @@ impl Actor for Listener {
             Arc::clone(&self.socket),
             self.registry.clone(),
             Arc::clone(&self.gauges),
-            Arc::clone(&self.gate),
+            Arc::clone(&self.admission),
         );
         ctx.spawn(accepting.into_actor(self));
     }
@@ -100,7 +100,7 @@ async fn accept(
     socket: Arc<TcpListener>,
     registry: Addr<Registry>,
     gauges: Arc<Gauges>,
-    gate: Arc<Gate>,
+    admission: Arc<Admission>,
 ) {
     // Told once, not twenty times a second.
     let mut failing = false;
@@ -117,7 +117,7 @@ async fn accept(
                 let local = stream.local_addr().unwrap_or(Ends::default().local);
                 let (registry, gauges) = (registry.clone(), Arc::clone(&gauges));
                 let ends = Ends { local, peer };
-                Connection::start_behind(Arc::clone(&gate), ends, stream, registry, gauges);
+                Connection::start_with(Arc::clone(&admission), ends, stream, registry, gauges);
             }
             Err(error) => {
                 if !std::mem::replace(&mut failing, true) {

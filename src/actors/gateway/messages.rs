@@ -77,8 +77,8 @@ pub enum Refused {
     Closed,
 }
 
-/// The client's stream has ended; frames that came before may still wait. From its connection: it only waits now, and
-/// where all places are taken, the oldest such client gives way to one that comes.
+/// The client's stream has ended; frames that came before may still wait. From its connection. Where all places are
+/// taken, the oldest client that only waits gives way to one that comes.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Ended(pub ConnectionId);
@@ -179,8 +179,8 @@ pub struct TakeCensus {
     pub at_most: usize,
 }
 
-/// Something that passes the registry, for whoever overhears it.
-pub enum Overheard<'a> {
+/// Something that passes the registry, for the tap.
+pub enum Tapped<'a> {
     /// A message of the runtime, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
     /// A client's message on a topic that the runtime listens to.
@@ -207,14 +207,14 @@ pub enum Overheard<'a> {
     },
 }
 
-/// Overhears what passes, on the registry's thread, and may not wait.
-pub type Eavesdropper = Box<dyn FnMut(Overheard<'_>) + Send>;
+/// Gets a copy of all that passes the registry, on the registry's thread, and may not wait.
+pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
 
-/// From now on this one overhears what passes, or nobody does; every topic of the runtime counts as subscribed to
-/// meanwhile. From the recorder.
+/// Sets the tap, or takes it away. While there is one, every topic of the runtime counts as subscribed to. From the
+/// recorder.
 #[derive(Message)]
 #[rtype(result = "()")]
-pub struct Overhear(pub Option<Eavesdropper>);
+pub struct SetTap(pub Option<Tap>);
 
 /// No call is taken any more, and waiting calls and goals for clients are refused, for the reason given. From the
 /// runtime, when it ends.
@@ -250,8 +250,7 @@ pub type Underway = Arc<oneshot::Sender<()>>;
 pub enum Frames {
     /// A whole frame, or a [series](crate::protocol::wire::series) of them.
     Plain(Bytes),
-    /// Frames in another form, made when the client has room. Where throttling keeps only so many, the others but the
-    /// first need not come.
+    /// Frames in another encoding, made on demand. With `Some(n)`, all but the first and the last n may be skipped.
     Encoded(Arc<Encoded>, Option<usize>),
     /// Feedback of a goal: it waits for no message that is to be encoded, as the goal's result does not either.
     Feedback(Bytes),

@@ -1,6 +1,6 @@
 //! The gateway stands between the sockets and the nodes: a listener, an actor for each connection, and the registry.
 //!
-//! **Invariant:** nothing in here knows an arm, and whatever a client sends, the others are served.
+//! **Invariant:** what is the arm's own is read from the catalog, and whatever a client sends, the others are served.
 
 pub mod connection;
 pub mod encoded;

@@ -25,12 +25,11 @@ use crate::actors::resources::work_clock;
 /// own, about one together.
 const READERS_AT_A_TIME: usize = 4;
 /// Writers that go on each time around: a tenth of a millisecond. Fewer if together they have [`WRITE_BYTES`] to write.
-/// Twice as many, and [`FREE_WRITES`] twice as many, held a light call up for up to a millisecond longer beside 1,000
-/// subscribers.
+/// With twice as many, and twice [`FREE_WRITES`], a light call beside 1,000 subscribers took up to a millisecond
+/// longer.
 const WRITERS_AT_A_TIME: usize = 16;
-/// Writes, the longer ones counting several times, for which nobody waits in a queue until the queue has been
-/// worked through once: half a millisecond's. A hundred subscribers of a message wait in none: it costs a tenth of what
-/// writing to them does.
+/// Writes per pass that never queue, about 0.5 ms; a long write counts several times. A hundred subscribers of a
+/// message wait in no queue: it costs a tenth of what writing to them does.
 const FREE_WRITES: usize = 128;
 /// Bytes of a message that count as another write.
 const LONG: usize = 4096;
@@ -97,12 +96,12 @@ pub(super) async fn read() {
     read_bytes(0).await;
 }
 
-/// The same where the reader's last message went to so many subscribers, as its next may.
+/// As `read`, where the reader's last message went to so many subscribers, as its next may.
 pub(super) async fn read_after(deliveries: usize) {
     read_bytes(deliveries * DELIVERY).await;
 }
 
-/// The same where what the reader reads next may be the end of so many bytes, all of which are looked at then.
+/// As `read`, before a read that may complete a message of `bytes`, which is then scanned whole.
 pub(super) async fn read_bytes(bytes: usize) {
     let (go, goes) = oneshot::channel();
     READERS.with(|queue| queue.join(bytes, go));
@@ -113,8 +112,7 @@ pub(super) async fn read_bytes(bytes: usize) {
 /// A queue in which writers wait.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum WritersQueue {
-    /// For messages whose publishers wait until they have been offered to the socket, be it of some of them, and for
-    /// those that had to be encoded.
+    /// For messages whose publisher waits for delivery, and for encoded messages.
     Paced,
     /// For messages of nodes, which publish on.
     Unpaced,
@@ -158,7 +156,7 @@ impl<W: Waits> TurnQueue<W> {
         left.is_some()
     }
 
-    /// Has the task work through the queue, and make free again what has been taken.
+    /// Starts the task that works through the queue, and then makes free again what has been taken.
     fn work(self: &Rc<Self>) {
         if !self.at_work.replace(true) {
             actix_rt::spawn(TurnQueueTask(Rc::clone(self)).run());
@@ -202,7 +200,7 @@ impl<W: Waits> TurnQueueTask<W> {
             if going == 0 {
                 return;
             }
-            // One who was the last in the queue, and is in it again at once, goes on the next time around.
+            // A writer that joins again at once goes on the next time around.
             tokio::task::yield_now().await;
         }
     }

@@ -29,7 +29,7 @@ const UNDERWAY: usize = 8;
 const FEW: usize = 64;
 
 impl<const N: usize> Player<N> {
-    /// Reckons where the record is to be by now.
+    /// Computes where the record is to be by now.
     pub(super) fn tick(&mut self) {
         let now = Instant::now();
         let passed = (now - self.ticked).min(CATCH_UP);
@@ -115,9 +115,9 @@ impl<const N: usize> Player<N> {
         Ok(None)
     }
 
-    /// Owes what is present of the topics that somebody has come to, or that have come to another place: one look back
-    /// costs as much for all of them as for one, and there is one from tick to tick, so that nobody holds the record up
-    /// by coming and going, or by winding it.
+    /// Owes the present messages of topics that have a new subscriber or were wound to another place. One look back
+    /// costs as much for all of them as for one, so there is one a tick: nobody holds the record up by coming and
+    /// going, or by winding it.
     pub(super) fn owe_fresh(&mut self) {
         if self.has_looked || self.fresh.is_empty() {
             return;

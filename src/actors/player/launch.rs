@@ -12,7 +12,7 @@ use actix::prelude::*;
 use super::{PlayedRecord, Player, list_only_what_is_served};
 use crate::actors::gateway::registry::Registry;
 use crate::actors::ros::parameters::Parameters;
-use crate::actors::ros::rosapi::Rosapi;
+use crate::actors::ros::rosapi::RosapiNode;
 use crate::actors::wire::Nodes;
 use crate::record::{ReadError, ReplayError, recorded_links};
 
@@ -60,8 +60,8 @@ fn start_beside<const N: usize>(
     Player::attach(&player, nodes);
     let parameters = Player::parameters(&player);
     Parameters::attach(&Parameters::new(parameters.clone()).start(), nodes);
-    let rosapi = Rosapi::new(registry.clone().recipient(), parameters).start();
-    Rosapi::attach(&rosapi, nodes);
+    let rosapi = RosapiNode::new(registry.clone().recipient(), parameters).start();
+    RosapiNode::attach(&rosapi, nodes);
     list_only_what_is_served(nodes);
     Ok(())
 }

@@ -90,7 +90,7 @@ pub struct Player<const N: usize> {
     rate: f64,
     /// In nanoseconds since the record's beginning.
     position: u64,
-    /// When the position was reckoned.
+    /// When the position was computed.
     ticked: Instant,
     /// When the present messages are published again, if it stands still then.
     repeat: Instant,

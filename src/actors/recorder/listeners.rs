@@ -6,7 +6,7 @@ use bytes::Bytes;
 
 use super::limits::MAX_RECORDED_FRAME;
 use crate::actors::arm::sim::{ArmEvent, ArmListener, ArmNews};
-use crate::actors::gateway::messages::{Eavesdropper, Overheard};
+use crate::actors::gateway::messages::{Tap, Tapped};
 use crate::record::{Content, Note, write_note};
 
 /// The arm's inputs and states; `put` answers whether it has taken an entry.
@@ -35,12 +35,12 @@ pub fn arm<const N: usize>(
 
 /// Topics, calls and answers; none for one that is longer than [`MAX_RECORDED_FRAME`].
 #[must_use]
-pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesdropper {
+pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Tap {
     Box::new(move |what| {
         let length = match &what {
-            Overheard::Published(_, frame) | Overheard::Answered { frame, .. } => frame.len(),
-            Overheard::Heard(_, msg) => msg.line().len(),
-            Overheard::Called { id, args, .. } => {
+            Tapped::Published(_, frame) | Tapped::Answered { frame, .. } => frame.len(),
+            Tapped::Heard(_, msg) => msg.line().len(),
+            Tapped::Called { id, args, .. } => {
                 args.line().len() + id.map_or(0, |id| id.line().len())
             }
         };
@@ -48,15 +48,15 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesd
             return put(None);
         }
         put(Some(match what {
-            Overheard::Published(topic, frame) => Content::Published {
+            Tapped::Published(topic, frame) => Content::Published {
                 topic,
                 frame: copied(frame),
             },
-            Overheard::Heard(topic, msg) => Content::Heard {
+            Tapped::Heard(topic, msg) => Content::Heard {
                 topic,
                 msg: msg.line().into(),
             },
-            Overheard::Called {
+            Tapped::Called {
                 from,
                 service,
                 id,
@@ -67,7 +67,7 @@ pub fn registry(mut put: impl FnMut(Option<Content>) + Send + 'static) -> Eavesd
                 id: id.map_or("", |id| id.line()).into(),
                 args: args.line().into(),
             },
-            Overheard::Answered { to, service, frame } => Content::Answered {
+            Tapped::Answered { to, service, frame } => Content::Answered {
                 client: to.0,
                 service,
                 frame: copied(frame),

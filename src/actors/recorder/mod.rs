@@ -22,7 +22,7 @@ pub use self::messages::{
 };
 use self::tape::{Begun, TapeTarget};
 use crate::actors::arm::sim::Tell;
-use crate::actors::gateway::messages::Overhear;
+use crate::actors::gateway::messages::SetTap;
 use crate::actors::node::Call;
 use crate::record::RunSettings;
 
@@ -31,7 +31,7 @@ use crate::record::RunSettings;
 /// The node `recorder` beside an arm of `N` links.
 pub struct Recorder<const N: usize> {
     arm: Recipient<Tell<N>>,
-    registry: Recipient<Overhear>,
+    registry: Recipient<SetTap>,
     /// Folder in which clients may have records made.
     folder: Option<PathBuf>,
     settings: RunSettings,
@@ -54,7 +54,7 @@ impl<const N: usize> Recorder<N> {
     #[must_use]
     pub fn new(
         arm: Recipient<Tell<N>>,
-        registry: Recipient<Overhear>,
+        registry: Recipient<SetTap>,
         folder: Option<PathBuf>,
         seed: u64,
     ) -> Self {
@@ -182,11 +182,11 @@ impl<const N: usize> Recorder<N> {
             let of_arm = tape.clone();
             let listener = listeners::arm(move |content| of_arm.put(content));
             let _ = arm.send(Tell(Some(listener))).await;
-            let eavesdropper = listeners::registry(move |content| {
+            let tap = listeners::registry(move |content| {
                 // Without any one of these the run can be repeated all the same.
                 let _ = tape.put_or_count(content);
             });
-            let _ = registry.send(Overhear(Some(eavesdropper))).await;
+            let _ = registry.send(SetTap(Some(tap))).await;
             Ok(end)
         };
         begins.into_actor(self).map(move |begun, recorder, _| {
@@ -210,7 +210,7 @@ impl<const N: usize> Recorder<N> {
             let current = current?;
             // Each gives up its tape; with the last one the thread ends the file.
             let _ = arm.send(Tell(None)).await;
-            let _ = registry.send(Overhear(None)).await;
+            let _ = registry.send(SetTap(None)).await;
             let recorded = current.end.await.ok()?;
             tracing::info!(
                 file = recorded.file,

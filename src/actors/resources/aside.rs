@@ -19,7 +19,7 @@ use crate::actors::resources::work_clock;
 /// the gateway keep most of the machine.
 pub const PLACES: usize = 2;
 
-/// The kinds of errands; none waits for places that the other takes.
+/// The kinds of errands. Each has places of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Errand {
     /// Reads a client's input.

@@ -1,4 +1,4 @@
-//! The table of routes: which node serves a service, pursues an action, listens to a topic and publishes one.
+//! The table of routes: which node serves a service or an action, listens to a topic and publishes one.
 //!
 //! **Invariant:** arguments are read here or aside, never on the thread of the node.
 
@@ -25,7 +25,7 @@ pub type Route<T> = Box<dyn Fn(T) + Send>;
 pub struct Nodes {
     /// The way of a call to the node that answers it.
     pub services: HashMap<Service, Route<ServiceCall>>,
-    /// The way of a goal to the node that pursues it.
+    /// The way of a goal to the node that serves its action.
     pub actions: HashMap<Action, Route<ActionRequest>>,
     /// The way of a message to the node that listens to its topic.
     pub listeners: HashMap<Topic, Route<TopicMessage>>,

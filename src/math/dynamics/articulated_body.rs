@@ -17,7 +17,7 @@
 //! | stiff part of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w` |
 //! | soft part of `B'` | `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
 //!
-//! A link needs one quotient, `1 / (W X)`, and nothing is waited for longer: so everything that can be is reckoned
+//! A link needs one quotient, `1 / (W X)`, and nothing is waited for longer: so everything that can be is computed
 //! beside it, and the fewest operations come behind a number that is late. For the outermost link, which carries
 //! nothing, `A'` is `1/4 + 3/4 x xᵀ`.
 //!

@@ -21,7 +21,7 @@ impl Registers {
         Self(*LEVEL.get_or_init(Level::new))
     }
 
-    /// All that there are, the widest first; what is reckoned in any of them is the same.
+    /// All that there are, the widest first; what is computed in any of them is the same.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let widest = Self::widest();

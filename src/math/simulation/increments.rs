@@ -87,7 +87,7 @@ pub(super) fn stepped<T: Number, const N: usize>(
     h: T,
 ) -> (State<N, T>, State<N, T>) {
     let State { position, velocity } = state;
-    // The motion does not depend on the time, so none is reckoned for the stages.
+    // The motion does not depend on the time, so none is computed for the stages.
     let (dq, dv) = increment(method, acceleration, h.like(0.0), position, velocity, h);
     let (position, position_carry) = add(position, &carry.position, &dq);
     let (velocity, velocity_carry) = add(velocity, &carry.velocity, &dv);

@@ -1,7 +1,7 @@
 //! A timed trial: one random target after another, counted as the arm reaches them.
 //!
-//! A [`Trial`] is told what happens and says what to do about it, as a list of [`Action`]s; the actor around it only
-//! carries messages. It knows no arm: targets come from a closure (usually around [`sample`]), goals are somebody
+//! A [`Trial`] is told what happens and says what to do about it, as a list of [`TrialCommand`]s; the actor around it
+//! only carries messages. It knows no arm: targets come from a closure (usually around [`sample`]), goals are somebody
 //! else's and known by their ids, and the time is the simulation time that [`Trial::tick`] is told, before anything
 //! else that happened at that time.
 //!
@@ -21,7 +21,9 @@ use super::goal::{Outcome, rounding};
 use super::kinematics::Target;
 
 pub use sampling::sample;
-pub use terms::{Action, ActionStatus, Changes, Conclusion, DURATION, Rejection, Settings, Status};
+pub use terms::{
+    ActionStatus, Changes, Conclusion, DURATION, Rejection, Settings, Status, TrialCommand,
+};
 
 /// How often a target that was refused is replaced before the trial waits. A sampled target is refused only when the
 /// lengths change between sampling and solving, so that a second refusal in a row is rare already.
@@ -173,7 +175,7 @@ impl Trial {
     ///
     /// A time before the last one told means that the simulation clock was reset: it adds nothing.
     #[must_use]
-    pub fn tick(&mut self, now: f64) -> Vec<Action> {
+    pub fn tick(&mut self, now: f64) -> Vec<TrialCommand> {
         let Some(clock) = self.clock.as_mut().filter(|_| self.running) else {
             return Vec::new();
         };
@@ -195,7 +197,7 @@ impl Trial {
         now: f64,
         changes: Changes,
         sample: impl FnOnce() -> Option<Target>,
-    ) -> Result<Vec<Action>, Rejection> {
+    ) -> Result<Vec<TrialCommand>, Rejection> {
         let target = sample().ok_or(Rejection::NoTarget)?;
         self.settings = changes.to(self.settings);
         self.clock = Some(TrialClock::started(now));
@@ -212,7 +214,7 @@ impl Trial {
     pub fn skip(
         &mut self,
         sample: impl FnOnce() -> Option<Target>,
-    ) -> Result<Vec<Action>, Rejection> {
+    ) -> Result<Vec<TrialCommand>, Rejection> {
         if !self.running {
             return Err(Rejection::NotRunning);
         }
@@ -225,7 +227,7 @@ impl Trial {
     /// # Errors
     ///
     /// [`Rejection::NotRunning`] when no trial runs.
-    pub fn stop(&mut self) -> Result<Vec<Action>, Rejection> {
+    pub fn stop(&mut self) -> Result<Vec<TrialCommand>, Rejection> {
         if self.running {
             Ok(self.end())
         } else {
@@ -240,7 +242,7 @@ impl Trial {
         ticket: u64,
         goal_id: &str,
         sample: impl FnOnce() -> Option<Target>,
-    ) -> Vec<Action> {
+    ) -> Vec<TrialCommand> {
         match std::mem::replace(&mut self.pursuit, Pursuit::Nothing) {
             Pursuit::Asked {
                 ticket: asked,
@@ -252,16 +254,16 @@ impl Trial {
                     goal_id: goal_id.to_owned(),
                 };
                 self.view = View::of(Some(target), ActionStatus::Active);
-                let mut actions = vec![Action::PublishStatus];
+                let mut commands = vec![TrialCommand::PublishStatus];
                 if let Some(early) = early.into_iter().find(|early| early.goal_id == goal_id) {
-                    actions.extend(self.concluded(early, sample));
+                    commands.extend(self.concluded(early, sample));
                 }
-                actions
+                commands
             }
             other => {
                 // Nobody wants this goal any more, and the arm must not go on pursuing it.
                 self.pursuit = other;
-                vec![Action::CancelGoal {
+                vec![TrialCommand::CancelGoal {
                     goal_id: goal_id.to_owned(),
                 }]
             }
@@ -270,7 +272,11 @@ impl Trial {
 
     /// The goal sent under `ticket` has been rejected; another target is tried, [`ATTEMPTS`] in all.
     #[must_use]
-    pub fn refused(&mut self, ticket: u64, sample: impl FnOnce() -> Option<Target>) -> Vec<Action> {
+    pub fn refused(
+        &mut self,
+        ticket: u64,
+        sample: impl FnOnce() -> Option<Target>,
+    ) -> Vec<TrialCommand> {
         let attempt = match &self.pursuit {
             Pursuit::Asked {
                 ticket: asked,
@@ -286,7 +292,7 @@ impl Trial {
         }
         self.pursuit = Pursuit::Nothing;
         self.view = View::of(None, ActionStatus::Idle);
-        vec![Action::PublishStatus]
+        vec![TrialCommand::PublishStatus]
     }
 
     /// Feedback on a goal, anybody's: the end effector's `distance` from its target \[m\], and the `positions` it
@@ -306,7 +312,7 @@ impl Trial {
         &mut self,
         conclusion: Conclusion,
         sample: impl FnOnce() -> Option<Target>,
-    ) -> Vec<Action> {
+    ) -> Vec<TrialCommand> {
         if let Pursuit::Asked { early, .. } = &mut self.pursuit {
             if early.len() == EARLY_RESULTS {
                 early.remove(0);
@@ -325,11 +331,13 @@ impl Trial {
                 self.view.action_status = ActionStatus::Reached;
                 self.view.error = Some(conclusion.final_distance);
                 let next = sample().map(|target| self.ask(target, 1));
-                std::iter::once(Action::PublishStatus).chain(next).collect()
+                std::iter::once(TrialCommand::PublishStatus)
+                    .chain(next)
+                    .collect()
             }
             Outcome::Preempted => {
                 self.view = View::of(self.view.target, ActionStatus::Preempted);
-                vec![Action::PublishStatus]
+                vec![TrialCommand::PublishStatus]
             }
         }
     }
@@ -339,32 +347,32 @@ impl Trial {
     }
 
     /// Drops whatever is pursued and goes for `target`.
-    fn replace(&mut self, target: Target) -> Vec<Action> {
+    fn replace(&mut self, target: Target) -> Vec<TrialCommand> {
         // The new goal would preempt the old one, but not if it is refused.
-        let mut actions = self.abandon();
-        actions.push(self.ask(target, 1));
+        let mut commands = self.abandon();
+        commands.push(self.ask(target, 1));
         // Shown once its goal has been accepted, with what that goal then has.
         self.view = View::of(None, ActionStatus::Idle);
-        actions
+        commands
     }
 
-    fn end(&mut self) -> Vec<Action> {
-        let mut actions = self.abandon();
+    fn end(&mut self) -> Vec<TrialCommand> {
+        let mut commands = self.abandon();
         self.running = false;
         self.view = View::of(None, ActionStatus::Idle);
-        actions.push(Action::PublishStatus);
-        actions
+        commands.push(TrialCommand::PublishStatus);
+        commands
     }
 
-    fn abandon(&mut self) -> Vec<Action> {
+    fn abandon(&mut self) -> Vec<TrialCommand> {
         match std::mem::replace(&mut self.pursuit, Pursuit::Nothing) {
-            Pursuit::InFlight { goal_id } => vec![Action::CancelGoal { goal_id }],
+            Pursuit::InFlight { goal_id } => vec![TrialCommand::CancelGoal { goal_id }],
             // A goal without an id is cancelled when it gets one.
             Pursuit::Asked { .. } | Pursuit::Nothing => Vec::new(),
         }
     }
 
-    fn ask(&mut self, target: Target, attempt: u32) -> Action {
+    fn ask(&mut self, target: Target, attempt: u32) -> TrialCommand {
         self.tickets += 1;
         let ticket = self.tickets;
         self.pursuit = Pursuit::Asked {
@@ -373,7 +381,7 @@ impl Trial {
             attempt,
             early: Vec::new(),
         };
-        Action::SendGoal {
+        TrialCommand::SendGoal {
             ticket,
             target,
             criteria: self.settings.criteria,

@@ -54,7 +54,7 @@ impl Changes {
 
 /// A thing that the trial wants done; several are done in order.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Action {
+pub enum TrialCommand {
     /// Cancel this goal, by its id, so that nobody else's is hit; a rejection means that it is over already.
     CancelGoal {
         /// The goal's id.

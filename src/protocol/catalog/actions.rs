@@ -94,7 +94,7 @@ impl Action {
         self.entry().type_name
     }
 
-    /// The node that pursues the goals.
+    /// The node that serves the action.
     #[must_use]
     pub const fn owner(self) -> Node {
         self.entry().owner

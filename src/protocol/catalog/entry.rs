@@ -183,6 +183,7 @@ pub(super) struct ServiceEntry {
     pub(super) response: &'static [Field],
     pub(super) is_computation: bool,
     pub(super) is_all_or_nothing: bool,
+    pub(super) supersedes: &'static [&'static str],
 }
 
 /// A service with nothing in its request and nothing in its response.
@@ -199,6 +200,7 @@ pub(super) const fn service(
         response: &[],
         is_computation: false,
         is_all_or_nothing: false,
+        supersedes: &[],
     }
 }
 
@@ -225,6 +227,14 @@ impl ServiceEntry {
     pub(super) const fn all_or_nothing(self) -> Self {
         Self {
             is_all_or_nothing: true,
+            ..self
+        }
+    }
+
+    /// An answer makes messages of these topics old that were produced before it: none of them may follow.
+    pub(super) const fn supersedes(self, topics: &'static [&'static str]) -> Self {
+        Self {
+            supersedes: topics,
             ..self
         }
     }

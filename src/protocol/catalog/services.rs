@@ -8,13 +8,14 @@ use super::node::Node;
 use super::playback::Playback;
 use super::rosapi::Rosapi;
 use super::table::{fields, table};
+use super::topics::{ARM_STATE, ARM_STATE_AND_FEEDBACK};
 use crate::protocol::names;
 
 table! {
     /// A service of the runtime's own.
     pub enum Service of ServiceEntry {
         /// Integrates a particle of one degree of freedom, apart from the arm.
-        IntegrationStep = service("/arm_sim/integration_step", "pendularm_interfaces/srv/IntegrationStep", Node::ArmSim)
+        IntegrationStep = of_arm("/arm_sim/integration_step", "pendularm_interfaces/srv/IntegrationStep")
             .request(fields![
                 required("function", "string", "m/s^2, of t in s"),
                 required("x0", "float64", "m"),
@@ -31,25 +32,27 @@ table! {
             .computation()
             .all_or_nothing(),
         /// Method and timestep of the live arm.
-        SetIntegrator = service("/arm_sim/set_integrator", "pendularm_interfaces/srv/SetIntegrator", Node::ArmSim)
+        SetIntegrator = of_arm("/arm_sim/set_integrator", "pendularm_interfaces/srv/SetIntegrator")
             .request(&METHOD)
             .response(&METHOD),
         /// Gravity, masses and lengths.
-        SetParams = service("/arm_sim/set_params", "pendularm_interfaces/srv/SetParams", Node::ArmSim)
+        SetParams = of_arm("/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
             .request(&PARAMS)
             .response(&PARAMS),
         /// Freezes and resumes simulation time.
-        Pause = service("/arm_sim/pause", "pendularm_interfaces/srv/Pause", Node::ArmSim)
+        Pause = of_arm("/arm_sim/pause", "pendularm_interfaces/srv/Pause")
             .request(&SWITCH)
-            .response(&SWITCH),
+            .response(&SWITCH)
+            .supersedes(ARM_STATE_AND_FEEDBACK),
         /// Back to the starting pose at time 0.
-        Reset = service("/arm_sim/reset", "pendularm_interfaces/srv/Reset", Node::ArmSim)
+        Reset = of_arm("/arm_sim/reset", "pendularm_interfaces/srv/Reset")
             .response(fields![
                 required("position", "float64[]", "rad"),
                 required("velocity", "float64[]", "rad/s"),
-            ]),
+            ])
+            .supersedes(ARM_STATE_AND_FEEDBACK),
         /// Takes single steps of a paused arm.
-        Step = service("/arm_sim/step", "pendularm_interfaces/srv/Step", Node::ArmSim)
+        Step = of_arm("/arm_sim/step", "pendularm_interfaces/srv/Step")
             .request(fields![required("steps", "uint64", "")])
             .response(fields![
                 required("steps", "uint64", ""),
@@ -57,12 +60,12 @@ table! {
             ])
             .all_or_nothing(),
         /// Pushes the arm for a while.
-        Disturb = service("/arm_sim/disturb", "pendularm_interfaces/srv/Disturb", Node::ArmSim)
+        Disturb = of_arm("/arm_sim/disturb", "pendularm_interfaces/srv/Disturb")
             .request(&DISTURBANCE)
             .response(&DISTURBANCE)
             .all_or_nothing(),
         /// The names of the arm's parameters.
-        ListParameters = service("/arm_sim/list_parameters", "rcl_interfaces/srv/ListParameters", Node::ArmSim)
+        ListParameters = of_arm("/arm_sim/list_parameters", "rcl_interfaces/srv/ListParameters")
             .request(fields![
                 optional("prefixes", "string[]", ""),
                 optional("depth", "uint64", ""),
@@ -70,33 +73,31 @@ table! {
             .response(fields![required("result", "rcl_interfaces/msg/ListParametersResult", "")])
             .all_or_nothing(),
         /// Their values.
-        GetParameters = service("/arm_sim/get_parameters", "rcl_interfaces/srv/GetParameters", Node::ArmSim)
+        GetParameters = of_arm("/arm_sim/get_parameters", "rcl_interfaces/srv/GetParameters")
             .request(&NAMES)
             .response(fields![required("values", "rcl_interfaces/msg/ParameterValue[]", "")])
             .all_or_nothing(),
         /// Their types.
-        GetParameterTypes = service(
-            "/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes", Node::ArmSim)
+        GetParameterTypes = of_arm("/arm_sim/get_parameter_types", "rcl_interfaces/srv/GetParameterTypes")
             .request(&NAMES)
             .response(fields![required("types", "uint8[]", "")])
             .all_or_nothing(),
         /// Their descriptions.
-        DescribeParameters = service(
-            "/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters", Node::ArmSim)
+        DescribeParameters = of_arm("/arm_sim/describe_parameters", "rcl_interfaces/srv/DescribeParameters")
             .request(&NAMES)
             .response(fields![required("descriptors", "rcl_interfaces/msg/ParameterDescriptor[]", "")])
             .all_or_nothing(),
         /// Sets them.
-        SetParameters = service("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters", Node::ArmSim)
+        SetParameters = of_arm("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters")
             .request(fields![required("parameters", "rcl_interfaces/msg/Parameter[]", "")])
             .response(fields![required("results", "rcl_interfaces/msg/SetParametersResult[]", "")])
             .all_or_nothing(),
         /// The controller on or off.
-        Enable = service("/pid_controller/enable", "pendularm_interfaces/srv/Enable", Node::ArmSim)
+        Enable = of_arm("/pid_controller/enable", "pendularm_interfaces/srv/Enable")
             .request(&SWITCH)
             .response(&SWITCH),
         /// The controller's gains.
-        SetGains = service("/pid_controller/set_gains", "pendularm_interfaces/srv/SetGains", Node::ArmSim)
+        SetGains = of_arm("/pid_controller/set_gains", "pendularm_interfaces/srv/SetGains")
             .request(&GAINS)
             .response(&GAINS),
         /// Joint positions for an end effector position.
@@ -264,6 +265,11 @@ table! {
     Playback(Playback),
 }
 
+/// A service of the arm. It brings the arm to now before it answers, so that older states are old.
+const fn of_arm(name: &'static str, type_name: &'static str) -> ServiceEntry {
+    service(name, type_name, Node::ArmSim).supersedes(ARM_STATE)
+}
+
 const METHOD: [Field; 2] = [
     optional("method", "string", ""),
     optional("timestep", "float64", "s"),
@@ -370,6 +376,12 @@ impl Service {
     #[must_use]
     pub const fn all_or_nothing(self) -> bool {
         self.entry().is_all_or_nothing
+    }
+
+    /// Topics, as clients spell them, of which no message may follow an answer that was produced before it.
+    #[must_use]
+    pub const fn supersedes(self) -> &'static [&'static str] {
+        self.entry().supersedes
     }
 
     /// The fields of a request, in the order of a positional `args` array.

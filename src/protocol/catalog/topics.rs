@@ -140,6 +140,22 @@ pub(super) const TRANSFORMS: [Field; 1] = [required(
     "",
 )];
 
+/// Topics of the arm's state, in both spellings.
+pub(super) const ARM_STATE: &[&str] = ARM_STATE_AND_FEEDBACK.split_at(8).0;
+/// The same, and feedback of a goal: after a pause and a reset there is no goal under way.
+pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = &[
+    Topic::JointStates.name(),
+    Topic::JointStates.short_name(),
+    Topic::Clock.name(),
+    Topic::Clock.short_name(),
+    Topic::Diagnostics.name(),
+    Topic::Diagnostics.short_name(),
+    Topic::Tf.name(),
+    Topic::Tf.short_name(),
+    Topic::IkFeedback.name(),
+    Topic::IkFeedback.short_name(),
+];
+
 impl Topic {
     /// The topic's name on the wire.
     #[must_use]
@@ -194,5 +210,21 @@ impl Topic {
     #[must_use]
     pub const fn fields(self) -> &'static [Field] {
         self.entry().message.fields
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::protocol::catalog::Service;
+
+    #[test]
+    fn every_answer_of_the_arm_makes_its_state_old_and_no_other_does() {
+        for service in Service::ALL {
+            let is_of_arm = service.owner() == Node::ArmSim;
+            let topics = service.supersedes();
+            assert_eq!(!topics.is_empty(), is_of_arm, "{}", service.name());
+            assert!(!is_of_arm || topics.starts_with(ARM_STATE));
+        }
     }
 }

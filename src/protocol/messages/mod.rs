@@ -195,7 +195,7 @@ pub fn action_result(
         .end()
 }
 
-/// Progress of a goal, as the client tells it that pursues it; `values` only pass through.
+/// Feedback of a goal, from an action server that is a client; `values` only pass through.
 #[must_use]
 pub fn action_feedback_raw(action: &str, id: Option<&Payload>, values: &Payload) -> Bytes {
     Encoder::with_room("action_feedback", values.line().len() + USUAL_FRAME)
@@ -205,7 +205,7 @@ pub fn action_feedback_raw(action: &str, id: Option<&Payload>, values: &Payload)
         .end()
 }
 
-/// The end of a goal, as the client tells it that pursued it; `values` only pass through.
+/// The result of a goal, from an action server that is a client; `values` only pass through.
 #[must_use]
 pub fn action_result_raw(
     action: &str,
@@ -223,7 +223,7 @@ pub fn action_result_raw(
         .end()
 }
 
-/// A goal that goes on to the client that pursues it, under an id of the runtime's own; `args` only pass through.
+/// A goal that goes on to its action server, a client, under an id of the runtime's own; `args` only pass through.
 #[must_use]
 pub fn action_goal(
     action: &str,
@@ -242,7 +242,7 @@ pub fn action_goal(
     frame.raw("args", args).value("feedback", &feedback).end()
 }
 
-/// The wish that a goal end, for the client that pursues it.
+/// The wish that a goal end, for its action server, a client.
 #[must_use]
 pub fn cancellation(action: &str, id: &str) -> Bytes {
     Encoder::op("cancel_action_goal")

@@ -24,9 +24,9 @@ use crate::protocol::wire::series::Series;
 pub use goal_status::GoalStatus;
 pub use reader::{OPS, read};
 
-/// Longest `args` and trajectory for a node of ours, without what it has no use for: its thread reads them, within
-/// some tenth of a millisecond. Those of computations, which workers read, and those for other clients are as long as
-/// a frame may be.
+/// Longest `args` and trajectory for a node of ours, without the members that it has no use for: the gateway's thread
+/// reads them, within some tenth of a millisecond. Those of computations, which workers read, and those for other
+/// clients are as long as a frame may be.
 pub const MAX_ARGS: usize = 16 * 1024;
 /// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
@@ -108,12 +108,12 @@ pub enum Op {
         /// Action name.
         action: String,
     },
-    /// An operation of a client that pursues goals of an action.
-    Pursue {
+    /// An operation of an action server: a client that carries out the goals of an action.
+    ServeAction {
         /// Action name.
         action: String,
         /// The op.
-        pursuit: PursuerOp,
+        op: ActionServerOp,
     },
     /// A piece of a longer frame.
     Fragment(Piece),
@@ -152,8 +152,8 @@ impl Op {
             Self::CallService(CallService { args, .. })
             | Self::SendActionGoal(ActionGoal { args, .. }) => args.payload().allocated(),
             Self::ServiceResponse { values, .. }
-            | Self::Pursue {
-                pursuit: PursuerOp::Feedback { values } | PursuerOp::End { values, .. },
+            | Self::ServeAction {
+                op: ActionServerOp::Feedback { values } | ActionServerOp::End { values, .. },
                 ..
             } => values.allocated(),
             // Names, which are short.
@@ -220,7 +220,7 @@ impl Encoding {
     }
 }
 
-/// As what a message is written; of several that a client asked for, the last in this order counts.
+/// The encoding of a message. If a client asked for several, the last in this order counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Compression {
     /// JSON. Also where `png` was asked for, which saves nothing on messages as short as ours.
@@ -256,10 +256,10 @@ pub struct ActionGoal {
     pub feedback: bool,
 }
 
-/// An operation of a client that pursues goals; where it is about one goal, the frame's id says which.
+/// An operation of an action server; where it is about one goal, the frame's id says which.
 #[derive(Debug, Clone)]
-pub enum PursuerOp {
-    /// The sender pursues the action from now on.
+pub enum ActionServerOp {
+    /// The sender serves the action from now on.
     Advertise {
         /// Action type, if given.
         type_name: Option<String>,

@@ -331,8 +331,8 @@ impl Outbox {
         }
     }
 
-    /// Drops the oldest topic messages for as long as so many bytes are too many: of the queue's first and the longest
-    /// held back, the older. Those of a series that have to go, go together.
+    /// Drops topic messages, the oldest first, until `too_many` gives no excess in bytes. The oldest is the queue's
+    /// first or the one that was held back first. Of a series, as many messages go at once as have to.
     fn drop_oldest(&mut self, too_many: impl Fn(&Self) -> usize) {
         loop {
             let excess = too_many(self);

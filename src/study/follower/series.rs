@@ -17,7 +17,7 @@
 #![allow(
     clippy::indexing_slicing,
     clippy::needless_range_loop,
-    reason = "indices run over 0..N, and over the coefficients reckoned so far, as they do in the recurrences"
+    reason = "indices run over 0..N, and over the coefficients computed so far, as they do in the recurrences"
 )]
 
 use crate::math::arm::{Arm, State};
@@ -41,7 +41,7 @@ const fn backwards(order: usize) -> usize {
     ORDER - 1 - order
 }
 
-/// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are reckoned from.
+/// Series of the angles of the links \[rad\], their rates \[rad/s\], and what they are computed from.
 #[derive(Debug, Clone)]
 pub(super) struct PowerSeries<const N: usize> {
     /// Order up to which rates are known.
@@ -111,7 +111,7 @@ impl<const N: usize> PowerSeries<N> {
         self.close(0, sums(&acceleration));
     }
 
-    /// Reckons the rates of the next order.
+    /// Computes the rates of the next order.
     #[inline]
     pub(super) fn extend(&mut self) {
         let k = self.order;

@@ -7,7 +7,7 @@ use actix::prelude::*;
 use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, Meant, SendGoal};
 use crate::actors::arm::sim::{ArmPose, Settle};
 use crate::actors::node::{Call, ask};
-use crate::math::trial::Action;
+use crate::math::trial::TrialCommand;
 
 /// `ik_action`, as its client sees it.
 #[derive(Clone)]
@@ -31,7 +31,7 @@ pub(super) struct GoalAnswer<const N: usize> {
 
 /// Takes the trial's wishes to `ik_action`, one after another.
 pub(super) async fn carry_out<const N: usize>(
-    commands: Vec<Action>,
+    commands: Vec<TrialCommand>,
     arm: Recipient<ArmPose<N>>,
     goals: GoalClient<N>,
     owner: Recipient<GoalNews<N>>,
@@ -39,12 +39,12 @@ pub(super) async fn carry_out<const N: usize>(
     let mut answers = Vec::new();
     for command in commands {
         match command {
-            Action::CancelGoal { goal_id } => {
+            TrialCommand::CancelGoal { goal_id } => {
                 let goal = Meant::Called(goal_id);
                 // A refusal means that the goal is over already: all that was wanted.
                 let _ = ask(&goals.cancel, CancelGoal { goal }).await;
             }
-            Action::SendGoal {
+            TrialCommand::SendGoal {
                 ticket,
                 target,
                 criteria,
@@ -65,7 +65,7 @@ pub(super) async fn carry_out<const N: usize>(
                     lengths,
                 });
             }
-            Action::PublishStatus => {}
+            TrialCommand::PublishStatus => {}
         }
     }
     answers

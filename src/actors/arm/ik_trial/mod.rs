@@ -1,7 +1,7 @@
 //! Timed trials: `/ik_trial/start`, `/ik_trial/skip`, `/ik_trial/stop`, and the state of things on `/ik_trial/status`.
 //!
 //! The rules are `math::trial`'s. The node asks the arm for lengths and simulation time before it does anything, and
-//! moves it through `ik_action` only. What it wants done there it does whole before it hears of anything else.
+//! moves it through `ik_action` only. What it asks for there is done to the end before it takes its next message.
 //!
 //! **Invariant:** time and goals' news are taken in the order in which the arm gave them; nothing ticks while no trial
 //! runs and nobody watches.
@@ -21,7 +21,7 @@ use super::ik_action::GoalNews;
 use crate::actors::arm::sim::{ArmPose, Pose, Settle};
 use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
 use crate::actors::wire::Nodes;
-use crate::math::trial::{Action, Changes, Conclusion, Rejection, Trial, sample};
+use crate::math::trial::{Changes, Conclusion, Rejection, Trial, TrialCommand, sample};
 use crate::protocol::catalog::{Node, Service, Topic};
 use crate::protocol::messages::goal::TrialStatus;
 
@@ -156,7 +156,7 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
         let Some(pose) = known.pose else {
             return known.intent.refuse();
         };
-        let mut actions = self.hear(&pose);
+        let mut commands = self.hear(&pose);
         let target = || sample(&self.lengths, || self.rng.f64());
         let (decided, pending) = match known.intent {
             Intent::Start(changes, reply) => {
@@ -171,16 +171,16 @@ impl<const N: usize> Handler<PoseKnown<N>> for IkTrial<N> {
             Intent::CheckDeadline => (Ok(Vec::new()), None),
             Intent::ShowStatus => {
                 self.status_asked = false;
-                (Ok(vec![Action::PublishStatus]), None)
+                (Ok(vec![TrialCommand::PublishStatus]), None)
             }
         };
         match decided {
             Ok(more) => {
-                actions.extend(more);
-                self.perform(actions, pending, ctx);
+                commands.extend(more);
+                self.perform(commands, pending, ctx);
             }
             Err(why) => {
-                self.perform(actions, None, ctx);
+                self.perform(commands, None, ctx);
                 self.answer(pending, Err(why));
             }
         }
@@ -191,7 +191,7 @@ impl<const N: usize> Handler<GoalNews<N>> for IkTrial<N> {
     type Result = ();
 
     fn handle(&mut self, news: GoalNews<N>, ctx: &mut Context<Self>) {
-        let mut actions = self.hear(&news.pose);
+        let mut commands = self.hear(&news.pose);
         match news.outcome {
             None => self
                 .trial
@@ -203,10 +203,10 @@ impl<const N: usize> Handler<GoalNews<N>> for IkTrial<N> {
                     final_distance: news.distance,
                 };
                 let target = || sample(&self.lengths, || self.rng.f64());
-                actions.extend(self.trial.concluded(conclusion, target));
+                commands.extend(self.trial.concluded(conclusion, target));
             }
         }
-        self.perform(actions, None, ctx);
+        self.perform(commands, None, ctx);
     }
 }
 
@@ -252,7 +252,7 @@ impl<const N: usize> IkTrial<N> {
     }
 
     /// Takes note of lengths and time. Two questions may be answered in either order: the later time counts.
-    fn hear(&mut self, pose: &Pose<N>) -> Vec<Action> {
+    fn hear(&mut self, pose: &Pose<N>) -> Vec<TrialCommand> {
         self.lengths = pose.lengths;
         let heard = (pose.resets, pose.simulated);
         if heard > self.clock {
@@ -262,34 +262,39 @@ impl<const N: usize> IkTrial<N> {
     }
 
     /// Does what the trial wants done, then answers the call that led to it.
-    fn perform(&mut self, actions: Vec<Action>, pending: Option<Pending>, ctx: &mut Context<Self>) {
-        let mut commands = Vec::new();
-        for action in actions {
-            match action {
-                Action::PublishStatus => self.publish_status(),
-                command => commands.push(command),
+    fn perform(
+        &mut self,
+        commands: Vec<TrialCommand>,
+        pending: Option<Pending>,
+        ctx: &mut Context<Self>,
+    ) {
+        let mut about_goals = Vec::new();
+        for command in commands {
+            match command {
+                TrialCommand::PublishStatus => self.publish_status(),
+                command => about_goals.push(command),
             }
         }
         self.keep_timers(ctx);
-        if commands.is_empty() {
+        if about_goals.is_empty() {
             return self.answer(pending, Ok(()));
         }
         let carried_out = carry_out(
-            commands,
+            about_goals,
             self.arm.clone(),
             self.goals.clone(),
             ctx.address().recipient(),
         );
         ctx.wait(carried_out.into_actor(self).map(move |answers, node, ctx| {
-            let actions = answers
+            let commands = answers
                 .into_iter()
                 .flat_map(|answer| node.goal_answered(answer))
                 .collect();
-            node.perform(actions, pending, ctx);
+            node.perform(commands, pending, ctx);
         }));
     }
 
-    fn goal_answered(&mut self, answer: GoalAnswer<N>) -> Vec<Action> {
+    fn goal_answered(&mut self, answer: GoalAnswer<N>) -> Vec<TrialCommand> {
         self.lengths = answer.lengths.unwrap_or(self.lengths);
         let target = || sample(&self.lengths, || self.rng.f64());
         match answer.goal_id {

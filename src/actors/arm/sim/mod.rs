@@ -1,6 +1,6 @@
 //! The arm: steps the simulation against wall time, serves `/arm_sim/*` and `/pid_controller/*`, publishes its state.
 //!
-//! The actor (`node.rs`) only asks the clock and says who hears what. What is due is reckoned by `math::pacer`, what
+//! The actor (`node.rs`) only asks the clock and says who hears what. What is due is computed by `math::pacer`, what
 //! happens in a step by `math::simulation`. `services` has what clients can ask, `messages` what other nodes say;
 //! `telemetry` and `scene` publish, `goals` judges goals and `limit` timesteps, with what the arm remembers for them in
 //! `state`.

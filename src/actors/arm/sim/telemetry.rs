@@ -1,7 +1,7 @@
 //! The arm's topics: `/joint_states` and `/clock` at every tick, `/arm_sim/error_estimate` at every sixth,
 //! `/diagnostics` once a second and at every change.
 //!
-//! **Invariant:** nothing is reckoned for a topic that nobody subscribes to; what is published is written elsewhere.
+//! **Invariant:** nothing is computed for a topic that nobody subscribes to; what is published is written elsewhere.
 
 use serde::Serialize;
 
@@ -10,7 +10,7 @@ use super::state::telemetry::{WakeUp, Window, energy};
 use crate::actors::node::{FrameOut, Publish};
 use crate::math::arm::State;
 use crate::math::pacer::CATCH_UP;
-use crate::protocol::catalog::Topic;
+use crate::protocol::catalog::{Service, Topic};
 use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{
     self, Clock, DiagnosticArray, DiagnosticStatus, Header, JointState, KeyValue, Stamp,
@@ -107,8 +107,10 @@ impl<const N: usize> ArmSim<N> {
         let (level, state, message) = match self.simulation.divergence() {
             Some(divergence) => {
                 let message = format!(
-                    "diverged: step {} from t = {} s was not finite and was not taken; /arm_sim/reset clears this",
-                    divergence.step, divergence.time
+                    "diverged: step {} from t = {} s was not finite and was not taken; {} clears this",
+                    divergence.step,
+                    divergence.time,
+                    Service::Reset.name()
                 );
                 (2, "diverged", message)
             }

@@ -4,11 +4,11 @@
 //! who are there were served at once (Demers, Keshav and Shenker, *Analysis and Simulation of a Fair Queueing
 //! Algorithm*, 1989). Each piece of work has its own reading, which begins at the clock's and advances by the time that
 //! it has had; the least reading is next. So a newcomer does not wait for what others have begun, nor is it served
-//! before them for ever: who has had more than a share stays behind until the clock has caught up, also when it leaves
-//! and comes back.
+//! before them for ever: a client that has had more than its share stays behind until the clock has caught up, also
+//! when it leaves and comes back.
 //!
-//! **Invariant:** while several wait, none has had more than another that came with it by more than what each had in
-//! one turn.
+//! **Invariant:** of several pieces of work that came together and wait, none is ahead of another by more than the time
+//! of one turn.
 
 use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
@@ -31,7 +31,7 @@ pub(super) struct Turns<T> {
     ahead: HashMap<Owner, Duration>,
 }
 
-/// Whose a piece of work is, and its reading.
+/// The owner of a piece of work, and its reading.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ticket {
     of: Owner,

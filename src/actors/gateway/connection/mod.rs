@@ -1,6 +1,6 @@
 //! One client: bytes in, ops to the registry; messages and responses back, through a bounded outbox.
 //!
-//! A reception judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
+//! A session judges the client by its first bytes. From then on three parts on one thread share one `Shared`: the
 //! reading task hands one op at a time to the registry and waits until it has taken effect; the actor's handlers put
 //! what they are sent into the outbox; the writer, which the same actor polls behind its handlers, drains it. A
 //! client that reads slowly fills its own outbox and nothing else.
@@ -9,28 +9,17 @@
 //!
 //! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
 
-mod admission;
-mod encoding;
-pub mod gate;
-mod guesses;
-#[cfg(feature = "web")]
-mod link;
+pub mod admission;
+mod computations;
+mod conversation;
 mod outgoing;
-mod perform;
-mod places;
-mod reader;
-mod reception;
+mod own_waker;
+mod session;
 mod shared;
-mod talk;
 mod transport;
-mod unencoded;
 mod unfinished;
 #[cfg(feature = "web")]
-mod watched;
-#[cfg(feature = "web")]
-mod web;
-mod when_woken;
-mod writer;
+mod websocket;
 
 use std::future::poll_fn;
 use std::pin::Pin;
@@ -41,53 +30,38 @@ use std::sync::atomic::AtomicBool;
 use actix::prelude::*;
 use tokio::io::{AsyncRead, AsyncWrite};
 
-use self::gate::Gate;
-use self::reception::Reception;
+use self::admission::Admission;
+use self::own_waker::OwnWaker;
+use self::session::ClientSession;
 use self::shared::Shared;
-use self::when_woken::WhenWoken;
 pub use super::ends::Ends;
 use super::messages::{Configure, Deliver, Disconnect, Finish, Outlets, Response};
 use super::registry::Registry;
 use crate::actors::panics::{contain, contained};
 use crate::actors::resources::gauges::Gauges;
-use crate::protocol::catalog::{Node, Service, Topic};
-
-/// Topics that a response of the arm makes old: after the response to a pause, no message from before it may follow.
-const ARM_STATE: [&str; 8] = [
-    Topic::JointStates.name(),
-    Topic::JointStates.short_name(),
-    Topic::Clock.name(),
-    Topic::Clock.short_name(),
-    Topic::Diagnostics.name(),
-    Topic::Diagnostics.short_name(),
-    Topic::Tf.name(),
-    Topic::Tf.short_name(),
-];
-
-/// One more that a pause and a reset make old: no goal is on its way any more.
-const PROGRESS: [&str; 2] = [Topic::IkFeedback.name(), Topic::IkFeedback.short_name()];
+use crate::protocol::catalog::Service;
 
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The actor of one client.
 pub struct Connection<S> {
-    /// The stream, until the reception takes it.
+    /// The stream, until the session takes it.
     stream: Option<S>,
     shared: Rc<Shared>,
-    /// The client has to pass this first.
-    gate: Arc<Gate>,
+    /// The conditions that the client has to meet first.
+    admission: Arc<Admission>,
     ends: Ends,
 }
 
 impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
     /// Starts the actor for `stream` in the present system; nothing is asked of the client first.
     pub fn start_on(stream: S, registry: Addr<Registry>, gauges: Arc<Gauges>) -> Addr<Self> {
-        Self::start_behind(Arc::default(), Ends::default(), stream, registry, gauges)
+        Self::start_with(Arc::default(), Ends::default(), stream, registry, gauges)
     }
 
-    /// Starts the actor behind a gate.
-    pub fn start_behind(
-        gate: Arc<Gate>,
+    /// Starts the actor for a client that has to be admitted.
+    pub fn start_with(
+        admission: Arc<Admission>,
         ends: impl Into<Ends>,
         stream: S,
         registry: Addr<Registry>,
@@ -96,7 +70,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         Self {
             stream: Some(stream),
             shared: Rc::new(Shared::new(registry, gauges)),
-            gate,
+            admission,
             ends: ends.into(),
         }
         .start()
@@ -117,7 +91,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Actor for Connection<S> {
             finish: address.recipient(),
             wants_text: Arc::clone(&self.shared.wants_text),
             gone: Arc::new(AtomicBool::new(false)),
-            backlog: Arc::clone(&self.shared.outgoing.backlog),
+            backlog: self.shared.outgoing.backlog(),
             account: Arc::clone(&self.shared.account),
             displaced: Arc::clone(&self.shared.displaced),
         };
@@ -153,14 +127,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Handler<Response> for Connecti
         self.contain(ctx, |connection| {
             let shared = &connection.shared;
             let service = response.service;
-            let of_arm = service.is_some_and(|one| one.owner() == Node::ArmSim);
-            let stops = matches!(service, Some(Service::Pause | Service::Reset));
-            let superseded = match (of_arm, stops) {
-                (_, true) => [&ARM_STATE[..], &PROGRESS].concat(),
-                (true, false) => ARM_STATE.to_vec(),
-                (false, false) => Vec::new(),
-            };
-            shared.outgoing.push_response(response.frame, &superseded);
+            let superseded = service.map_or(&[][..], Service::supersedes);
+            shared.outgoing.push_response(response.frame, superseded);
             if service.is_some_and(Service::is_computation) {
                 shared.end_computation();
             }
@@ -195,16 +163,16 @@ impl<S: AsyncRead + AsyncWrite + Unpin + 'static> Connection<S> {
         let Some(stream) = self.stream.take() else {
             return;
         };
-        let reception = Reception {
+        let session = ClientSession {
             shared: Rc::clone(&self.shared),
             finish: ctx.address().recipient(),
-            gate: Arc::clone(&self.gate),
+            admission: Arc::clone(&self.admission),
             ends: self.ends,
         };
         let outgoing = Rc::clone(&self.shared.outgoing);
-        let mut course = WhenWoken::new(contained(reception.run(stream, outlets)));
+        let mut session = OwnWaker::new(contained(session.run(stream, outlets)));
         let served = poll_fn(move |cx| {
-            let polled = Pin::new(&mut course).poll(cx);
+            let polled = Pin::new(&mut session).poll(cx);
             outgoing.write(cx);
             polled
         });

@@ -4,7 +4,6 @@
 //! **Invariant:** nothing that borrows a cell here waits while it does.
 
 use std::cell::{Cell, RefCell};
-use std::collections::VecDeque;
 use std::rc::Rc;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -13,9 +12,10 @@ use actix::prelude::*;
 use bytes::Bytes;
 use tokio::sync::Notify;
 
+use super::computations::Computations;
 use super::outgoing::Outgoing;
 use crate::actors::ConnectionId;
-use crate::actors::gateway::limits::{MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING};
+use crate::actors::gateway::limits::MAX_RESPONSES_WAITING;
 use crate::actors::gateway::messages::Request;
 use crate::actors::gateway::registry::Registry;
 use crate::actors::resources::budget::{Account, Share};
@@ -57,14 +57,6 @@ pub(super) enum Ending {
 pub(super) const HELD_MOST: &str =
     "memory: this connection held the most when all clients together held too much";
 
-/// The heavy calls of one connection: one runs, some wait.
-#[derive(Default)]
-struct Computations {
-    waiting: VecDeque<(Request, Share)>,
-    /// The memory of the request that runs, if one does.
-    running: Option<Share>,
-}
-
 impl Shared {
     /// Nothing waits, nothing is begun.
     pub(super) fn new(registry: Addr<Registry>, gauges: Arc<Gauges>) -> Self {
@@ -97,7 +89,7 @@ impl Shared {
 
     /// The client may be read: neither its responses nor its computations pile up.
     pub(super) fn may_read(&self) -> bool {
-        self.may_compute() && self.computations.borrow().waiting.len() < MAX_COMPUTATIONS_WAITING
+        self.may_compute() && !self.computations.borrow().are_too_many()
     }
 
     /// Another computation may start: its response would not come on top of too many.
@@ -117,15 +109,13 @@ impl Shared {
 
     /// Queues a heavy call behind the connection's others.
     pub(super) fn enqueue_computation(&self, request: Request, share: Share) {
-        let mut computations = self.computations.borrow_mut();
-        computations.waiting.push_back((request, share));
-        drop(computations);
+        self.computations.borrow_mut().push(request, share);
         self.start_computation();
     }
 
     /// The computation that ran has been answered.
     pub(super) fn end_computation(&self) {
-        self.computations.borrow_mut().running = None;
+        self.computations.borrow_mut().end();
         self.start_computation();
         self.room.notify_one();
     }
@@ -133,20 +123,17 @@ impl Shared {
     /// Starts the next computation if none runs and its response would find room.
     fn start_computation(&self) {
         let mut computations = self.computations.borrow_mut();
-        if computations.running.is_some() || computations.waiting.is_empty() || !self.may_compute()
+        if computations.can_start()
+            && self.may_compute()
+            && let Some(request) = computations.start()
         {
-            return;
-        }
-        if let Some((request, share)) = computations.waiting.pop_front() {
-            computations.running = Some(share);
             self.registry.do_send(request);
         }
     }
 
     /// Whether a computation runs or waits.
     pub(super) fn is_computing(&self) -> bool {
-        let computations = self.computations.borrow();
-        computations.running.is_some() || !computations.waiting.is_empty()
+        !self.computations.borrow().is_empty()
     }
 
     /// Nobody waits for the computations any more.

@@ -5,14 +5,21 @@
 
 use std::future::Future;
 use std::io::{self, IoSlice};
+use std::time::Duration;
 
 use bytes::{Bytes, BytesMut};
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
+use tokio::time::timeout;
 
 use crate::actors::gateway::limits::{WRITE_BYTES, WRITE_FRAMES};
 
 /// Bytes asked of a stream at a time: large enough for a burst of small frames, small enough to be fair.
 pub(super) const CHUNK: usize = 64 * 1024;
+
+/// How long, and how many bytes, of a refused client's input are swallowed so that it can still read why: closing
+/// a socket with unread input resets it.
+const DISCARD_TIME: Duration = Duration::from_secs(1);
+const DISCARD_BYTES: usize = 16 * 1024 * 1024;
 
 /// The receiving half.
 pub(super) trait Inbound {
@@ -94,4 +101,20 @@ pub(super) async fn read_some<R: AsyncRead + Unpin>(
 ) -> io::Result<usize> {
     chunk.reserve(CHUNK);
     input.read_buf(chunk).await
+}
+
+/// Swallows a refused client's input for a bounded time.
+pub(super) async fn discard<I: Inbound>(mut input: I) {
+    let mut chunk = BytesMut::new();
+    let swallow = async {
+        let mut swallowed = 0;
+        while swallowed < DISCARD_BYTES {
+            chunk.clear();
+            match input.swallow(&mut chunk).await {
+                Ok(0) | Err(_) => break,
+                Ok(read) => swallowed += read,
+            }
+        }
+    };
+    let _ = timeout(DISCARD_TIME, swallow).await;
 }

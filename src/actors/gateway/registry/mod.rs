@@ -1,37 +1,25 @@
 //! The registry: every client, topic and service; fans published topics out to subscribed connections, and routes
-//! calls.
+//! calls. `state.rs` has its state, which is made of `tables/`; `ops/` are the methods that change it.
 //!
 //! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
 
-mod actions;
-mod calls;
-mod census;
-mod ear;
-mod endings;
-mod fan_out;
-mod left;
 mod nodes;
-mod numbers;
 mod ops;
-mod pursuers;
-mod pursuit;
 mod refusal;
-mod services;
 mod state;
-mod subscriptions;
-mod topics;
+mod tables;
 
 use actix::prelude::*;
 use tokio::sync::oneshot;
 
-use self::fan_out::Pace;
 pub use self::nodes::{Attach, Nodes};
+use self::ops::fan_out::Pace;
 use self::refusal::Refusal;
 use self::state::Client;
 pub use self::state::Registry;
 use super::messages::{
-    Connect, Disconnect, Ended, Finish, FinishAll, Handled, Overhear, Overheard, PublishInTurn,
-    RefuseCalls, Refused, Request, Retire, TakeCensus,
+    Connect, Disconnect, Ended, Finish, FinishAll, Handled, PublishInTurn, RefuseCalls, Refused,
+    Request, Retire, SetTap, TakeCensus, Tapped,
 };
 use crate::actors::ConnectionId;
 use crate::actors::node::{Publish, Respond};
@@ -63,7 +51,7 @@ impl Handler<Connect> for Registry {
         }
         if self.clients.len() >= self.max_connections {
             self.displace();
-            self.look_at_endings(ctx);
+            self.schedule_cleanup(ctx);
         }
         if self.clients.len() >= self.max_connections {
             return Err(Refused::Full(self.max_connections));
@@ -91,7 +79,7 @@ impl Handler<Retire> for Registry {
 
     fn handle(&mut self, Retire(id): Retire, ctx: &mut Context<Self>) -> Handled {
         self.withdraw(id);
-        self.look_at_endings(ctx);
+        self.schedule_cleanup(ctx);
         if self.services.waiting_for(id) == 0 {
             return Handled::at_once();
         }
@@ -108,7 +96,7 @@ impl Handler<Disconnect> for Registry {
 
     fn handle(&mut self, Disconnect(id): Disconnect, ctx: &mut Context<Self>) {
         self.forget(id);
-        self.look_at_endings(ctx);
+        self.schedule_cleanup(ctx);
     }
 }
 
@@ -154,7 +142,7 @@ impl Handler<Respond> for Registry {
         {
             let frame = respond.frame.write();
             if let Some(service) = respond.service {
-                self.ear.hear(Overheard::Answered {
+                self.tap.pass(Tapped::Answered {
                     to: respond.connection,
                     service,
                     frame: &frame,
@@ -176,19 +164,19 @@ impl Handler<TakeCensus> for Registry {
     }
 }
 
-impl Handler<Overhear> for Registry {
+impl Handler<SetTap> for Registry {
     type Result = ();
 
-    fn handle(&mut self, Overhear(eavesdropper): Overhear, _: &mut Context<Self>) {
+    fn handle(&mut self, SetTap(tap): SetTap, _: &mut Context<Self>) {
         let unwanted: Vec<&str> = Topic::ALL
             .map(Topic::name)
             .into_iter()
             .filter(|topic| !self.topics.has_subscribers(topic))
             .collect();
-        let was_open = self.ear.is_open();
-        self.ear.lend(eavesdropper);
+        let was_set = self.tap.is_set();
+        self.tap.set(tap);
         for topic in unwanted {
-            match (was_open, self.ear.is_open()) {
+            match (was_set, self.tap.is_set()) {
                 (_, true) => self.tell_owner(topic, true),
                 (true, false) => self.let_rest(topic),
                 (false, false) => {}
@@ -196,7 +184,7 @@ impl Handler<Overhear> for Registry {
         }
         for (topic, frame) in &self.latched {
             if self.topics.has_subscribers(topic.name()) {
-                self.ear.hear(Overheard::Published(*topic, frame));
+                self.tap.pass(Tapped::Published(*topic, frame));
             }
         }
     }
@@ -210,7 +198,7 @@ impl Handler<RefuseCalls> for Registry {
         for call in self.services.take_all() {
             self.answer_forwarded(&call, &Refusal::Closed(why));
         }
-        for goal in self.pursuers.take_all() {
+        for goal in self.action_servers.take_all() {
             self.abort(&goal, &Refusal::Closed(why));
         }
     }

@@ -9,7 +9,7 @@ use crate::actors::gateway::limits::{
 
 /// An op or a call that changed nothing.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub(super) enum Refusal {
+pub(crate) enum Refusal {
     #[error("topic: {0} belongs to the runtime; a client can't advertise it or publish there")]
     RuntimeTopic(String),
     #[error("topic: a connection advertises at most {MAX_ADVERTISED} topics")]
@@ -49,7 +49,7 @@ pub(super) enum Refusal {
     #[error("action: {0} is pursued by the runtime itself")]
     RuntimeAction(String),
     #[error("action: this connection does not pursue {0}")]
-    NotPursuer(String),
+    NotActionServer(String),
     #[error("id: no goal of {0} with this id is pursued by this connection")]
     StaleGoal(String),
     #[error("id: no goal of {0} with this id was sent by this connection")]

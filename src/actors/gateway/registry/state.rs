@@ -1,4 +1,4 @@
-//! The registry's state: its clients, topics, services and nodes, and what several of its rooms do with them.
+//! The registry's state: its clients, topics, services and nodes, and what several of its ops do with them.
 //!
 //! **Invariant:** what a client has registered stands here as long as the client, and then until its turn to go.
 
@@ -11,14 +11,14 @@ use bytes::Bytes;
 use tokio::sync::oneshot;
 use tokio::time::Instant;
 
-use super::census::{Tally, Use};
-use super::ear::Ear;
-use super::left::{Left, Registration};
 use super::nodes::Nodes;
-use super::pursuers::Pursuers;
 use super::refusal::Refusal;
-use super::services::{Forwarded, Services};
-use super::topics::{Subscription, Topics};
+use super::tables::action_servers::ActionServers;
+use super::tables::census::{Tally, Use};
+use super::tables::leftovers::{Leftovers, Registration};
+use super::tables::services::{Forwarded, Services};
+use super::tables::tap::TapPoint;
+use super::tables::topics::{Subscription, Topics};
 use crate::actors::ConnectionId;
 use crate::actors::gateway::limits::{MAX_CONNECTIONS, REGISTRATION_BYTES};
 use crate::actors::gateway::messages::{Outlets, Response};
@@ -36,11 +36,11 @@ pub struct Registry {
     pub(super) clients: HashMap<ConnectionId, Client>,
     pub(super) topics: Topics,
     pub(super) services: Services,
-    pub(super) pursuers: Pursuers,
-    /// Left behind by those who have gone; it will be ended.
-    pub(super) left: Left,
-    /// When the registry looks next at what is to be ended, and the task that waits for that.
-    pub(super) look: Option<(Instant, SpawnHandle)>,
+    pub(super) action_servers: ActionServers,
+    /// Left behind by those who have gone, to be cleaned up.
+    pub(super) leftovers: Leftovers,
+    /// When the next cleanup is, and the task that waits for that.
+    pub(super) next_cleanup: Option<(Instant, SpawnHandle)>,
     pub(super) nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
     pub(super) latched: HashMap<Topic, Bytes>,
@@ -54,14 +54,14 @@ pub struct Registry {
     /// Clients at once.
     pub(super) max_connections: usize,
     pub(super) connections_made: u64,
-    /// Overhears what passes, if anybody does.
-    pub(super) ear: Ear,
+    /// Copies what passes to the recorder, while it records.
+    pub(super) tap: TapPoint,
     /// Why no call is taken any more, once the runtime is ending.
     pub(super) closed: Option<&'static str>,
 }
 
 /// One client, as the registry knows it.
-pub(super) struct Client {
+pub(crate) struct Client {
     pub(super) outlets: Outlets,
     /// Topics, each with what it takes.
     pub(super) advertised: HashMap<Box<str>, Share>,
@@ -71,8 +71,8 @@ pub(super) struct Client {
     /// In order of their names: the topics' owners hear of its going in that order.
     pub(super) subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
     pub(super) provided: HashMap<Box<str>, Share>,
-    /// Actions.
-    pub(super) pursued: HashMap<Box<str>, Share>,
+    /// Actions that it serves.
+    pub(super) served_actions: HashMap<Box<str>, Share>,
     /// Statuses that it wants.
     pub(super) verbosity: Verbosity,
     /// Dropped once no call of this client waits any more, if it has stopped sending.
@@ -87,9 +87,9 @@ impl Registry {
             clients: HashMap::new(),
             topics: Topics::default(),
             services: Services::default(),
-            pursuers: Pursuers::default(),
-            left: Left::default(),
-            look: None,
+            action_servers: ActionServers::default(),
+            leftovers: Leftovers::default(),
+            next_cleanup: None,
             nodes: Nodes::default(),
             latched: HashMap::new(),
             fragmented: Arc::default(),
@@ -98,7 +98,7 @@ impl Registry {
             ended: BTreeSet::new(),
             max_connections: MAX_CONNECTIONS,
             connections_made: 0,
-            ear: Ear::default(),
+            tap: TapPoint::default(),
             closed: None,
         }
     }
@@ -121,7 +121,7 @@ impl Client {
             withdrawn: HashSet::new(),
             subscriptions: BTreeMap::new(),
             provided: HashMap::new(),
-            pursued: HashMap::new(),
+            served_actions: HashMap::new(),
             verbosity: Verbosity::ALL,
             answered: None,
         }
@@ -168,8 +168,7 @@ impl Client {
 }
 
 impl Registry {
-    /// Hands over all that a client has registered, to be withdrawn; the calls that wait for it as provider, and the
-    /// goals that it pursues, will be ended.
+    /// Leaves all that a client has registered to the cleanup, with the calls and goals that wait for its answer.
     pub(super) fn withdraw(&mut self, id: ConnectionId) {
         let Some(client) = self.clients.get_mut(&id) else {
             return;
@@ -177,16 +176,17 @@ impl Registry {
         let advertised = std::mem::take(&mut client.advertised).into_iter();
         let subscriptions = std::mem::take(&mut client.subscriptions).into_iter();
         let provided = std::mem::take(&mut client.provided).into_iter();
-        let pursued = std::mem::take(&mut client.pursued).into_iter();
+        let served_actions = std::mem::take(&mut client.served_actions).into_iter();
         let registrations = advertised
             .map(|(topic, share)| Registration::Advertised(topic, share))
             .chain(subscriptions.map(|(topic, all)| Registration::Subscribed(topic, all)))
             .chain(provided.map(|(service, share)| Registration::Provided(service, share)))
-            .chain(pursued.map(|(action, share)| Registration::Pursued(action, share)));
-        self.left.add_registrations(id, Box::new(registrations));
-        let goals = self.pursuers.take_numbers(id);
+            .chain(served_actions.map(|(action, share)| Registration::ServedAction(action, share)));
+        self.leftovers
+            .add_registrations(id, Box::new(registrations));
+        let goals = self.action_servers.take_numbers(id);
         let calls = self.services.take_numbers(id);
-        self.left.add(goals, calls);
+        self.leftovers.add(goals, calls);
     }
 
     /// Withdraws one thing that a client had registered.
@@ -197,7 +197,7 @@ impl Registry {
             Registration::Provided(service, _share) => {
                 self.withdraw_service(&service, id);
             }
-            Registration::Pursued(action, _share) => {
+            Registration::ServedAction(action, _share) => {
                 self.withdraw_action(&action, id);
             }
         }
@@ -207,7 +207,7 @@ impl Registry {
     pub(super) fn forget(&mut self, id: ConnectionId) {
         self.withdraw(id);
         self.services.forget_caller(id);
-        self.pursuers.forget_sender(id);
+        self.action_servers.forget_sender(id);
         self.ended.remove(&id);
         if let Some(client) = self.clients.remove(&id) {
             client.outlets.gone.store(true, Ordering::Relaxed);
@@ -251,7 +251,7 @@ impl Registry {
 
     /// Whether messages on the topic of that absolute name are to be made.
     pub(super) fn is_wanted(&self, topic: &str) -> bool {
-        self.ear.is_open() || self.topics.has_subscribers(topic)
+        self.tap.is_set() || self.topics.has_subscribers(topic)
     }
 
     /// Nobody wants messages on that topic any more.
@@ -319,7 +319,7 @@ impl Registry {
 }
 
 /// Who sent the frame that is being performed, and its `id`.
-pub(super) struct FrameOrigin {
+pub(crate) struct FrameOrigin {
     pub(super) from: ConnectionId,
     pub(super) id: Option<Payload>,
 }

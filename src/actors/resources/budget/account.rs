@@ -164,8 +164,8 @@ impl Account {
         self.places.load(Ordering::Relaxed) + self.shared.load(Ordering::Relaxed)
     }
 
-    /// So many topic messages, of so many bytes together, wait for the client now, and others, of `writing` bytes with
-    /// their places, are being written to it. Told by its connection alone.
+    /// Sets what the client is charged for: `count` topic messages of `bytes` wait, and others, of `writing` bytes with
+    /// their places, are being written. Called by its connection alone.
     pub fn queue(&self, count: usize, bytes: usize, writing: usize) {
         self.writing.store(writing, Ordering::Relaxed);
         let whole = bytes + count * FRAME_BYTES;
@@ -179,8 +179,8 @@ impl Account {
         }
     }
 
-    /// Waits until something is asked of the client: true if that is its connection, false if it is the topic messages
-    /// that wait for it, but for [`MESSAGES_LEFT`].
+    /// Waits until the client has to give something up: true if that is its connection, false if it is the topic
+    /// messages that wait for it, all but [`MESSAGES_LEFT`].
     pub async fn asked(&self) -> bool {
         loop {
             match self.asked.load(Ordering::SeqCst) {

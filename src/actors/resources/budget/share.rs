@@ -37,13 +37,14 @@ impl Account {
         Freed::of(&self.sum, self.shared.load(Ordering::Relaxed))
     }
 
-    /// Takes `bytes` for an answer that is to be computed. An eighth of all that there is is left for what needs no
-    /// promise, and another for answers of no more than [`MODEST_PART`] of it, so that they find room beside as many
-    /// long ones as there may be.
+    /// Reserves `bytes` for an answer that is to be computed. An eighth of the limit is kept for what needs no promise,
+    /// and another eighth for answers of at most one part in [`MODEST_PART`] of the limit, so that they find room
+    /// beside any number of long ones.
     ///
     /// # Errors
-    /// Says whether room can be expected: what others compute ends soon, what clients do not read may stay. Not after
-    /// `patience` has run out, if somebody holds more than this client would: it gives way then.
+    /// If there is no room. Says whether some can be expected: computations of others end soon, messages that
+    /// clients do not read may stay. With `is_out_of_patience` there is room if somebody holds more than this client
+    /// would: that one gives way.
     pub fn promise(
         self: &Arc<Self>,
         bytes: usize,

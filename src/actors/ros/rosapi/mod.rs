@@ -33,7 +33,7 @@ const MANY: usize = 64;
 // ---- state ----------------------------------------------------------------------------------------------------------
 
 /// The node `rosapi` beside an arm of `N` links.
-pub struct Rosapi<const N: usize> {
+pub struct RosapiNode<const N: usize> {
     registry: Recipient<TakeCensus>,
     arm: ArmParameters<N>,
 }
@@ -64,7 +64,7 @@ impl<const N: usize> ArmParameters<N> {
     }
 }
 
-impl<const N: usize> Rosapi<N> {
+impl<const N: usize> RosapiNode<N> {
     /// A node that asks the registry who is there and the arm for its values.
     #[must_use]
     pub fn new(registry: Recipient<TakeCensus>, arm: ArmParameters<N>) -> Self {
@@ -91,13 +91,13 @@ impl<const N: usize> Rosapi<N> {
 
 // ---- life cycle -----------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Actor for Rosapi<N> {
+impl<const N: usize> Actor for RosapiNode<N> {
     type Context = Context<Self>;
 }
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
 
-impl<const N: usize> Handler<Call<Look>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<Look>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<Look>, ctx: &mut Context<Self>) {
@@ -130,7 +130,7 @@ impl<const N: usize> Handler<Call<Look>> for Rosapi<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<GetTime>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<GetTime>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<GetTime>, ctx: &mut Context<Self>) {
@@ -143,7 +143,7 @@ impl<const N: usize> Handler<Call<GetTime>> for Rosapi<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<GetParam<N>>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<GetParam<N>>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<GetParam<N>>, ctx: &mut Context<Self>) {
@@ -157,7 +157,7 @@ impl<const N: usize> Handler<Call<GetParam<N>>> for Rosapi<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<SetParam<N>>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<SetParam<N>>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, call: Call<SetParam<N>>, ctx: &mut Context<Self>) {
@@ -173,7 +173,7 @@ impl<const N: usize> Handler<Call<SetParam<N>>> for Rosapi<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<HasParam>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<HasParam>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, mut call: Call<HasParam>, _: &mut Context<Self>) {
@@ -181,7 +181,7 @@ impl<const N: usize> Handler<Call<HasParam>> for Rosapi<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<DeleteParam>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<DeleteParam>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, mut call: Call<DeleteParam>, _: &mut Context<Self>) {
@@ -192,7 +192,7 @@ impl<const N: usize> Handler<Call<DeleteParam>> for Rosapi<N> {
     }
 }
 
-impl<const N: usize> Handler<Call<GetParamNames>> for Rosapi<N> {
+impl<const N: usize> Handler<Call<GetParamNames>> for RosapiNode<N> {
     type Result = ();
 
     fn handle(&mut self, mut call: Call<GetParamNames>, _: &mut Context<Self>) {

@@ -1,4 +1,4 @@
-//! The operations of actions: goals and cancellations from those who send them, the rest from those who pursue them.
+//! The operations of actions: goals and cancellations from those who send them, the rest from action servers.
 //!
 //! **Invariant:** an end has a status of `action_msgs/msg/GoalStatus`, also where its sender leaves that out.
 
@@ -6,7 +6,7 @@ use serde_json::value::RawValue;
 
 use super::OpReader;
 use crate::protocol::catalog::Action;
-use crate::protocol::op::{ActionGoal, GoalStatus, Op, OpError, Problem, PursuerOp};
+use crate::protocol::op::{ActionGoal, ActionServerOp, GoalStatus, Op, OpError, Problem};
 use crate::protocol::wire::json;
 use crate::protocol::wire::payload::Payload;
 
@@ -38,30 +38,30 @@ impl OpReader<'_> {
         })
     }
 
-    /// An operation of a client that pursues goals.
-    pub(super) fn pursuit(&self) -> Result<Op, Problem> {
+    /// An operation of an action server.
+    pub(super) fn serve_action(&self) -> Result<Op, Problem> {
         let action = self.name("action")?;
-        let pursuit = match self.op {
-            "advertise_action" => PursuerOp::Advertise {
+        let op = match self.op {
+            "advertise_action" => ActionServerOp::Advertise {
                 type_name: self.optional_text("type")?,
             },
-            "unadvertise_action" => PursuerOp::Unadvertise,
+            "unadvertise_action" => ActionServerOp::Unadvertise,
             "action_feedback" => {
                 self.required("id")?;
                 let values = self.required("values")?.into();
-                PursuerOp::Feedback { values }
+                ActionServerOp::Feedback { values }
             }
             _ => {
                 self.required("id")?;
                 let is_good = self.boolean("result")?;
-                PursuerOp::End {
+                ActionServerOp::End {
                     values: Payload::from(self.get("values").unwrap_or(RawValue::NULL)),
                     status: self.goal_status(is_good)?,
                     result: is_good,
                 }
             }
         };
-        Ok(Op::Pursue { action, pursuit })
+        Ok(Op::ServeAction { action, op })
     }
 
     fn goal_status(&self, is_good: bool) -> Result<u8, Problem> {

@@ -170,7 +170,7 @@ impl<'a> OpReader<'a> {
                 token: self.secret()?,
             },
             "service_response" => self.response()?,
-            _ => self.pursuit()?,
+            _ => self.serve_action()?,
         })
     }
 

@@ -1,6 +1,6 @@
-//! The part of a frame that the runtime's own nodes get: no more than they have a use for.
+//! The part of a frame that is for the runtime's own nodes: only the members that they have a use for.
 //!
-//! **Invariant:** it has at most [`MAX_ARGS`] bytes, so that it costs a node's thread next to nothing to read it.
+//! **Invariant:** it has at most [`MAX_ARGS`] bytes, so that the gateway's thread reads it in next to no time.
 
 use std::collections::BTreeMap;
 

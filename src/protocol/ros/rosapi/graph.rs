@@ -23,7 +23,7 @@ pub struct Census {
     pub topics: Vec<Arc<ListedTopic>>,
     /// Services that clients provide, by absolute name.
     pub services: Vec<Arc<ListedService>>,
-    /// Actions that clients pursue, by absolute name.
+    /// Actions that clients serve, by absolute name.
     pub actions: Vec<Arc<ListedService>>,
     /// The runtime's own services, where they are not those of the live arm: a record is replayed.
     pub replayed: Option<Arc<BTreeSet<Service>>>,
@@ -42,7 +42,7 @@ pub struct ListedTopic {
     pub subscribed: bool,
 }
 
-/// A service that a client provides, or an action that it pursues.
+/// A service that a client provides, or an action that it serves.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ListedService {
     /// Its name.

@@ -12,7 +12,7 @@
 
 #![allow(
     clippy::indexing_slicing,
-    reason = "indices run over 0..N, and over the coefficients reckoned so far, as they do in the recurrences"
+    reason = "indices run over 0..N, and over the coefficients computed so far, as they do in the recurrences"
 )]
 
 use super::double_double::DoubleDouble as Real;

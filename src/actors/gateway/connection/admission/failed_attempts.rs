@@ -1,0 +1,117 @@
+//! The rate of failed authentication: wrong tokens of one address are answered ten a second and no faster.
+//!
+//! Only wrong tokens wait. The right one is admitted at once, from wherever it comes: whoever guesses on the holder's
+//! own machine must not lock the holder out. Guessing is slow by this, and hopeless by the
+//! [length](crate::protocol::op::token::MIN_TOKEN) of a token: that no answer comes is an answer too.
+//!
+//! **Invariant:** so many addresses are kept in mind and no more, whoever guesses from wherever.
+
+use std::collections::HashMap;
+use std::net::{IpAddr, Ipv6Addr};
+use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use crate::actors::gateway::limits::HEAD_TIME;
+
+/// Time between two answers to wrong tokens of one address.
+pub const ATTEMPT_INTERVAL: Duration = Duration::from_millis(100);
+/// Wrong tokens that are answered at once after a while without any: people mistype, and a page that was open before
+/// the token changed asks with the old one.
+pub const FREE_ATTEMPTS: u32 = 5;
+/// Addresses that are kept in mind, some 64 KiB of them. Who has more of them is not slowed down by this.
+pub const MAX_ADDRESSES: usize = 1024;
+
+/// Addresses with failed attempts of late. For each, when all of them would have been answered at one every
+/// [`ATTEMPT_INTERVAL`]: it runs ahead of now with every attempt.
+#[derive(Debug, Default)]
+pub(crate) struct FailedAttempts(Mutex<HashMap<IpAddr, Instant>>);
+
+impl FailedAttempts {
+    /// How long the answer to a wrong token waits that came from there now; `None` if there are so many that it is
+    /// not answered.
+    pub(crate) fn wait(&self, from: IpAddr) -> Option<Duration> {
+        let (now, from) = (Instant::now(), network(from));
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if known.len() >= MAX_ADDRESSES && !known.contains_key(&from) {
+            let calmest = known.iter().min_by_key(|(_, even)| **even);
+            if let Some(calmest) = calmest.map(|(address, _)| *address) {
+                known.remove(&calmest);
+            }
+        }
+        let even = known.entry(from).or_insert(now);
+        let ahead = even.saturating_duration_since(now);
+        let wait = ahead.saturating_sub(ATTEMPT_INTERVAL * (FREE_ATTEMPTS - 1));
+        if wait >= HEAD_TIME {
+            return None;
+        }
+        *even = now + ahead + ATTEMPT_INTERVAL;
+        Some(wait)
+    }
+}
+
+/// The address, or of IPv6 the network that one network has at least.
+fn network(address: IpAddr) -> IpAddr {
+    match address.to_canonical() {
+        IpAddr::V6(address) => {
+            let [a, b, c, d, ..] = address.segments();
+            Ipv6Addr::new(a, b, c, d, 0, 0, 0, 0).into()
+        }
+        address @ IpAddr::V4(_) => address,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const HERE: IpAddr = IpAddr::V4(std::net::Ipv4Addr::LOCALHOST);
+
+    #[tokio::test(start_paused = true)]
+    async fn a_few_are_answered_at_once_and_then_ten_a_second() {
+        let attempts = FailedAttempts::default();
+        for _ in 0..FREE_ATTEMPTS {
+            assert_eq!(attempts.wait(HERE), Some(Duration::ZERO));
+        }
+        for number in 1..50 {
+            assert_eq!(attempts.wait(HERE), Some(number * ATTEMPT_INTERVAL));
+        }
+        assert_eq!(attempts.wait(HERE), None, "too far ahead");
+        let elsewhere = "192.0.2.1".parse().unwrap();
+        assert_eq!(attempts.wait(elsewhere), Some(Duration::ZERO));
+        tokio::time::advance(Duration::from_secs(1)).await;
+        assert_eq!(attempts.wait(HERE), Some(40 * ATTEMPT_INTERVAL));
+        tokio::time::advance(Duration::from_secs(60)).await;
+        assert_eq!(attempts.wait(HERE), Some(Duration::ZERO), "forgiven");
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn so_many_addresses_are_kept_and_the_calmest_goes_first() {
+        let attempts = FailedAttempts::default();
+        for _ in 0..=FREE_ATTEMPTS {
+            attempts.wait(HERE);
+        }
+        for number in 0..2 * MAX_ADDRESSES {
+            let bits = u32::try_from(number).unwrap();
+            assert!(attempts.wait(IpAddr::V4(bits.into())).is_some());
+            assert!(attempts.0.lock().unwrap().len() <= MAX_ADDRESSES);
+        }
+        assert_eq!(
+            attempts.wait(HERE),
+            Some(2 * ATTEMPT_INTERVAL),
+            "not forgotten"
+        );
+    }
+
+    #[test]
+    fn an_address_is_a_household() {
+        let same = |one: &str, other: &str| {
+            network(one.parse().unwrap()) == network(other.parse().unwrap())
+        };
+        assert!(same("2001:db8::1", "2001:db8::2:3"));
+        assert!(same("::ffff:192.0.2.1", "192.0.2.1"));
+        assert!(!same("2001:db8::1", "2001:db8:0:1::1"));
+        assert!(!same("192.0.2.1", "192.0.2.2"));
+    }
+}

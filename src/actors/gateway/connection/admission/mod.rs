@@ -1,0 +1,78 @@
+//! Admission: the conditions under which a client is served, whichever protocol it speaks.
+//!
+//! **Invariant:** with a token set, nothing is done for a client that has not shown it, and those that have not,
+//! however many and however silent, keep nobody out who has.
+
+pub(super) mod authentication;
+mod failed_attempts;
+mod slots;
+
+use self::failed_attempts::FailedAttempts;
+pub use self::failed_attempts::{ATTEMPT_INTERVAL, FREE_ATTEMPTS, MAX_ADDRESSES};
+use self::slots::Slots;
+use crate::protocol::op::token::Token;
+#[cfg(feature = "web")]
+use crate::web::{MAX_REQUESTS, Site};
+
+/// Bytes that a client may send before it has shown its token.
+pub const MAX_AUTH_BYTES: usize = 16 * 1024;
+/// Connections that have not shown the token yet. They are counted apart from the clients, and the oldest makes room
+/// for the next: whoever shows the token at once is never the oldest of so many.
+pub const MAX_UNAUTHENTICATED: usize = 128;
+
+/// Requests whose heads are not complete: the oldest makes room for the next, and a browser sends a head at once.
+#[cfg(feature = "web")]
+pub const MAX_HEADS: usize = 128;
+
+/// The conditions under which a listener admits clients.
+#[derive(Debug, Default)]
+pub struct Admission {
+    /// Every client has to show this, if it is set.
+    pub token: Option<Token>,
+    /// Says which clients are served over HTTP, and with which files.
+    #[cfg(feature = "web")]
+    pub site: Site,
+    /// The clients that are not admitted yet.
+    pub newcomers: Newcomers,
+}
+
+/// The clients that are not admitted yet, and the addresses whose tokens were wrong.
+#[derive(Debug)]
+pub struct Newcomers {
+    /// Slots of clients that have to show the token and have not.
+    pub(super) unauthenticated: Slots,
+    pub(super) failed_attempts: FailedAttempts,
+    /// Slots of requests whose heads are not complete, where there is no token to be shown.
+    #[cfg(feature = "web")]
+    pub(super) heads: Slots,
+    /// Slots of responses to requests.
+    #[cfg(feature = "web")]
+    pub(super) answers: Slots,
+    /// Slots of responses that are files of the report, apart: a client that takes one slowly keeps nobody from the
+    /// page.
+    #[cfg(feature = "web")]
+    pub(super) files: Slots,
+}
+
+impl Newcomers {
+    /// With so many slots for those that have not shown the token yet.
+    #[must_use]
+    pub fn of(unauthenticated: usize) -> Self {
+        Self {
+            unauthenticated: Slots::new(unauthenticated),
+            failed_attempts: FailedAttempts::default(),
+            #[cfg(feature = "web")]
+            heads: Slots::new(MAX_HEADS),
+            #[cfg(feature = "web")]
+            answers: Slots::new(MAX_REQUESTS),
+            #[cfg(feature = "web")]
+            files: Slots::new(MAX_REQUESTS),
+        }
+    }
+}
+
+impl Default for Newcomers {
+    fn default() -> Self {
+        Self::of(MAX_UNAUTHENTICATED)
+    }
+}

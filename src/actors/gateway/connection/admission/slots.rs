@@ -1,0 +1,121 @@
+//! A fixed number of slots. When all are in use, a newcomer evicts the oldest holder.
+//!
+//! Clients that finish quickly keep their slot; only idle ones are evicted. Refusing the newcomer would shut out honest
+//! clients.
+//!
+//! A holder that needs room which is counted elsewhere may evict the oldest ones until there is enough.
+//!
+//! **Invariant:** never more slots are held than there are.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use tokio::sync::Notify;
+
+/// The slots, oldest first: each is notified when it is evicted.
+#[derive(Debug)]
+pub(crate) struct Slots {
+    most: usize,
+    taken: Mutex<VecDeque<Arc<Notify>>>,
+}
+
+impl Slots {
+    /// So many slots, all of them free.
+    pub(crate) fn new(most: usize) -> Self {
+        Self {
+            most,
+            taken: Mutex::default(),
+        }
+    }
+
+    /// Takes a slot: the oldest one, if none is free.
+    pub(crate) fn take(&self) -> HeldSlot<'_> {
+        let notice = Arc::new(Notify::new());
+        let mut taken = self.taken();
+        if taken.len() >= self.most {
+            evict(&mut taken);
+        }
+        taken.push_back(Arc::clone(&notice));
+        HeldSlot {
+            slots: self,
+            notice,
+        }
+    }
+
+    fn taken(&self) -> MutexGuard<'_, VecDeque<Arc<Notify>>> {
+        self.taken.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+fn evict(taken: &mut VecDeque<Arc<Notify>>) {
+    if let Some(oldest) = taken.pop_front() {
+        oldest.notify_one();
+    }
+}
+
+/// A slot that is held; it is free again when this is dropped.
+#[derive(Debug)]
+pub(crate) struct HeldSlot<'a> {
+    slots: &'a Slots,
+    notice: Arc<Notify>,
+}
+
+impl HeldSlot<'_> {
+    /// Ends when somebody else has the slot. To be awaited until then, not beyond.
+    pub(crate) async fn evicted(&self) {
+        self.notice.notified().await;
+    }
+
+    /// Evicts the oldest slot. Returns false if this is the oldest or has been evicted.
+    #[cfg(feature = "web")]
+    pub(crate) fn evict_oldest(&self) -> bool {
+        let mut taken = self.slots.taken();
+        let is_behind = taken
+            .iter()
+            .skip(1)
+            .any(|one| Arc::ptr_eq(one, &self.notice));
+        if is_behind {
+            evict(&mut taken);
+        }
+        is_behind
+    }
+}
+
+impl Drop for HeldSlot<'_> {
+    fn drop(&mut self) {
+        let mut taken = self.slots.taken();
+        taken.retain(|one| !Arc::ptr_eq(one, &self.notice));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use tokio::time::timeout;
+
+    use super::*;
+
+    async fn is_evicted(slot: &HeldSlot<'_>) -> bool {
+        timeout(Duration::ZERO, slot.evicted()).await.is_ok()
+    }
+
+    #[tokio::test]
+    async fn the_oldest_slot_goes_to_who_comes_when_all_are_held() {
+        let slots = Slots::new(2);
+        let (first, second) = (slots.take(), slots.take());
+        drop(first);
+        let third = slots.take();
+        assert!(!is_evicted(&second).await, "there was one left");
+        let fourth = slots.take();
+        assert!(
+            is_evicted(&second).await && !is_evicted(&third).await && !is_evicted(&fourth).await
+        );
+        drop(second);
+        assert_eq!(
+            slots.taken().len(),
+            2,
+            "what was evicted is not given back twice"
+        );
+    }
+}

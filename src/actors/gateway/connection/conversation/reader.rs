@@ -1,0 +1,233 @@
+//! The reading task of a connection: frames as they come, one op at a time. [`perform`](super::perform) has what is
+//! done about each.
+//!
+//! **Invariant:** the next frame is looked at only when the last op has taken effect (pure computations excepted), so
+//! all that a client asks of the runtime happens in the order in which it asked. A series of messages counts as one op.
+
+use std::rc::Rc;
+
+use actix::prelude::*;
+use bytes::BytesMut;
+use tokio::time::{Instant, timeout, timeout_at};
+
+use crate::actors::ConnectionId;
+use crate::actors::gateway::connection::shared::Shared;
+use crate::actors::gateway::connection::transport::{CHUNK, Inbound, discard};
+use crate::actors::gateway::connection::unfinished::Unfinished;
+use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN, RESPONSES_OWED};
+use crate::actors::gateway::messages::{Disconnect, Ended, Finish, Retire};
+use crate::actors::gateway::turns;
+use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
+use crate::protocol::wire::frame::{Cut, FrameReader};
+
+/// The error for a frame that takes longer than [`FRAME_TIME`](crate::actors::gateway::limits::FRAME_TIME).
+const TOO_SLOW: &str = "a frame that has begun must be complete within a minute";
+
+/// The reading half of a connection.
+pub(crate) struct Reader {
+    pub(super) id: ConnectionId,
+    pub(super) shared: Rc<Shared>,
+    finish: Recipient<Finish>,
+    frames: FrameReader,
+    /// Frames that come in pieces.
+    pub(super) fragments: Fragments,
+    /// Counts the frames and messages that are not complete yet.
+    unfinished: Unfinished,
+    /// A JSON object has come. This is no HTTP request then: its head would have come first.
+    pub(super) speaks_json: bool,
+    /// The stream has ended; what came before may still wait.
+    has_ended: bool,
+}
+
+impl Reader {
+    pub(super) fn new(
+        id: ConnectionId,
+        shared: Rc<Shared>,
+        finish: Recipient<Finish>,
+        frames: FrameReader,
+        unfinished: Unfinished,
+    ) -> Self {
+        Self {
+            id,
+            shared,
+            finish,
+            frames,
+            fragments: Fragments::default(),
+            unfinished,
+            speaks_json: false,
+            has_ended: false,
+        }
+    }
+
+    /// Whether frames may be binary: over raw TCP they are lines of text.
+    pub(super) const fn takes_binary(&self) -> bool {
+        self.frames.is_of_messages()
+    }
+
+    /// Reads until the client ends or is refused, then lets the connection finish; `first` has been read already.
+    pub(super) async fn run<I: Inbound>(mut self, mut input: I, first: BytesMut) {
+        match self.converse(&mut input, first).await {
+            Ok(()) => self.settle().await,
+            // A broken stream takes no answers, and nobody waits for those that don't come.
+            Err(_) => self.shared.abandon_computations(),
+        }
+        // Answers that are on their way arrive before the registry answers this, and so before the end.
+        let _ = self.shared.registry.send(Disconnect(self.id)).await;
+        let _ = self.finish.send(Finish).await;
+        if self.shared.is_refused() {
+            discard(input).await;
+        }
+    }
+
+    /// Handles frames until the stream ends or the client is refused; an error if it broke.
+    async fn converse<I: Inbound>(
+        &mut self,
+        input: &mut I,
+        mut chunk: BytesMut,
+    ) -> std::io::Result<()> {
+        loop {
+            let full = chunk.len() >= CHUNK / 2;
+            self.frames.push(&chunk);
+            chunk.clear();
+            let mut in_a_row = 0;
+            while let Some(cut) = self.next(input, &mut chunk).await? {
+                in_a_row += 1;
+                if in_a_row > FREE_FRAMES {
+                    turns::read().await;
+                }
+                self.unfinished.begin_anew();
+                self.take(cut).await;
+                if self.shared.is_refused() {
+                    return Ok(());
+                }
+            }
+            self.keep_unfinished(&chunk);
+            if full {
+                // A long frame comes in many chunks, all of them at hand.
+                turns::read().await;
+            }
+            if self.shared.is_finishing() {
+                break;
+            }
+            if !chunk.is_empty() {
+                continue;
+            }
+            if self.has_ended {
+                break;
+            }
+            match self.read(input, &mut chunk).await? {
+                Some(0) => self.note_end(),
+                Some(_) => {}
+                None => {
+                    self.refuse(TOO_SLOW);
+                    return Ok(());
+                }
+            }
+        }
+        if let Some(error) = self.frames.finish() {
+            self.complain(&error.to_string(), None).await;
+        }
+        Ok(())
+    }
+
+    /// The client has ended its stream: from now on it only waits.
+    fn note_end(&mut self) {
+        self.has_ended = true;
+        self.shared.registry.do_send(Ended(self.id));
+    }
+
+    /// Reads on; `None` if a frame that has begun takes too long. Meanwhile pieces of messages grow old, and are
+    /// forgotten.
+    async fn read<I: Inbound>(
+        &mut self,
+        input: &mut I,
+        chunk: &mut BytesMut,
+    ) -> std::io::Result<Option<usize>> {
+        loop {
+            let began = Instant::now();
+            let is_unfinished = self.frames.is_unfinished();
+            let late = is_unfinished.then(|| began + self.unfinished.time_left());
+            let oldest = self.fragments.oldest().map(Instant::from_std);
+            let old = oldest.map(|oldest| oldest + MAX_AGE + LOOK_AGAIN);
+            let read = match late.into_iter().chain(old).min() {
+                None => return input.read(chunk).await.map(Some),
+                Some(due) => timeout_at(due, input.read(chunk)).await,
+            };
+            let received = read.as_ref().map_or(0, |read| *read.as_ref().unwrap_or(&0));
+            if is_unfinished {
+                self.unfinished.wait(began.elapsed(), received);
+            }
+            if let Ok(read) = read {
+                return read.map(Some);
+            }
+            if is_unfinished && self.unfinished.time_left().is_zero() {
+                return Ok(None);
+            }
+            self.fragments.forget_old(Instant::now().into_std());
+            self.keep_unfinished(chunk);
+        }
+    }
+
+    /// Counts what is kept of what is not complete yet.
+    fn keep_unfinished(&mut self, chunk: &BytesMut) {
+        if !self.frames.is_unfinished() {
+            self.unfinished.begin_anew();
+        }
+        let kept = self.frames.buffered() + self.fragments.allocated() + chunk.capacity();
+        self.unfinished.keep(kept);
+    }
+
+    /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
+    /// answer or withdraw, and waits for the responses that it is owed.
+    async fn settle(&self) {
+        let answered = async {
+            if let Ok(handled) = self.shared.registry.send(Retire(self.id)).await {
+                handled.effect().await;
+            }
+            while self.shared.is_computing() {
+                self.shared.room.notified().await;
+            }
+        };
+        if timeout(RESPONSES_OWED, answered).await.is_err() {
+            self.shared.abandon_computations();
+        }
+    }
+
+    /// Cuts off what is complete, once the client's frames may be performed. Until then `chunk` takes the bytes that
+    /// follow: a little of it, so that its end is seen.
+    async fn next<I: Inbound>(
+        &mut self,
+        input: &mut I,
+        chunk: &mut BytesMut,
+    ) -> std::io::Result<Option<Cut>> {
+        while !self.shared.may_read() && !self.shared.is_finishing() {
+            self.wait_for_room(input, chunk).await?;
+        }
+        Ok(self.frames.cut())
+    }
+
+    /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`]. An error if the client
+    /// is gone; one that has ended its stream is taken for gone when nothing was for [`RESPONSES_OWED`].
+    async fn wait_for_room<I: Inbound>(
+        &mut self,
+        input: &mut I,
+        chunk: &mut BytesMut,
+    ) -> std::io::Result<()> {
+        let shared = Rc::clone(&self.shared);
+        if self.has_ended {
+            let room = timeout(RESPONSES_OWED, shared.room.notified()).await;
+            return room.map_err(|_| std::io::ErrorKind::TimedOut.into());
+        }
+        tokio::select! {
+            biased;
+            () = shared.room.notified() => {}
+            read = input.read(chunk), if chunk.len() < CHUNK => {
+                if read? == 0 {
+                    self.note_end();
+                }
+                self.keep_unfinished(chunk);
+            }
+        }
+        Ok(())
+    }
+}

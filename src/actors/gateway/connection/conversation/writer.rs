@@ -1,0 +1,130 @@
+//! Writing to one client: drains the outbox, several frames at a time. Nothing else writes to the socket of a client
+//! that is served.
+//!
+//! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
+//! put into the outbox is offered to the socket in the same turn. Where it waits in a queue
+//! ([`turns`](crate::actors::gateway::turns)), it is polled in its turn. A client that takes nothing wakes it when it
+//! does.
+//!
+//! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
+
+use bytes::{Buf, Bytes};
+use tokio::time::{Instant, sleep_until, timeout, timeout_at};
+
+use crate::actors::gateway::connection::shared::Shared;
+use crate::actors::gateway::connection::transport::Outbound;
+use crate::actors::gateway::limits::{LINGER, WRITE_BYTES};
+
+/// Writes until the connection has finished, its client is gone, or its client has stalled for too long.
+/// Returns whether all that was queued has been written.
+pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
+    let mut frames = Vec::new();
+    loop {
+        wait_for_turn(shared).await;
+        shared.outgoing.take(&mut frames);
+        if !frames.is_empty() {
+            if !write_frames(&mut output, &mut frames, shared).await {
+                return false;
+            }
+        } else if shared.is_done() {
+            return timeout(LINGER, output.end()).await.is_ok();
+        } else if !tend(&mut output, shared).await {
+            return false;
+        } else {
+            wait(shared).await;
+        }
+    }
+}
+
+/// Waits where many are written to. Responses wait for no turn.
+async fn wait_for_turn(shared: &Shared) {
+    let outgoing = &shared.outgoing;
+    if let Some(bytes) = outgoing.topics_alone()
+        && !outgoing.queue().may_write(bytes)
+    {
+        outgoing.wait_for_turn(bytes).await;
+    }
+}
+
+/// Lets the transport say what it has to; false if the client is gone or stalled.
+async fn tend<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
+    tokio::select! {
+        biased;
+        tended = output.tend() => tended.is_some(),
+        () = stalled(shared) => false,
+    }
+}
+
+/// Waits until there is something to write, or nothing more will be. Both are looked at here: the news of it may have
+/// come while the transport had something to say.
+async fn wait(shared: &Shared) {
+    let outgoing = &shared.outgoing;
+    let news = outgoing.news(|| !outgoing.is_empty() || shared.is_done());
+    match outgoing.next_release() {
+        None => news.await,
+        Some(release) => {
+            let _ = timeout_at(release, news).await;
+        }
+    }
+}
+
+/// Writes all of the frames; false if the client is gone or stalled.
+async fn write_frames<O: Outbound>(
+    output: &mut O,
+    frames: &mut Vec<Bytes>,
+    shared: &Shared,
+) -> bool {
+    let mut first = 0;
+    while first < frames.len() {
+        let written = tokio::select! {
+            biased;
+            written = output.write(frames.get(first..).unwrap_or_default()) => written,
+            () = stalled(shared) => return false,
+        };
+        let Some(mut left) = written else {
+            return false;
+        };
+        shared.written(left);
+        let fair = left >= WRITE_BYTES / 2;
+        while left > 0 {
+            let Some(frame) = frames.get_mut(first) else {
+                break;
+            };
+            let step = left.min(frame.len());
+            frame.advance(step);
+            left -= step;
+            if frame.is_empty() {
+                first += 1;
+            }
+        }
+        if fair {
+            tokio::task::yield_now().await;
+        }
+    }
+    frames.clear();
+    true
+}
+
+/// Ends when the client has taken nothing from now on for too long: while responses wait, or because the connection is
+/// finishing.
+async fn stalled(shared: &Shared) {
+    let last_byte = Instant::now();
+    let patience = || shared.outgoing.patience(last_byte, shared.is_finishing());
+    loop {
+        let limit = patience();
+        let changed = shared.outgoing.news(|| patience() != limit);
+        match limit {
+            None => changed.await,
+            Some(limit) => tokio::select! {
+                biased;
+                () = sleep_until(limit) => {
+                    // It may have taken some of what is being written.
+                    if patience() == Some(limit) {
+                        return;
+                    }
+                }
+                () = changed => {}
+            },
+        }
+    }
+}

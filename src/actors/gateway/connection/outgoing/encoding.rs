@@ -1,0 +1,116 @@
+//! Topic messages that wait to be encoded for the client, one after the other, on another thread.
+//!
+//! **Invariant:** a client's topic messages keep their order: what comes behind one that is being encoded waits for
+//! it.
+
+use std::rc::{Rc, Weak};
+
+use tokio::time::sleep;
+
+use super::Outgoing;
+use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN};
+use crate::actors::gateway::messages::{Deliver, Frames};
+use crate::actors::gateway::turns;
+use crate::protocol::outbox::MAX_TOPIC_BYTES;
+
+/// While more bytes of topic messages than this wait for the client, nothing more is encoded for it: it might be
+/// dropped unread.
+const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
+
+impl Outgoing {
+    /// Takes topic messages for the client: into the outbox if they are ready and nothing waits to be encoded, else
+    /// behind what does. Feedback of a goal is always ready.
+    pub(crate) fn accept(self: &Rc<Self>, message: Deliver) {
+        let waits = self.is_encoding() && !matches!(message.frames, Frames::Feedback(_));
+        let left = if waits {
+            Some(message)
+        } else {
+            self.pass(message)
+        };
+        let Some(message) = left else {
+            return;
+        };
+        let mut unencoded = self.unencoded.borrow_mut();
+        self.charge.count_dropped(unencoded.push(message));
+        if !std::mem::replace(&mut unencoded.at_work, true) {
+            actix_rt::spawn(EncodingTask(Rc::downgrade(self)).run());
+        }
+    }
+
+    /// Whether messages wait to be encoded.
+    pub(crate) fn is_encoding(&self) -> bool {
+        self.unencoded.borrow().at_work
+    }
+
+    /// Puts messages that are ready into the outbox; gives them back if they are not.
+    fn pass(&self, message: Deliver) -> Option<Deliver> {
+        match message.frames {
+            Frames::Plain(frame) | Frames::Feedback(frame) => self.push(&message.topic, frame),
+            Frames::Encoded(ref encoded, newest) => {
+                let Some(made) = encoded.at_hand() else {
+                    return Some(message);
+                };
+                self.charge.count_dropped(made.lost);
+                let frames = &made.messages;
+                // The first may be due; all others but the newest would be replaced by those.
+                let last = newest.map_or(0, |newest| frames.len().saturating_sub(newest));
+                let wanted = frames.iter().enumerate();
+                for (_, frame) in wanted.filter(|(at, _)| *at == 0 || *at >= last) {
+                    self.push(&message.topic, frame.clone());
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The task; the connection may end before it.
+struct EncodingTask(Weak<Outgoing>);
+
+impl Drop for EncodingTask {
+    fn drop(&mut self) {
+        if let Some(outgoing) = self.0.upgrade() {
+            outgoing.unencoded.borrow_mut().at_work = false;
+            // The writer may have waited for this to end.
+            outgoing.wake_writer();
+        }
+    }
+}
+
+impl EncodingTask {
+    async fn run(self) {
+        while let Some(outgoing) = self.0.upgrade() {
+            let next = outgoing.unencoded.borrow_mut().begin();
+            let Some((number, message)) = next else {
+                return;
+            };
+            drop(outgoing);
+            if let Frames::Encoded(encoded, newest) = &message.frames {
+                // Throttling keeps the newest: it has to see all of them.
+                while newest.is_none() && encoded.at_hand().is_none() && self.has_enough() {
+                    sleep(LOOK_AGAIN).await;
+                }
+                if encoded.messages().await.messages.len() > FREE_FRAMES {
+                    // Many clients may have as many to go through.
+                    turns::read().await;
+                }
+            }
+            if let Some(outgoing) = self.0.upgrade() {
+                let unencoded = outgoing.unencoded.borrow();
+                let is_wanted = unencoded.is_wanted(number, &message.topic);
+                drop(unencoded);
+                if is_wanted {
+                    let _ = outgoing.pass(message);
+                    outgoing.turn.note_encoded();
+                }
+                outgoing.wake_writer();
+            }
+            tokio::task::yield_now().await;
+        }
+    }
+
+    fn has_enough(&self) -> bool {
+        let outgoing = self.0.upgrade();
+        outgoing.is_some_and(|outgoing| outgoing.topic_bytes() > ENOUGH)
+    }
+}

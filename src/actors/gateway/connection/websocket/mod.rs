@@ -1,0 +1,337 @@
+//! HTTP and WebSocket clients: a request is answered and that is all, or the stream becomes a WebSocket and its
+//! client is one like any other.
+//!
+//! A WebSocket message is a frame. What is asked of the protocol beside that is done here: both sides of the stream
+//! keep sharing one socket, for reading a ping means writing a pong; a peer that shows no sign of life is given up.
+//!
+//! **Invariant:** over WebSocket no status is sent before the client has asked for such.
+
+mod link;
+mod watched;
+
+use std::future::poll_fn;
+use std::io;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::time::Duration;
+
+use bytes::{Buf, Bytes, BytesMut};
+use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::time::{Instant, sleep_until};
+use tokio_tungstenite::tungstenite::Message;
+use tokio_tungstenite::tungstenite::error::{CapacityError, Error};
+use tokio_tungstenite::tungstenite::protocol::frame::coding::{CloseCode, Data, OpCode};
+use tokio_tungstenite::tungstenite::protocol::frame::{CloseFrame, Frame, Utf8Bytes};
+
+use self::link::{FRAGMENT, Link};
+use super::session::ClientSession;
+use super::shared::{Ending, HELD_MOST, Shared};
+use super::transport::{CHUNK, Inbound, Outbound, read_some};
+use super::unfinished::First;
+use crate::actors::ConnectionId;
+use crate::actors::gateway::messages::Request;
+use crate::protocol::messages::ErrorForm;
+use crate::protocol::op::{Op, Verbosity};
+use crate::protocol::wire::frame::FrameReader;
+use crate::web::message::OneLine;
+use crate::web::serve;
+
+/// Ping interval: below the idle timeouts of NATs and proxies.
+pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
+/// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong: that can
+/// be a long way behind in a full pipe.
+pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
+impl ClientSession {
+    /// Does what a client has asked for over HTTP; `behind` came after its request.
+    pub(super) async fn serve_web<S>(
+        self,
+        mut stream: S,
+        id: ConnectionId,
+        outcome: serve::Served,
+        behind: First,
+    ) where
+        S: AsyncRead + AsyncWrite + Unpin + 'static,
+    {
+        let (answers, files) = (
+            &self.admission.newcomers.answers,
+            &self.admission.newcomers.files,
+        );
+        let slot = match &outcome {
+            serve::Served::Answer(serve::Resource::Report(_), _) => files.take(),
+            _ => answers.take(),
+        };
+        let make_room = || slot.evict_oldest();
+        let is_socket = tokio::select! {
+            biased;
+            () = self.shared.finished() => false,
+            is_socket = serve::respond(&mut stream, outcome, &self.admission.site, make_room) => is_socket,
+            () = slot.evicted() => false,
+        };
+        drop(slot);
+        if !is_socket {
+            return;
+        }
+        let quiet = Request {
+            from: id,
+            id: None,
+            op: Op::SetLevel {
+                verbosity: Verbosity::NONE,
+                errors: Some(ErrorForm::Text),
+            },
+        };
+        let _ = self.shared.registry.send(quiet).await;
+        let link = Link::open(stream, &behind.bytes, &self.shared).await;
+        let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
+        let output = Output {
+            link,
+            shared: Rc::clone(&self.shared),
+            unfinished: None,
+        };
+        let reader = self.reader(id, FrameReader::of_messages(), behind.unfinished);
+        self.talk(reader, input, output, BytesMut::new()).await;
+    }
+}
+
+/// The receiving half.
+struct Input<S> {
+    link: Rc<Link<S>>,
+    shared: Rc<Shared>,
+    next_ping: Instant,
+    /// Since when a sign of life has been waited for.
+    asked: Option<Instant>,
+    /// When the last read ended.
+    read_until: Instant,
+    /// The message that has come, while some of it has not been read.
+    line: Option<OneLine>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
+    fn new(link: Rc<Link<S>>, shared: Rc<Shared>) -> Self {
+        let now = Instant::now();
+        Self {
+            link,
+            shared,
+            next_ping: now + PING_INTERVAL,
+            asked: None,
+            read_until: now,
+            line: None,
+        }
+    }
+
+    /// The next message; an error if the peer shows no sign of life.
+    async fn next(&mut self) -> io::Result<Option<Result<Message, Error>>> {
+        loop {
+            let pong_due = self.asked.map(|asked| asked + PONG_TIME);
+            let late = self.link.socket.borrow().get_ref().late();
+            let due = pong_due.into_iter().chain(late).min();
+            let wake = due.map_or(self.next_ping, |due| due.min(self.next_ping));
+            tokio::select! {
+                biased;
+                message = self.link.next() => return Ok(message),
+                () = sleep_until(wake) => self.look_for_life()?,
+            }
+        }
+    }
+
+    /// Takes what is still to be read of a message: a long one as it would come over TCP, a chunk at a time.
+    fn take(&mut self, mut line: OneLine, chunk: &mut BytesMut) {
+        let before = chunk.len();
+        if line.append(CHUNK, chunk) {
+            let read = chunk.len() - before;
+            self.link.socket.borrow_mut().get_mut().complete(read);
+        } else {
+            self.line = Some(line);
+        }
+    }
+
+    fn look_for_life(&mut self) -> io::Result<()> {
+        let now = Instant::now();
+        let late = self.link.socket.borrow().get_ref().late();
+        if late.is_some_and(|late| late <= now) {
+            self.link.close_reason.set((CloseCode::Policy, TOO_SLOW));
+            self.shared.ending.set(Ending::Refused);
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        if let Some(asked) = self.asked {
+            if self.link.life.get() > asked {
+                self.asked = None;
+            } else if now >= asked + PONG_TIME {
+                self.link
+                    .close_reason
+                    .set((CloseCode::Away, "no sign of life"));
+                return Err(io::ErrorKind::TimedOut.into());
+            }
+        }
+        if now >= self.next_ping {
+            self.next_ping = now + PING_INTERVAL;
+            self.asked.get_or_insert(now);
+            self.link.ping_is_due.set(true);
+            self.shared.outgoing.wake_writer();
+        }
+        Ok(())
+    }
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
+    async fn read(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
+        // While nothing was read, no sign of life could be seen.
+        let unread = self.read_until.elapsed();
+        self.read_until = Instant::now();
+        self.asked = self.asked.map(|asked| asked + unread);
+        self.link.socket.borrow_mut().get_mut().read_on(unread);
+        let before = chunk.len();
+        if let Some(line) = self.line.take() {
+            self.take(line, chunk);
+        }
+        while chunk.len() == before {
+            match self.next().await? {
+                Some(Ok(Message::Text(text))) => self.take(OneLine::new(text.into()), chunk),
+                Some(Ok(Message::Binary(bytes))) => self.take(OneLine::new(bytes), chunk),
+                // Pings and closes are answered by the library, as soon as reading goes on; frames never come out of
+                // it.
+                Some(Ok(control)) => {
+                    let mut socket = self.link.socket.borrow_mut();
+                    socket.get_mut().control(control.len());
+                }
+                // The peer has closed, and takes no answers any more.
+                None => return Err(io::ErrorKind::ConnectionAborted.into()),
+                Some(Err(error)) => {
+                    self.link.close_reason.set(close_reason(&error));
+                    self.shared.ending.set(Ending::Refused);
+                    return Err(io::ErrorKind::InvalidData.into());
+                }
+            }
+        }
+        self.read_until = Instant::now();
+        Ok(chunk.len() - before)
+    }
+
+    async fn swallow(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
+        let link = &self.link;
+        poll_fn(|cx| {
+            let mut socket = link.socket.borrow_mut();
+            socket.get_mut().begin_turn();
+            let mut reading = std::pin::pin!(read_some(socket.get_mut(), chunk));
+            reading.as_mut().poll(cx)
+        })
+        .await
+    }
+}
+
+/// The reason given where a message takes longer than `FRAME_TIME`.
+const TOO_SLOW: &str = "a message that has begun must be complete within a minute";
+
+/// The reason given where a peer has broken a rule.
+fn close_reason(error: &Error) -> (CloseCode, &'static str) {
+    match error {
+        Error::Capacity(CapacityError::MessageTooLong { .. }) => {
+            (CloseCode::Size, "a message has at most 4 MiB")
+        }
+        Error::Utf8(_) => (CloseCode::Invalid, "a text message is UTF-8"),
+        _ => (CloseCode::Protocol, "not as RFC 6455 has it"),
+    }
+}
+
+/// The sending half.
+struct Output<S> {
+    link: Rc<Link<S>>,
+    shared: Rc<Shared>,
+    /// The kind of message that the next write goes on with, if it does not begin one.
+    unfinished: Option<Data>,
+}
+
+impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
+    const END_IS_ANSWERED: bool = true;
+
+    async fn write(&mut self, frames: &[Bytes]) -> Option<usize> {
+        // Pongs that wait would take the room of what is put there.
+        self.link.flush().await?;
+        let mut written = 0;
+        let mut waiting = frames.iter().cloned();
+        let mut frame = waiting.next()?;
+        loop {
+            let room = FRAGMENT.saturating_sub(written);
+            let kind = self.unfinished.unwrap_or_else(|| kind_of(&frame));
+            let (piece, is_last) = first_piece(&frame, kind == Data::Text, room);
+            if written > 0 && !is_last {
+                break;
+            }
+            written += piece.len();
+            frame.advance(piece.len());
+            let opcode = match self.unfinished {
+                Some(_) => Data::Continue,
+                None => kind,
+            };
+            self.unfinished = (!is_last).then_some(kind);
+            let payload = match piece.strip_suffix(b"\n") {
+                Some(line) if is_last && kind == Data::Text => piece.slice_ref(line),
+                _ => piece,
+            };
+            let part = Frame::message(payload, OpCode::Data(opcode), is_last);
+            self.link.put(Message::Frame(part))?;
+            if !is_last {
+                break;
+            }
+            if frame.is_empty() {
+                let Some(next) = waiting.next() else {
+                    break;
+                };
+                frame = next;
+            }
+        }
+        self.link.flush().await?;
+        Some(written)
+    }
+
+    async fn tend(&mut self) -> Option<()> {
+        // Another may be due by the time that one has gone out.
+        while self.link.ping_is_due.take() {
+            self.link.flush().await?;
+            self.link.put(Message::Ping(Bytes::new()))?;
+            self.link.flush().await?;
+        }
+        Some(())
+    }
+
+    async fn end(&mut self) -> io::Result<()> {
+        let (code, why) = if self.shared.ending.get() == Ending::CutOff {
+            (CloseCode::Again, HELD_MOST)
+        } else {
+            self.link.close_reason.get()
+        };
+        let reason = Utf8Bytes::from_static(why);
+        let gone = || io::Error::from(io::ErrorKind::ConnectionAborted);
+        let close = Message::Close(Some(CloseFrame { code, reason }));
+        self.link.flush().await.ok_or_else(gone)?;
+        self.link.put(close).ok_or_else(gone)?;
+        self.link.flush().await.ok_or_else(gone)?;
+        if !self.shared.is_refused() {
+            return Ok(());
+        }
+        // Nothing that it sends is looked at any more, a close frame included: the stream's own end has to do.
+        poll_fn(|cx| Pin::new(self.link.socket.borrow_mut().get_mut()).poll_shutdown(cx)).await
+    }
+}
+
+/// How a frame goes out: JSON begins with a brace, CBOR never does.
+fn kind_of(frame: &Bytes) -> Data {
+    if frame.first() == Some(&b'{') {
+        Data::Text
+    } else {
+        Data::Binary
+    }
+}
+
+/// As much of a frame as there is room for in one WebSocket frame, and whether a message ends there. A text may be
+/// several messages, one per line.
+fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
+    let offered = frame.slice(..frame.len().min(room));
+    if !is_text {
+        let is_last = offered.len() == frame.len();
+        return (offered, is_last);
+    }
+    match offered.iter().position(|&byte| byte == b'\n') {
+        Some(end) => (offered.slice(..=end), true),
+        None => (offered, false),
+    }
+}

@@ -1,0 +1,185 @@
+//! A WebSocket's stream, watched: for signs of life, and for what its other side has begun and not completed.
+//!
+//! **Invariant:** what is kept of unfinished messages, and what waits to be written, is charged to the client's
+//! account.
+
+use std::cell::Cell;
+use std::io;
+use std::pin::Pin;
+use std::rc::Rc;
+use std::task::{Context, Poll};
+use std::time::Duration;
+
+use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
+use tokio::time::Instant;
+
+use crate::actors::gateway::connection::outgoing::Outgoing;
+use crate::actors::gateway::connection::unfinished::Unfinished;
+use crate::actors::gateway::limits::FRAME_TIME;
+use crate::actors::resources::budget::Share;
+use crate::protocol::limits::MAX_FRAME;
+
+/// Buffer of a WebSocket for what comes in. It is there as long as the connection, so it is small.
+pub(super) const READ_BUFFER: usize = 8 * 1024;
+/// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.
+const TURN: usize = 32 * 1024;
+
+/// A stream that notes when its other side last gave a sign of life: sent a byte, or took one after having taken
+/// none. And what it has sent of a message that is not complete yet.
+pub(super) struct Watched<S> {
+    stream: S,
+    life: Rc<Cell<Instant>>,
+    /// Hears of every byte that the other side takes.
+    outgoing: Rc<Outgoing>,
+    /// The last write found no room: the next that does shows that there is somebody.
+    is_blocked: bool,
+    unfinished: Unfinished,
+    /// Bytes that belong to no complete message yet, or to one that has just been read.
+    pending: usize,
+    /// The longest message so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to
+    /// it, or to the longest frame of it, and stays so.
+    longest: usize,
+    /// Arrival time of the first pending byte, plus all time spent not reading.
+    began: Option<Instant>,
+    /// They belong to one that has just been read.
+    is_complete: bool,
+    /// Bytes that wait to be written, and their buffer, which may be twice as long.
+    unsent: Share,
+    /// Bytes that may still be read before others have a turn.
+    turn: usize,
+}
+
+/// Bytes of a control frame beside its payload: two, and the mask's four.
+const CONTROL_HEAD: usize = 6;
+
+impl<S> Watched<S> {
+    /// A stream on which nothing has come yet; `life` is when its other side last gave a sign of life.
+    pub(super) fn new(
+        stream: S,
+        life: Rc<Cell<Instant>>,
+        outgoing: Rc<Outgoing>,
+        unfinished: Unfinished,
+        unsent: Share,
+    ) -> Self {
+        Self {
+            stream,
+            life,
+            outgoing,
+            is_blocked: false,
+            unfinished,
+            pending: 0,
+            longest: 0,
+            began: None,
+            is_complete: false,
+            unsent,
+            turn: TURN,
+        }
+    }
+
+    /// Reading has another turn.
+    pub(super) const fn begin_turn(&mut self) {
+        self.turn = TURN;
+    }
+
+    /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
+    pub(super) fn long(&self) -> Option<usize> {
+        (self.pending > TURN).then_some(self.pending)
+    }
+
+    /// All of a message has been read; so many bytes of it have not been dealt with.
+    pub(super) fn complete(&mut self, left: usize) {
+        self.is_complete = true;
+        self.settle(left);
+    }
+
+    /// Reading goes on after so long a time: what was complete has been dealt with.
+    pub(super) fn read_on(&mut self, unread: Duration) {
+        if std::mem::take(&mut self.is_complete) {
+            self.settle(0);
+        }
+        self.began = self.began.map(|began| began + unread);
+    }
+
+    /// A control frame with so much payload has come: it may stand between the parts of a message.
+    pub(super) fn control(&mut self, payload: usize) {
+        self.settle(self.pending.saturating_sub(CONTROL_HEAD + payload));
+    }
+
+    fn settle(&mut self, pending: usize) {
+        self.pending = pending;
+        if pending == 0 {
+            self.began = None;
+        }
+        // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
+        // kept.
+        let unfinished = (2 * pending).min(3 * MAX_FRAME);
+        if pending > READ_BUFFER {
+            self.longest = self.longest.max(pending.min(MAX_FRAME));
+        }
+        self.unfinished.keep(unfinished.max(self.longest));
+    }
+
+    /// When the message that has begun is late.
+    pub(super) fn late(&self) -> Option<Instant> {
+        self.began.map(|began| began + FRAME_TIME)
+    }
+}
+
+impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
+    fn poll_read(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        buffer: &mut ReadBuf<'_>,
+    ) -> Poll<io::Result<()>> {
+        if self.turn == 0 {
+            cx.waker().wake_by_ref();
+            return Poll::Pending;
+        }
+        let before = buffer.filled().len();
+        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        let received = buffer.filled().len() - before;
+        self.turn = self.turn.saturating_sub(received);
+        if received > 0 {
+            let now = Instant::now();
+            self.life.set(now);
+            self.began.get_or_insert(now);
+            let pending = self.pending + received;
+            self.settle(pending);
+        }
+        polled
+    }
+}
+
+impl<S: AsyncWrite + Unpin> AsyncWrite for Watched<S> {
+    fn poll_write(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+        bytes: &[u8],
+    ) -> Poll<io::Result<usize>> {
+        let polled = Pin::new(&mut self.stream).poll_write(cx, bytes);
+        if polled.is_ready() && self.is_blocked {
+            self.life.set(Instant::now());
+        }
+        self.is_blocked = polled.is_pending();
+        let taken = match &polled {
+            Poll::Ready(Ok(taken)) => *taken,
+            _ => 0,
+        };
+        if taken > 0 {
+            self.outgoing.note_taken();
+        }
+        let unsent = 2 * (bytes.len() - taken);
+        if unsent != self.unsent.bytes() {
+            self.unsent.resize(unsent);
+        }
+        polled
+    }
+
+    fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_flush(cx)
+    }
+
+    fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}

@@ -1,0 +1,137 @@
+//! Actions that clients serve: who serves which, and the goals that are on their way.
+//!
+//! **Invariant:** a forwarded goal ends by the result of its own server, or with that client, and only once. Goals
+//! outlive who sent them; then nobody hears of them any more.
+
+use std::collections::{BTreeSet, HashMap};
+use std::sync::Arc;
+
+use super::numbers::Numbers;
+use super::services::{Provider, Services};
+use crate::actors::ConnectionId;
+use crate::actors::resources::budget::Share;
+use crate::protocol::names;
+use crate::protocol::wire::payload::Payload;
+
+/// A goal that was forwarded to its server and has not ended yet.
+pub(crate) struct ForwardedGoal {
+    /// Who sent it.
+    pub(crate) sender: ConnectionId,
+    /// The sender's id for it.
+    pub(crate) id: Option<Payload>,
+    pub(crate) server: ConnectionId,
+    /// The action's name as the sender spells it.
+    pub(crate) action: Arc<str>,
+    /// The same as the server spells it.
+    pub(crate) spelling: Box<str>,
+    pub(crate) wants_feedback: bool,
+    /// Its share of its sender's account.
+    pub(crate) _share: Share,
+}
+
+/// Action servers, and goals on their way.
+#[derive(Default)]
+pub(crate) struct ActionServers {
+    /// By absolute name.
+    servers: HashMap<Box<str>, Provider>,
+    goals: HashMap<u64, ForwardedGoal>,
+    by_sender: Numbers,
+    by_server: Numbers,
+    goals_made: u64,
+}
+
+impl ActionServers {
+    /// Makes `server` the one who serves the action; the newest registration wins. Gives the one before.
+    pub(crate) fn serve(&mut self, action: &str, server: Provider) -> Option<Provider> {
+        self.servers.insert(action.into(), server)
+    }
+
+    pub(crate) fn server(&self, action: &str) -> Option<&Provider> {
+        self.servers.get(action)
+    }
+
+    /// Withdraws the action if `connection` serves it; true if it did.
+    pub(crate) fn withdraw(&mut self, action: &str, connection: ConnectionId) -> bool {
+        let is_ours = |one: &Provider| one.connection == connection;
+        let serves = self.server(action).is_some_and(is_ours);
+        if serves {
+            self.servers.remove(action);
+        }
+        serves
+    }
+
+    /// Goals of `sender` that have not ended.
+    pub(crate) fn sent_by(&self, sender: ConnectionId) -> usize {
+        self.by_sender.count(sender)
+    }
+
+    /// Takes a goal in; gives the id under which it goes to its server.
+    pub(crate) fn remember(&mut self, goal: ForwardedGoal) -> String {
+        self.goals_made += 1;
+        let number = self.goals_made;
+        self.by_sender.add(goal.sender, number);
+        self.by_server.add(goal.server, number);
+        self.goals.insert(number, goal);
+        Services::call_id(number)
+    }
+
+    /// The number of the goal that `server` means by `id`, if it is that server's and of that action.
+    pub(crate) fn meant_by_server(
+        &self,
+        id: Option<&Payload>,
+        action: &str,
+        server: ConnectionId,
+    ) -> Option<u64> {
+        let number = Services::number_of(id?)?;
+        let goal = self.goals.get(&number)?;
+        let is_its =
+            goal.server == server && names::absolute(&goal.action) == names::absolute(action);
+        is_its.then_some(number)
+    }
+
+    /// The id at its server, and the goal, that `sender` means by `id`.
+    pub(crate) fn meant_by_sender(
+        &self,
+        id: Option<&Payload>,
+        action: &str,
+        sender: ConnectionId,
+    ) -> Option<(String, &ForwardedGoal)> {
+        let sent = self.by_sender.newest(sender);
+        let mut goals = sent.filter_map(|number| Some((number, self.goals.get(&number)?)));
+        let action = names::absolute(action);
+        let (number, goal) = goals
+            .find(|(_, goal)| goal.id.as_ref() == id && names::absolute(&goal.action) == action)?;
+        Some((Services::call_id(number), goal))
+    }
+
+    pub(crate) fn goal(&self, number: u64) -> Option<&ForwardedGoal> {
+        self.goals.get(&number)
+    }
+
+    /// Takes a goal out, which has ended.
+    pub(crate) fn take(&mut self, number: u64) -> Option<ForwardedGoal> {
+        let goal = self.goals.remove(&number)?;
+        self.by_sender.remove(goal.sender, number);
+        self.by_server.remove(goal.server, number);
+        Some(goal)
+    }
+
+    /// Takes every goal that has not ended, oldest first.
+    pub(crate) fn take_all(&mut self) -> Vec<ForwardedGoal> {
+        let numbers: BTreeSet<u64> = self.goals.keys().copied().collect();
+        let goals = numbers.into_iter().map(|number| self.take(number));
+        goals.flatten().collect()
+    }
+
+    /// Takes the numbers of the goals that `server` has not ended, and will not end.
+    pub(crate) fn take_numbers(&mut self, server: ConnectionId) -> BTreeSet<u64> {
+        self.by_server.take(server)
+    }
+
+    /// Forgets the goals that `sender` has sent.
+    pub(crate) fn forget_sender(&mut self, sender: ConnectionId) {
+        for number in self.by_sender.take(sender) {
+            self.take(number);
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Who subscribes to what: the registry's table of topics.
+//!
+//! **Invariant:** a connection stands at most once under a topic, however often it subscribed.
+
+use std::collections::HashMap;
+use std::collections::hash_map::Entry;
+use std::sync::{Arc, Weak};
+use std::time::Duration;
+
+use actix::prelude::*;
+
+use crate::actors::ConnectionId;
+use crate::actors::gateway::limits::MAX_FRAGMENT_SIZES;
+use crate::actors::gateway::messages::{Deliver, Throttle};
+use crate::actors::resources::budget::Share;
+use crate::protocol::names;
+use crate::protocol::op::Encoding;
+
+/// One `subscribe` of a connection to a topic; `id` tells several of them apart.
+#[derive(Debug)]
+pub(crate) struct Subscription {
+    pub(crate) id: Option<Box<str>>,
+    pub(crate) throttle: Duration,
+    pub(crate) queue_length: usize,
+    pub(crate) encoding: Encoding,
+    /// Keeps its `fragment_size` among those that the topic has.
+    pub(crate) size: Option<Arc<usize>>,
+    /// Its share of the account.
+    pub(crate) _share: Share,
+}
+
+/// A connection under a topic.
+pub(crate) struct Subscriber {
+    pub(crate) connection: ConnectionId,
+    pub(crate) outlet: Recipient<Deliver>,
+    /// The encoding that its subscriptions come to.
+    pub(crate) encoding: Encoding,
+    /// Number of the newest messages that are kept, if some of them are held back or left out.
+    pub(crate) newest: Option<usize>,
+}
+
+/// The smallest of each value over a connection's subscriptions to one topic; `None` for none.
+pub(crate) fn throttle_of(subscriptions: &[Subscription]) -> Option<Throttle> {
+    let queue_lengths = subscriptions.iter().map(|one| one.queue_length.max(1));
+    Some(Throttle {
+        interval: subscriptions.iter().map(|one| one.throttle).min()?,
+        queue_length: queue_lengths.min()?,
+    })
+}
+
+/// The encoding that a connection's subscriptions to one topic come to.
+fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
+    let all = subscriptions.iter().map(|one| one.encoding);
+    all.reduce(Encoding::merged).unwrap_or_default()
+}
+
+/// Every topic that somebody subscribes to, by the spelling that the subscriber used.
+#[derive(Default)]
+pub(crate) struct Topics {
+    subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
+    /// By absolute name: the `fragment_size`s in use, for as long as a subscription has them.
+    sizes: HashMap<Box<str>, Vec<Weak<usize>>>,
+}
+
+impl Topics {
+    /// Adds a subscriber under its spelling of the topic. Gives the spelling, shared, and whether that is new to this
+    /// subscriber.
+    pub(crate) fn add(
+        &mut self,
+        topic: &str,
+        connection: ConnectionId,
+        outlet: Recipient<Deliver>,
+    ) -> (Arc<str>, bool) {
+        let name = self
+            .subscribers
+            .get_key_value(topic)
+            .map_or_else(|| Arc::from(topic), |(name, _)| Arc::clone(name));
+        let subscribers = self.subscribers.entry(Arc::clone(&name)).or_default();
+        let new = !subscribers.iter().any(|one| one.connection == connection);
+        if new {
+            subscribers.push(Subscriber {
+                connection,
+                outlet,
+                encoding: Encoding::default(),
+                newest: None,
+            });
+        }
+        (name, new)
+    }
+
+    /// The `fragment_size` that a subscription gets which asks for `size` and gives up `given_up`; the subscription
+    /// keeps it. If the topic of that absolute name has [`MAX_FRAGMENT_SIZES`] others, powers of two aside, it is the
+    /// power of two below: nobody is refused because of what others ask for.
+    pub(crate) fn share_size(
+        &mut self,
+        topic: &str,
+        size: usize,
+        given_up: Option<&Arc<usize>>,
+    ) -> Arc<usize> {
+        let sizes = self.sizes.entry(topic.into()).or_default();
+        sizes.retain(|one| one.strong_count() > 0);
+        let known = |size| {
+            let mut all = sizes.iter().filter_map(Weak::upgrade);
+            all.find(|one| **one == size)
+        };
+        if let Some(known) = known(size) {
+            return known;
+        }
+        let all = sizes.iter().filter_map(Weak::upgrade);
+        let others = all.filter(|one| !one.is_power_of_two()).count();
+        let given_up = given_up.filter(|one| !one.is_power_of_two());
+        let is_freed = given_up.is_some_and(|one| Arc::strong_count(one) == 1);
+        let is_full = others - usize::from(is_freed) >= MAX_FRAGMENT_SIZES;
+        let size = if is_full {
+            1 << size.max(1).ilog2()
+        } else {
+            size
+        };
+        known(size).unwrap_or_else(|| {
+            let size = Arc::new(size);
+            sizes.push(Arc::downgrade(&size));
+            size
+        })
+    }
+
+    /// Nobody subscribes to the topic of that absolute name any more.
+    pub(crate) fn forget_sizes(&mut self, topic: &str) {
+        self.sizes.remove(topic);
+    }
+
+    /// Sets how a subscriber's messages are written, by what its subscriptions come to.
+    pub(crate) fn configure(
+        &mut self,
+        topic: &Arc<str>,
+        connection: ConnectionId,
+        subscriptions: &[Subscription],
+    ) {
+        let subscribers = self.subscribers.get_mut(topic).into_iter().flatten();
+        for subscriber in subscribers.filter(|one| one.connection == connection) {
+            subscriber.encoding = encoding_of(subscriptions);
+            let throttle = throttle_of(subscriptions);
+            let held = throttle.filter(|throttle| !throttle.interval.is_zero());
+            subscriber.newest = held.map(|throttle| throttle.queue_length);
+        }
+    }
+
+    /// Removes a subscriber.
+    pub(crate) fn remove(&mut self, topic: &Arc<str>, connection: ConnectionId) {
+        let Entry::Occupied(mut entry) = self.subscribers.entry(Arc::clone(topic)) else {
+            return;
+        };
+        entry.get_mut().retain(|one| one.connection != connection);
+        if entry.get().is_empty() {
+            entry.remove();
+        }
+    }
+
+    /// Whether anybody subscribes to the topic of that absolute name, under whichever spelling.
+    pub(crate) fn has_subscribers(&self, topic: &str) -> bool {
+        names::spellings(topic).any(|spelling| self.subscribers.contains_key(spelling))
+    }
+
+    /// A spelling, shared, and those who subscribed with it, if there are any.
+    pub(crate) fn subscribers(&self, topic: &str) -> Option<(&Arc<str>, &[Subscriber])> {
+        self.subscribers
+            .get_key_value(topic)
+            .map(|(name, list)| (name, list.as_slice()))
+    }
+}
