@@ -52,7 +52,8 @@
 //! - [`SimulationTime`], from `rosapi` and `rosout`: the time.
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
-//! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
+//! - [`ArmMotion`], [`MoveSetpoint`], [`SettleWith`], from `follow`: how it moves; its setpoint moved on along a path;
+//!   who is to be asked before it says that it stands still.
 //!
 //! To `arm_sim`, `ik_action`, `follow` and `tf_web`, from the runtime: [`node::ShutDown`], the end, at which steps that
 //! are still to be taken are refused and goals are aborted.
@@ -129,6 +130,7 @@
 //! [`Consult`]: arm::sim::Consult
 //! [`GoalJudged`]: arm::sim::GoalJudged
 //! [`Settle`]: arm::sim::Settle
+//! [`SettleWith`]: arm::sim::SettleWith
 //! [`HeldLimit`]: arm::sim::HeldLimit
 //! [`Solve`]: arm::ik::Solve
 //! [`SendGoal`]: arm::ik_action::SendGoal

@@ -9,6 +9,7 @@ use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, Peer, WIDE};
 use pendularm::actors::gateway::limits::{MAX_FRAGMENT_SIZES, READ_HERE};
 use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::resources::aside::{Errand, PlaceAside};
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::MAX_ARGS;
 use serde_json::{Value, json};
@@ -134,6 +135,42 @@ fn messages_keep_their_order_though_long_ones_are_cut_up_elsewhere() {
             assert_eq!(message["msg"]["n"], n);
             assert_eq!(number > 0, n % 2 == 0, "only the long ones come in pieces");
         }
+    });
+}
+
+/// A client that asks for long messages in pieces hears of the arm in time all the same, however many others do.
+#[test]
+fn only_messages_of_its_own_topic_wait_for_one_that_is_cut_up() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut peer = gateway.connect(WIDE);
+        subscribe_in_pieces(&mut peer, 100_000).await;
+        peer.send(json!({"op": "subscribe", "topic": "/plain"}))
+            .await;
+        peer.receive().await;
+        let mut publisher = gateway.connect(WIDE);
+        let places = [
+            PlaceAside::take(Errand::WritingLong).await,
+            PlaceAside::take(Errand::WritingLong).await,
+        ];
+        for topic in ["/t", "/plain"] {
+            publisher.advertise(topic).await;
+        }
+        for (topic, text) in [
+            ("/t", "x".repeat(300_000)),
+            ("/plain", "1".into()),
+            ("/t", "2".into()),
+        ] {
+            publisher
+                .send(json!({"op": "publish", "topic": topic, "msg": {"data": text}}))
+                .await;
+        }
+        assert_eq!(peer.receive().await["topic"], "/plain");
+        drop(places);
+        let (long, _) = next_message(&mut peer).await;
+        assert_eq!(long["msg"]["data"].as_str().unwrap().len(), 300_000);
+        let (short, _) = next_message(&mut peer).await;
+        assert_eq!(short["msg"]["data"], "2");
     });
 }
 

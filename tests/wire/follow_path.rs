@@ -1,5 +1,7 @@
 //! `/joint_trajectory_controller/follow_joint_trajectory`, as a planner's client uses it.
 
+use std::time::{Duration, Instant};
+
 use crate::common::{Client, Runtime};
 use pendularm::protocol::catalog::Action;
 use pendularm::protocol::op::follow::MAX_POINTS;
@@ -274,4 +276,28 @@ fn a_goal_that_is_none_is_refused_by_its_field() {
         end["values"],
         "trajectory.points[0].positions[0] must be a finite number"
     );
+}
+
+/// The node looks at the arm every 5 ms: so soon after the answer it would still speak of the way.
+#[test]
+fn a_paused_arm_is_on_no_way_that_there_were_feedback_of() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.send(&goal("long", &through(&[point([0.3, 0.3], 1e3)])));
+    for _ in 0..20 {
+        client.receive_where("feedback", |frame| frame["op"] == "action_feedback");
+        client.ask("/arm_sim/pause", json!({"data": true}));
+        client.kept.clear();
+        let began = Instant::now();
+        while began.elapsed() < Duration::from_millis(12) {
+            client.ask("/rosapi/get_time", json!({}));
+        }
+        let said = &client.kept;
+        assert!(
+            said.iter().all(|frame| frame["op"] != "action_feedback"),
+            "{said:?}"
+        );
+        client.ask("/arm_sim/pause", json!({"data": false}));
+    }
 }

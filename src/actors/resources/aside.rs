@@ -26,6 +26,8 @@ pub enum Errand {
     Reading,
     /// Writes messages in the forms that clients ask for.
     Writing,
+    /// The same with messages of hundreds of kilobytes.
+    WritingLong,
     /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
     Listing,
 }
@@ -33,6 +35,7 @@ pub enum Errand {
 thread_local! {
     static READING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
     static WRITING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
+    static WRITING_LONG: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
     static LISTING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
 }
 
@@ -45,6 +48,7 @@ impl PlaceAside {
         let free = match errand {
             Errand::Reading => READING.with(Arc::clone),
             Errand::Writing => WRITING.with(Arc::clone),
+            Errand::WritingLong => WRITING_LONG.with(Arc::clone),
             Errand::Listing => LISTING.with(Arc::clone),
         };
         free.acquire_owned().await.ok().map(Self)

@@ -8,6 +8,7 @@
 
 mod actions;
 mod entry;
+mod nested;
 mod node;
 mod parameter_types;
 pub mod playback;

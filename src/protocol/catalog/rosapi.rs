@@ -7,6 +7,7 @@
 use super::entry::{Field, ServiceEntry, optional, required, service};
 use super::node::Node;
 use super::table::{fields, table};
+use super::topics::ARM_STATE;
 
 /// The questions' names begin with this.
 pub const PREFIX: &str = "/rosapi/";
@@ -126,7 +127,8 @@ table! {
                 required("name", "string", ""),
                 required("value", "string", ""),
             ])
-            .response(&DONE),
+            .response(&DONE)
+            .supersedes(ARM_STATE),
         /// Whether there is such a parameter.
         HasParam = question("/rosapi/has_param", "rosapi_msgs/srv/HasParam")
             .request(fields![required("name", "string", "")])

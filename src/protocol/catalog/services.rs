@@ -3,7 +3,8 @@
 //! **Invariant:** a service that a client can call is a row here, and a row that no node serves fails
 //! `tests/actors/rosapi.rs`.
 
-use super::entry::{Field, ServiceEntry, Type, message, optional, required, service};
+use super::entry::{Field, ServiceEntry, optional, required, service};
+use super::nested::{CRITICAL_TYPE, GAINS, GAINS_TYPE, PARAMS, PARAMS_TYPE};
 use super::node::Node;
 use super::playback::Playback;
 use super::rosapi::Rosapi;
@@ -32,11 +33,11 @@ table! {
             .computation()
             .all_or_nothing(),
         /// Method and timestep of the live arm.
-        SetIntegrator = of_arm("/arm_sim/set_integrator", "pendularm_interfaces/srv/SetIntegrator")
+        SetIntegrator = changes("/arm_sim/set_integrator", "pendularm_interfaces/srv/SetIntegrator")
             .request(&METHOD)
             .response(&METHOD),
         /// Gravity, masses and lengths.
-        SetParams = of_arm("/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
+        SetParams = changes("/arm_sim/set_params", "pendularm_interfaces/srv/SetParams")
             .request(&PARAMS)
             .response(&PARAMS),
         /// Freezes and resumes simulation time.
@@ -52,7 +53,7 @@ table! {
             ])
             .supersedes(ARM_STATE_AND_FEEDBACK),
         /// Takes single steps of a paused arm.
-        Step = of_arm("/arm_sim/step", "pendularm_interfaces/srv/Step")
+        Step = changes("/arm_sim/step", "pendularm_interfaces/srv/Step")
             .request(fields![required("steps", "uint64", "")])
             .response(fields![
                 required("steps", "uint64", ""),
@@ -60,7 +61,7 @@ table! {
             ])
             .all_or_nothing(),
         /// Pushes the arm for a while.
-        Disturb = of_arm("/arm_sim/disturb", "pendularm_interfaces/srv/Disturb")
+        Disturb = changes("/arm_sim/disturb", "pendularm_interfaces/srv/Disturb")
             .request(&DISTURBANCE)
             .response(&DISTURBANCE)
             .all_or_nothing(),
@@ -88,16 +89,16 @@ table! {
             .response(fields![required("descriptors", "rcl_interfaces/msg/ParameterDescriptor[]", "")])
             .all_or_nothing(),
         /// Sets them.
-        SetParameters = of_arm("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters")
+        SetParameters = changes("/arm_sim/set_parameters", "rcl_interfaces/srv/SetParameters")
             .request(fields![required("parameters", "rcl_interfaces/msg/Parameter[]", "")])
             .response(fields![required("results", "rcl_interfaces/msg/SetParametersResult[]", "")])
             .all_or_nothing(),
         /// The controller on or off.
-        Enable = of_arm("/pid_controller/enable", "pendularm_interfaces/srv/Enable")
+        Enable = changes("/pid_controller/enable", "pendularm_interfaces/srv/Enable")
             .request(&SWITCH)
             .response(&SWITCH),
         /// The controller's gains.
-        SetGains = of_arm("/pid_controller/set_gains", "pendularm_interfaces/srv/SetGains")
+        SetGains = changes("/pid_controller/set_gains", "pendularm_interfaces/srv/SetGains")
             .request(&GAINS)
             .response(&GAINS),
         /// Joint positions for an end effector position.
@@ -265,30 +266,25 @@ table! {
     Playback(Playback),
 }
 
-/// A service of the arm. It brings the arm to now before it answers, so that older states are old.
+/// A service of the arm.
 const fn of_arm(name: &'static str, type_name: &'static str) -> ServiceEntry {
-    service(name, type_name, Node::ArmSim).supersedes(ARM_STATE)
+    service(name, type_name, Node::ArmSim)
+}
+
+/// A service that changes the arm, so that states from before are old.
+const fn changes(name: &'static str, type_name: &'static str) -> ServiceEntry {
+    of_arm(name, type_name).supersedes(ARM_STATE)
 }
 
 const METHOD: [Field; 2] = [
     optional("method", "string", ""),
     optional("timestep", "float64", "s"),
 ];
-const PARAMS: [Field; 3] = [
-    optional("gravity", "float64", "m/s^2"),
-    optional("masses", "float64[]", "kg"),
-    optional("lengths", "float64[]", "m"),
-];
 const NAMES: [Field; 1] = [required("names", "string[]", "")];
 const SWITCH: [Field; 1] = [optional("data", "bool", "")];
 const DISTURBANCE: [Field; 2] = [
     required("effort", "float64[]", "N m"),
     required("duration", "float64", "s"),
-];
-const GAINS: [Field; 3] = [
-    optional("kp", "float64[]", "N m/rad"),
-    optional("ki", "float64[]", "N m/(rad s)"),
-    optional("kd", "float64[]", "N m s/rad"),
 ];
 const TRIAL: [Field; 3] = [
     optional("duration", "float64", "s"),
@@ -304,39 +300,6 @@ pub(super) const WISH: [Field; 5] = [
     optional("trans_thres", "float32", ""),
     optional("rate", "float32", "Hz"),
 ];
-
-/// The type of a request's `gains`; its members are the fields of `/pid_controller/set_gains`.
-const GAINS_TYPE: &str = "pendularm_interfaces/msg/Gains";
-/// The type of a request's `params`; its members are the fields of `/arm_sim/set_params`.
-const PARAMS_TYPE: &str = "pendularm_interfaces/msg/Params";
-/// The type of `critical` in a response.
-const CRITICAL_TYPE: &str = "pendularm_interfaces/msg/CriticalMode";
-const CRITICAL: [Field; 3] = [
-    required("growth_per_step", "float64", ""),
-    required("frequency", "float64", "Hz"),
-    required("joint", "int64", ""),
-];
-
-/// The types that are inside requests and responses alone.
-pub(super) const TYPES: [Type; 3] = [
-    message(GAINS_TYPE, &GAINS),
-    message(PARAMS_TYPE, &PARAMS),
-    message(CRITICAL_TYPE, &CRITICAL),
-];
-
-impl Field {
-    /// The members of a field that is an object in a request or a response, in documented order; empty for every other
-    /// field.
-    #[must_use]
-    pub fn members(&self) -> &'static [Self] {
-        match self.kind {
-            GAINS_TYPE => &GAINS,
-            PARAMS_TYPE => &PARAMS,
-            CRITICAL_TYPE => &CRITICAL,
-            _ => &[],
-        }
-    }
-}
 
 impl Service {
     /// The service's name on the wire.

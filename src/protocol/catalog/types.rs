@@ -10,7 +10,7 @@ pub use super::entry::{Constant, Count, Type};
 use super::entry::{Field, byte, message, required};
 use super::services::WISH;
 use super::topics::{TRANSFORMS, Topic};
-use super::{Action, parameter_types, ros2_types, services};
+use super::{Action, nested, parameter_types, ros2_types};
 use crate::protocol::names;
 
 /// Stands between the definitions of a type and of the types in it: 80 of these in a line.
@@ -21,7 +21,7 @@ pub fn all() -> impl Iterator<Item = Type> {
     let topics = Topic::ALL.into_iter().map(Topic::message);
     topics
         .chain(PARTS)
-        .chain(services::TYPES)
+        .chain(nested::TYPES)
         .chain(parameter_types::TYPES)
         .chain(ros2_types::TYPES)
 }

@@ -14,7 +14,7 @@ use std::time::Duration;
 use actix::prelude::*;
 
 use self::answers::{ResultCode, feedback, result};
-use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint};
+use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint, Settle, SettleWith};
 use crate::actors::node::{Done, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, Canceller, NOT_ACTIVE};
 use crate::math::arm::State;
@@ -45,6 +45,7 @@ pub struct PathFollower<const N: usize> {
 pub struct PathArm<const N: usize> {
     motion: Recipient<ArmMotion<N>>,
     setpoint: Recipient<MoveSetpoint<N>>,
+    settle: Recipient<SettleWith>,
 }
 
 impl<const N: usize> PathArm<N> {
@@ -54,6 +55,7 @@ impl<const N: usize> PathArm<N> {
         Self {
             motion: arm.clone().recipient(),
             setpoint: arm.clone().recipient(),
+            settle: arm.clone().recipient(),
         }
     }
 }
@@ -125,6 +127,8 @@ impl<const N: usize> Handler<FollowPath<N>> for PathFollower<N> {
     type Result = ();
 
     fn handle(&mut self, goal: FollowPath<N>, ctx: &mut Context<Self>) {
+        let own = ctx.address().recipient();
+        self.arm.settle.do_send(SettleWith(own));
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, ctx| match motion {
             Ok(motion) => node.begin(goal, &motion, ctx),
@@ -148,6 +152,12 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
             drop(done);
         }));
     }
+}
+
+impl<const N: usize> Handler<Settle> for PathFollower<N> {
+    type Result = ();
+
+    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
 }
 
 impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
@@ -223,7 +233,8 @@ impl<const N: usize> PathFollower<N> {
         let time = motion.time - goal.began;
         let desired = goal.course.path.at(time);
         let standing = goal.course.judge(time, &motion.state);
-        if goal.client.wants_feedback && goal.feedback.due(motion.time) {
+        let may_be_due = goal.client.wants_feedback && !motion.is_paused;
+        if may_be_due && goal.feedback.due(motion.time) {
             let values = feedback(motion.time, time, &desired, &motion.state);
             goal.client.feed_back(values);
         }

@@ -10,7 +10,9 @@ use std::ops::ControlFlow;
 
 use actix::prelude::*;
 
-use super::messages::{ArmPose, CommandGoal, EndGoal, GoalJudged, Pose, TrackGoal, Tracking};
+use super::messages::{
+    ArmPose, CommandGoal, EndGoal, GoalJudged, Pose, Settle, SettleWith, TrackGoal, Tracking,
+};
 use super::node::ArmSim;
 use super::state::goals::{Tracked, pose};
 use crate::math::goal::{Cadence, Goal};
@@ -116,13 +118,45 @@ impl<const N: usize> ArmSim<N> {
         taken
     }
 
-    /// To be called before the simulation is reset: the goal is preempted. Gives the news and who is to hear it.
-    pub(super) fn end_goal_for_reset(
-        &mut self,
-    ) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
+    /// To be called before the simulation is reset: the goal is preempted, and its owner hears of it.
+    pub(super) fn end_goal_for_reset(&mut self) {
         let ended = self.goals.preempt(&self.simulation);
         self.goals.past.end(self.simulation.time());
-        let (tracked, judged) = ended?;
-        Some((tracked.owner, judged))
+        if let Some((tracked, judged)) = ended {
+            tracked.owner.do_send(judged);
+        }
+    }
+
+    /// Answers once all that the arm has said of goals is published: news of a goal go by way of its owner, and none
+    /// may come after the answer that the arm stands still.
+    pub(super) fn once_settled(
+        &mut self,
+        ctx: &mut Context<Self>,
+        answer: impl FnOnce(&mut Self) + 'static,
+    ) {
+        let owners = [&self.goals.settle, &self.goals.settle_path];
+        let asked: Vec<_> = owners
+            .into_iter()
+            .flatten()
+            .map(|owner| owner.send(Settle))
+            .collect();
+        if asked.is_empty() {
+            return answer(self);
+        }
+        let settled = async move {
+            for one in asked {
+                // Who has ended publishes nothing either.
+                let _ = one.await;
+            }
+        };
+        ctx.spawn(settled.into_actor(self).map(move |(), arm, _| answer(arm)));
+    }
+}
+
+impl<const N: usize> Handler<SettleWith> for ArmSim<N> {
+    type Result = ();
+
+    fn handle(&mut self, SettleWith(owner): SettleWith, _: &mut Context<Self>) {
+        self.goals.settle_path = Some(owner);
     }
 }

@@ -95,12 +95,18 @@ pub struct TrackGoal<const N: usize> {
     pub settle: Recipient<Settle>,
 }
 
-/// Answered by the owner of goals when all that reached it before has been dealt with. From the arm, before it says
+/// Answered by an owner of goals when all that reached it before has been dealt with. From the arm, before it says
 /// that it stands still, and from `ik_trial`, which so hears all that the arm had said about goals before it gave the
 /// time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Settle;
+
+/// Feedback is published by the sender too, who is to be asked before the arm says that it stands still. From
+/// `joint_trajectory_controller`, with each of its goals.
+#[derive(Message, Debug, Clone)]
+#[rtype(result = "()")]
+pub struct SettleWith(pub Recipient<Settle>);
 
 /// The goal has begun.
 #[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]

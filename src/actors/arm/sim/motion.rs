@@ -25,6 +25,8 @@ pub struct JointMotion<const N: usize> {
     pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
+    /// Whether its time is frozen.
+    pub is_paused: bool,
 }
 
 /// The setpoint is moved on, if it is still the one that is known. The answer is whether it was. From
@@ -48,6 +50,7 @@ impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
             setpoint: *self.simulation.pid().setpoint(),
             time: self.simulation.time(),
             resets: self.goals.past.resets,
+            is_paused: self.paused,
         }
     }
 }

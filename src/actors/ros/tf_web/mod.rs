@@ -252,14 +252,16 @@ impl<const N: usize> TfRepublisher<N> {
             let sources = sources.iter().map(String::as_str);
             seen_from(stamp, target, sources, &pose.lengths, &pose.positions)
         };
-        if self.topic.is_some_and(|due| due <= now) {
-            self.topic = Some(now + TOPIC_PERIOD);
+        // At the look that is nearest: the next would be later than this is early.
+        let soon = now + PERIOD / 2;
+        if let Some(due) = self.topic.as_mut().filter(|due| **due <= soon) {
+            *due = next(*due, TOPIC_PERIOD, now);
             publish(&self.publish, Topic::TfWeb, seen(WORLD, &frames(N)));
         }
         let mut due: Vec<_> = self
             .wishes
             .iter_mut()
-            .filter(|(_, due)| *due <= now)
+            .filter(|(_, due)| *due <= soon)
             .collect();
         // The longest due come first.
         due.sort_by_key(|(_, due)| *due);
@@ -270,7 +272,7 @@ impl<const N: usize> TfRepublisher<N> {
             !is_published || published <= TOPIC_AT_ONCE
         });
         for (wish, due) in within_limits.take(AT_ONCE) {
-            *due = now + wish.period;
+            *due = next(*due, wish.period, now);
             let message = seen(&wish.target, &wish.sources);
             match &wish.by {
                 Wisher::Client(client) => client.feed_back(message),
@@ -281,6 +283,11 @@ impl<const N: usize> TfRepublisher<N> {
             }
         }
     }
+}
+
+/// When that is due again which was due at `due` and comes `now`: lateness is made up for, but not more than a period.
+fn next(due: Instant, period: Duration, now: Instant) -> Instant {
+    (due + period).max(now)
 }
 
 fn publish(to: &Recipient<Publish>, topic: Topic, message: impl Serialize + Send + 'static) {

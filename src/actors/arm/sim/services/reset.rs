@@ -7,9 +7,8 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::field_by_field::{Echo, FieldByField};
-use crate::actors::arm::sim::messages::GoalJudged;
 use crate::actors::arm::sim::node::ArmSim;
-use crate::actors::node::{Ask, Call, Reply};
+use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
 use crate::math::arm::State;
 use crate::math::simulation::ArmInput;
@@ -37,45 +36,24 @@ impl<const N: usize> Handler<Call<Reset<N>>> for ArmSim<N> {
 
     fn handle(&mut self, call: Call<Reset<N>>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
-        let ended = if call.ask.rejected.is_empty() {
-            self.reset()
-        } else {
-            None
-        };
-        self.answer_reset(call.reply, call.ask.rejected, ended, ctx);
+        let (reply, rejected) = (call.reply, call.ask.rejected);
+        if rejected.is_empty() {
+            self.reset();
+        }
+        let values = *self.simulation.state();
+        self.once_settled(ctx, move |_| reply.conclude(Echo { values, rejected }));
     }
 }
 
 impl<const N: usize> ArmSim<N> {
-    /// Gives the goal that ended by it, and who is to hear of that.
-    fn reset(&mut self) -> Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)> {
-        let ended = self.end_goal_for_reset();
+    fn reset(&mut self) {
         let diverged = self.simulation.divergence().is_some();
+        self.end_goal_for_reset();
         self.change(ArmInput::Reset);
         self.restart_pacer();
         self.restart_energy_drift();
         if diverged {
             self.publish_diagnostics();
-        }
-        ended
-    }
-
-    /// Answers with the pose after the reset, but not before the goal's owner has published how the goal ended.
-    fn answer_reset(
-        &self,
-        reply: Reply<Echo<State<N>>>,
-        rejected: Rejections,
-        ended: Option<(Recipient<GoalJudged<N>>, GoalJudged<N>)>,
-        ctx: &mut Context<Self>,
-    ) {
-        let values = *self.simulation.state();
-        let echo = Echo { values, rejected };
-        match ended {
-            None => reply.conclude(echo),
-            Some((owner, news)) => {
-                let heard = owner.send(news).into_actor(self);
-                ctx.spawn(heard.map(move |_, _, _| reply.conclude(echo)));
-            }
         }
     }
 }

@@ -7,7 +7,6 @@ use bytes::Bytes;
 use serde::Serialize;
 
 use super::field_by_field::{Echo, FieldByField};
-use crate::actors::arm::sim::messages::Settle;
 use crate::actors::arm::sim::node::ArmSim;
 use crate::actors::node::{Ask, Call};
 use crate::actors::wire::{Address, Answered, Nodes};
@@ -50,13 +49,11 @@ impl<const N: usize> Handler<Call<Pause>> for ArmSim<N> {
     fn handle(&mut self, call: Call<Pause>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
         let (reply, echo) = (call.reply, self.pause(call.ask));
-        // News of a goal go by way of its owner: none may come after the answer that the arm stands still.
-        match self.goals.settle.as_ref().filter(|_| echo.values) {
-            None => reply.conclude(echo),
-            Some(owner) => {
-                let settled = owner.send(Settle).into_actor(self);
-                ctx.spawn(settled.map(move |_, _, _| reply.conclude(echo)));
-            }
+        let answer = move |_: &mut Self| reply.conclude(echo);
+        if self.paused {
+            self.once_settled(ctx, answer);
+        } else {
+            answer(self);
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Topic messages that wait to be encoded for the client, one after the other, on another thread.
 //!
-//! **Invariant:** a client's topic messages keep their order: what comes behind one that is being encoded waits for
-//! it.
+//! **Invariant:** the messages of a topic keep their order: behind one that is being encoded they wait for it. Other
+//! topics, and answers, do not: whoever asks for long messages in another form hears of the arm in time all the same.
 
 use std::rc::{Rc, Weak};
 
@@ -18,10 +18,11 @@ use crate::protocol::outbox::MAX_TOPIC_BYTES;
 const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
 
 impl Outgoing {
-    /// Takes topic messages for the client: into the outbox if they are ready and nothing waits to be encoded, else
-    /// behind what does. Feedback of a goal is always ready.
+    /// Takes topic messages for the client: into the outbox if they are ready and none of their topic waits to be
+    /// encoded, else behind what does. Feedback of a goal is always ready.
     pub(crate) fn accept(self: &Rc<Self>, message: Deliver) {
-        let waits = self.is_encoding() && !matches!(message.frames, Frames::Feedback(_));
+        let waits = self.unencoded.borrow().has(&message.topic)
+            && !matches!(message.frames, Frames::Feedback(_));
         let left = if waits {
             Some(message)
         } else {
@@ -96,7 +97,8 @@ impl EncodingTask {
                 }
             }
             if let Some(outgoing) = self.0.upgrade() {
-                let unencoded = outgoing.unencoded.borrow();
+                let mut unencoded = outgoing.unencoded.borrow_mut();
+                unencoded.end(&message.topic);
                 let is_wanted = unencoded.is_wanted(number, &message.topic);
                 drop(unencoded);
                 if is_wanted {

@@ -3,6 +3,7 @@
 //! **Invariant:** at most [`MAX_TOPIC_BYTES`] wait, and the oldest are dropped.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::actors::gateway::messages::Deliver;
 use crate::protocol::outbox::blocks::Blocks;
@@ -15,6 +16,8 @@ pub(super) struct Unencoded {
     waiting: Blocks<Deliver>,
     /// Their bytes, as they came.
     bytes: usize,
+    /// By topic, how many wait or are being encoded; topics without any are left out.
+    topics: HashMap<Arc<str>, usize>,
     /// Messages that have left: they are numbered as they come.
     left: usize,
     /// By topic, the first message that is not too old.
@@ -27,8 +30,15 @@ impl Unencoded {
     /// Adds a message, or a series of them; gives how many messages had to go for it.
     pub(super) fn push(&mut self, message: Deliver) -> u64 {
         self.bytes += message.frames.plain().len();
+        *self.topics.entry(Arc::clone(&message.topic)).or_default() += 1;
         self.waiting.push_back(message);
-        self.keep(MAX_TOPIC_BYTES)
+        // The longest message that there can be has a place too.
+        self.keep(MAX_TOPIC_BYTES + PLACE_BYTES)
+    }
+
+    /// Whether messages of this topic wait or are being encoded.
+    pub(super) fn has(&self, topic: &str) -> bool {
+        self.topics.contains_key(topic)
     }
 
     /// Drops the oldest until those that are left, and their places, take no more than `most` bytes; gives how many
@@ -38,6 +48,7 @@ impl Unencoded {
         while self.bytes + self.waiting.len() * PLACE_BYTES > most
             && let Some(oldest) = self.pop()
         {
+            self.end(&oldest.topic);
             dropped += series::messages(oldest.frames.plain().clone()).count() as u64;
         }
         dropped
@@ -58,7 +69,17 @@ impl Unencoded {
         }
     }
 
-    /// The next message to be encoded, and its number.
+    /// A message of this topic is dealt with.
+    pub(super) fn end(&mut self, topic: &str) {
+        if let Some(messages) = self.topics.get_mut(topic) {
+            *messages -= 1;
+            if *messages == 0 {
+                self.topics.remove(topic);
+            }
+        }
+    }
+
+    /// The next message to be encoded, and its number; it is to [`end`](Self::end).
     pub(super) fn begin(&mut self) -> Option<(usize, Deliver)> {
         let number = self.left;
         Some((number, self.pop()?))
@@ -79,22 +100,35 @@ impl Unencoded {
 
 #[cfg(test)]
 mod tests {
-    use bytes::Bytes;
-
     use super::*;
     use crate::actors::gateway::messages::Frames;
+
+    fn message(length: usize) -> Deliver {
+        Deliver {
+            topic: "/t".into(),
+            frames: Frames::Plain(vec![b'x'; length].into()),
+            underway: None,
+        }
+    }
+
+    #[test]
+    fn the_longest_message_has_a_place_and_a_second_takes_it() {
+        let mut unencoded = Unencoded::default();
+        for dropped in [0, 1] {
+            assert_eq!(unencoded.push(message(MAX_TOPIC_BYTES)), dropped);
+            assert_eq!(unencoded.size(), (1, MAX_TOPIC_BYTES));
+            assert!(unencoded.has("/t"));
+        }
+        assert_eq!(unencoded.keep(0), 1);
+        assert!(!unencoded.has("/t"));
+    }
 
     /// Nobody is charged for places that nothing takes.
     #[test]
     fn the_places_go_with_the_messages() {
         let mut unencoded = Unencoded::default();
         for _ in 0..20_000 {
-            let message = Deliver {
-                topic: "/t".into(),
-                frames: Frames::Plain(Bytes::from_static(b"x")),
-                underway: None,
-            };
-            unencoded.push(message);
+            unencoded.push(message(1));
         }
         for left in [1, 0] {
             while unencoded.size().0 > left {
