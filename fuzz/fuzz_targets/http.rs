@@ -11,7 +11,7 @@
 use std::time::Duration;
 
 use libfuzzer_sys::fuzz_target;
-use pendularm::actors::gateway::connection::admission::{Newcomers, Admission};
+use pendularm::actors::gateway::connection::admission::{Admission, Newcomers};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::op::token::Token;
 use pendularm::web::Site;

@@ -16,7 +16,7 @@ use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages::trajectory::joint_trajectory;
 use pendularm::protocol::messages::{self, ErrorForm, Level};
 use pendularm::protocol::op::{
-    self, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem, ActionServerOp,
+    self, ActionServerOp, MAX_QUEUE_LENGTH, MAX_THROTTLE, MAX_TIMEOUT, Op, OpError, Problem,
 };
 use pendularm::protocol::wire::frame::FrameReader;
 use pendularm::protocol::wire::payload::Payload;

@@ -1,4 +1,4 @@
-//! Parts that the tests of the web door share: requests as bytes, answers taken apart, and the client over WebSocket.
+//! Parts that the tests of HTTP and WebSocket share: requests as bytes, answers taken apart, and the client over WebSocket.
 
 use std::fs;
 use std::io::{Read, Write};

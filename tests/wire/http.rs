@@ -575,7 +575,7 @@ fn the_log_names_the_pages_address_at_the_start() {
     );
 }
 
-/// The program without the web door is to have nothing of it.
+/// The program without the feature web is to have nothing of it.
 #[test]
 fn without_the_feature_no_crate_of_the_web_door_is_built_in() {
     let tree = |arguments: &[&str]| {
