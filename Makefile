@@ -82,6 +82,9 @@ lint: ## Check formatting and lints; any warning fails
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
+	@echo "planted faults: has each its place in the sources still?"
+	python3 tests/simulate/faults.py check
+	python3 fuzz/faults/run.py check
 
 audit: ## Check the dependencies: licences, duplicates, sources, advisories where there is a copy of the database
 	@echo "make audit: cargo-deny against deny.toml"

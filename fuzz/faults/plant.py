@@ -42,6 +42,18 @@ pub fn fault_changed(frame: &[u8]) -> bytes::Bytes {
 """
 
 
+def misplaced(root, faults):
+    """The faults (what is wrong, file, right text, wrong text) whose right text does not stand once in its file, by number; says why."""
+    missing = []
+    for number, (what, file, right, _) in enumerate(faults, 1):
+        path = root / file
+        count = path.read_text().count(right) if path.exists() else 0
+        if count != 1:
+            print(f"fault {number} ({what}): {file} has {count} times {right!r}", file=sys.stderr)
+            missing.append(number)
+    return missing
+
+
 def plant(root, copy, parts, faults):
     """Copies `parts` of the sources and puts the faults in (what is wrong, file, right text, wrong text); gives those that have no
     place there any more, by number."""
@@ -55,14 +67,17 @@ def plant(root, copy, parts, faults):
             shutil.copy(root / part, copy / part)
     library = copy / "src/lib.rs"
     library.write_text(library.read_text() + SWITCH)
-    missing = []
-    for number, (what, file, right, wrong) in enumerate(faults, 1):
+    missing = misplaced(root, faults)
+    for number, (_, file, right, wrong) in enumerate(faults, 1):
+        if number in missing:
+            continue
         path = copy / file
-        text = path.read_text() if path.exists() else ""
+        text = path.read_text()
+        wrong = re.sub(r"\bR\((\d+)\)", rf"crate::fault_now({number}, \1)", wrong)
+        # Another fault may have changed the text since.
         if text.count(right) != 1:
-            print(f"fault {number} ({what}): {file} has {text.count(right)} times {right!r}", file=sys.stderr)
+            print(f"fault {number}: another stands in its place", file=sys.stderr)
             missing.append(number)
             continue
-        wrong = re.sub(r"\bR\((\d+)\)", rf"crate::fault_now({number}, \1)", wrong)
         path.write_text(text.replace(right, re.sub(r"\bF\b", f"crate::fault({number})", wrong)))
     return missing

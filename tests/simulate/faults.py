@@ -2,7 +2,8 @@
 """Puts faults into a copy of the sources, and sees at which seed the simulation finds each: `make simulate-faults`.
 
 Numbers among the arguments pick faults, `SEEDS` (1000) says how many seeds each may take, `FROM` (1) which is the first; the seeds that
-are kept come before it. Exit status 1 if a fault was not found, or where the source has changed and a fault is to be written anew.
+are kept come before it. Exit status 1 if a fault was not found, or where the source has changed and a fault is to be written anew;
+`check` only looks for that.
 """
 
 import os
@@ -14,7 +15,7 @@ import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "fuzz/faults"))
-from plant import plant  # noqa: E402
+from plant import misplaced, plant  # noqa: E402
 
 BUILD = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target")).resolve()
 COPY = BUILD / "simulate-faults"
@@ -85,12 +86,12 @@ FAULTS = [
      "        let mut reading = self.ahead.remove(&of).unwrap_or_default();\n"
      "        let most = self.waiting.iter().map(|(place, _)| place.reading).max();\n"
      "        if F { reading = reading.max(most.unwrap_or_default() + Duration::from_secs(60)); }"),
-    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/state.rs",
-     "        for call in self.services.take_provided_by(id) {",
-     "        if R(4) { return; }\n        for call in self.services.take_provided_by(id) {"),
-    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops/calls.rs",
-     "            sleep_until(deadline).await;",
-     "            sleep_until(deadline + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
+    ("calls of a provider that is gone wait on, one time in 4", f"{REGISTRY}/ops/cleanup.rs",
+     "        if let Some(call) = self.services.take(number) {",
+     "        if R(4) { return; }\n        if let Some(call) = self.services.take(number) {"),
+    ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops/cleanup.rs",
+     "            sleep_until(due).await;",
+     "            sleep_until(due + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
     ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle.rs",
      "        self.next().is_none_or(|next| next <= now)",
      "        self.next().is_none_or(|next| next <= now || (R(10) && next <= now + self.interval / 2))"),
@@ -100,8 +101,8 @@ FAULTS = [
      "                self.bytes -= newest.map_or(0, |(_, frame)| frame.len());\n            } else {\n                self.pop(topic);\n"
      "            }\n        }\n        None"),
     ("what a deaf client misses is not counted", "src/protocol/outbox/mod.rs",
-     "                return;\n            }\n            self.dropped += 1;", "                return;\n            }\n            self.dropped += u64::from(!F);"),
-    ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments.rs",
+     "                self.dropped += count as u64;", "                self.dropped += if F { 0 } else { count as u64 };"),
+    ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments/split.rs",
      "    let total = pieces.len();", "    let total = pieces.len();\n    if R(10) { pieces.swap(0, total - 1); }"),
     ("a number has another last bit in CBOR, one in 50", "src/protocol/ros/cbor.rs",
      "    out.extend(&value.to_be_bytes());",
@@ -146,6 +147,8 @@ def find(number, program):
 
 
 def main():
+    if sys.argv[1:] == ["check"]:
+        sys.exit(1 if misplaced(ROOT, FAULTS) else 0)
     chosen = [int(word) for word in sys.argv[1:]] or list(range(1, len(FAULTS) + 1))
     parts = ("src", "page", "tests", "client", "fuzz/src", "Cargo.toml", "Cargo.lock", "README.md")
     missing = plant(ROOT, COPY, parts, FAULTS)

@@ -22,8 +22,6 @@ use crate::protocol::wire::{fragments, series};
 /// Longest message, or series of them, that is encoded where it is heard: in all the forms that there may be it takes
 /// a fraction of a millisecond.
 const SHORT: usize = 16 * 1024;
-/// Longer than this is long: that is encoded in a line of its own, so that what is shorter waits for less.
-const LONG: usize = 256 * 1024;
 /// Bytes of memory that encoding takes per byte of a message, beside its tree: the names of ROS 1 may double the
 /// message, the buffer grows by doubling, and names are put in order.
 const ENCODING_BYTES: usize = 4;
@@ -90,11 +88,7 @@ impl Encoded {
     pub(super) async fn messages(self: &Arc<Self>) -> &Made {
         let make = || async {
             let this = Arc::clone(self);
-            let errand = if self.plain.len() > LONG {
-                Errand::WritingLong
-            } else {
-                Errand::Writing
-            };
+            let errand = Errand::writing(self.plain.len());
             let made = aside(errand, move || this.make()).await;
             made.unwrap_or_default()
         };

@@ -24,16 +24,44 @@ pub const PLACES: usize = 2;
 pub enum Errand {
     /// Reads a client's input.
     Reading,
+    /// The same with more than [`LONG`].
+    ReadingLong,
     /// Writes messages in the forms that clients ask for.
     Writing,
-    /// The same with messages of hundreds of kilobytes.
+    /// The same with more than [`LONG`].
     WritingLong,
     /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
     Listing,
 }
 
+/// Bytes of a long input or message. Long ones have places of their own: what is shorter waits for less.
+const LONG: usize = 256 * 1024;
+
+impl Errand {
+    /// Reads so many bytes of a client's input.
+    #[must_use]
+    pub const fn reading(bytes: usize) -> Self {
+        if bytes > LONG {
+            Self::ReadingLong
+        } else {
+            Self::Reading
+        }
+    }
+
+    /// Writes a message of so many bytes in another form.
+    #[must_use]
+    pub const fn writing(bytes: usize) -> Self {
+        if bytes > LONG {
+            Self::WritingLong
+        } else {
+            Self::Writing
+        }
+    }
+}
+
 thread_local! {
     static READING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
+    static READING_LONG: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
     static WRITING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
     static WRITING_LONG: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
     static LISTING: Arc<Semaphore> = Arc::new(Semaphore::new(PLACES));
@@ -47,6 +75,7 @@ impl PlaceAside {
     pub async fn take(errand: Errand) -> Option<Self> {
         let free = match errand {
             Errand::Reading => READING.with(Arc::clone),
+            Errand::ReadingLong => READING_LONG.with(Arc::clone),
             Errand::Writing => WRITING.with(Arc::clone),
             Errand::WritingLong => WRITING_LONG.with(Arc::clone),
             Errand::Listing => LISTING.with(Arc::clone),

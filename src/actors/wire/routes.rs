@@ -59,7 +59,7 @@ impl Nodes {
     ) {
         let take = move |call: ServiceCall| {
             let node = node.clone();
-            let is_long = call.arguments.payload().get().len() > LONG_ARGUMENTS;
+            let length = call.arguments.payload().get().len();
             let read = move || {
                 let mut caller = call.caller;
                 match A::read(call.service, &call.arguments) {
@@ -71,8 +71,8 @@ impl Nodes {
                     Err(rejections) => caller.refuse(&rejections.status()),
                 }
             };
-            if is_long {
-                actix_rt::spawn(aside(Errand::Reading, read));
+            if length > LONG_ARGUMENTS {
+                actix_rt::spawn(aside(Errand::reading(length), read));
             } else {
                 read();
             }

@@ -40,13 +40,13 @@ fn requests<const N: usize>(
             done,
         } => {
             let follow = follow.clone();
-            let is_long = arguments.payload().get().len() > LONG_ARGUMENTS;
+            let length = arguments.payload().get().len();
             let read = move || match FollowGoal::read(&arguments, &joint_names::<N>()) {
                 Ok(goal) => follow.do_send(path(&goal, client, done)),
                 Err(rejections) => client.refuse(&rejections.status()),
             };
-            if is_long {
-                actix_rt::spawn(aside(Errand::Reading, read));
+            if length > LONG_ARGUMENTS {
+                actix_rt::spawn(aside(Errand::reading(length), read));
             } else {
                 read();
             }

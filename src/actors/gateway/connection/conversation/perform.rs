@@ -132,7 +132,7 @@ impl Reader {
         if length <= READ_HERE {
             return Some(read());
         }
-        let read = aside(Errand::Reading, read).await;
+        let read = aside(Errand::reading(length), read).await;
         if read.is_none() {
             self.refuse(UNREADABLE);
         }
