@@ -22,6 +22,12 @@ fn codes(cell: &str) -> Vec<&str> {
 }
 
 #[test]
+fn the_readme_is_read_in_one_sitting() {
+    let length = text("README.md").len();
+    assert!(length <= 10_000, "README.md has {length} bytes");
+}
+
+#[test]
 fn the_papers_list_the_targets_that_make_help_lists() {
     let makefile = text("Makefile");
     let documented: BTreeSet<String> = makefile

@@ -44,13 +44,14 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     /// Takes a stream on which the handshake has been made; `behind` came after it.
     pub(super) async fn open(stream: S, behind: &[u8], shared: &Shared) -> Rc<Self> {
         let life = Rc::new(Cell::new(Instant::now()));
-        let watched = Watched::new(
+        let mut watched = Watched::new(
             stream,
             Rc::clone(&life),
             Rc::clone(&shared.outgoing),
             Unfinished::new(&shared.account),
             shared.account.take(0),
         );
+        watched.follow(behind);
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
             .write_buffer_size(FRAGMENT)

@@ -6,6 +6,7 @@
 //!
 //! **Invariant:** over WebSocket no status is sent before the client has asked for such.
 
+mod heads;
 mod link;
 mod watched;
 

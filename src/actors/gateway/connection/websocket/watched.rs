@@ -13,6 +13,7 @@ use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
+use super::heads::FrameHeads;
 use crate::actors::gateway::connection::outgoing::Outgoing;
 use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::limits::FRAME_TIME;
@@ -36,8 +37,10 @@ pub(super) struct Watched<S> {
     unfinished: Unfinished,
     /// Bytes that belong to no complete message yet, or to one that has just been read.
     pending: usize,
-    /// The longest message so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to
-    /// it, or to the longest frame of it, and stays so.
+    /// Follows the frames.
+    heads: FrameHeads,
+    /// The longest frame so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to it,
+    /// and stays so.
     longest: usize,
     /// Arrival time of the first pending byte, plus all time spent not reading.
     began: Option<Instant>,
@@ -68,11 +71,20 @@ impl<S> Watched<S> {
             is_blocked: false,
             unfinished,
             pending: 0,
+            heads: FrameHeads::default(),
             longest: 0,
             began: None,
             is_complete: false,
             unsent,
             turn: TURN,
+        }
+    }
+
+    /// Bytes have come.
+    pub(super) fn follow(&mut self, bytes: &[u8]) {
+        let frame = usize::try_from(self.heads.follow(bytes)).unwrap_or(MAX_FRAME);
+        if frame > READ_BUFFER {
+            self.longest = self.longest.max(frame.min(MAX_FRAME));
         }
     }
 
@@ -113,9 +125,6 @@ impl<S> Watched<S> {
         // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
         // kept.
         let unfinished = (2 * pending).min(3 * MAX_FRAME);
-        if pending > READ_BUFFER {
-            self.longest = self.longest.max(pending.min(MAX_FRAME));
-        }
         self.unfinished.keep(unfinished.max(self.longest));
     }
 
@@ -143,6 +152,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             let now = Instant::now();
             self.life.set(now);
             self.began.get_or_insert(now);
+            self.follow(buffer.filled().get(before..).unwrap_or_default());
             let pending = self.pending + received;
             self.settle(pending);
         }
