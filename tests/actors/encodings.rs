@@ -153,7 +153,7 @@ fn only_messages_of_its_own_topic_wait_for_one_that_is_cut_up() {
             PlaceAside::take(Errand::WritingLong).await,
             PlaceAside::take(Errand::WritingLong).await,
         ];
-        for topic in ["/t", "/plain"] {
+        for topic in ["/t", "/plain", "/shorter"] {
             publisher.advertise(topic).await;
         }
         for (topic, text) in [
@@ -166,6 +166,21 @@ fn only_messages_of_its_own_topic_wait_for_one_that_is_cut_up() {
                 .await;
         }
         assert_eq!(peer.receive().await["topic"], "/plain");
+        let mut second = gateway.connect(WIDE);
+        second
+            .send(json!({"op": "subscribe", "topic": "/shorter", "fragment_size": 20_000}))
+            .await;
+        second.receive().await;
+        publisher
+            .send(
+                json!({"op": "publish", "topic": "/shorter", "msg": {"data": "y".repeat(60_000)}}),
+            )
+            .await;
+        let (shorter, _) = next_message(&mut second).await;
+        assert_eq!(
+            shorter["topic"], "/shorter",
+            "others' long ones have a line of their own"
+        );
         drop(places);
         let (long, _) = next_message(&mut peer).await;
         assert_eq!(long["msg"]["data"].as_str().unwrap().len(), 300_000);

@@ -24,11 +24,11 @@ pub const PLACES: usize = 2;
 pub enum Errand {
     /// Reads a client's input.
     Reading,
-    /// The same with more than [`LONG`].
+    /// The same with more than 256 KiB.
     ReadingLong,
     /// Writes messages in the forms that clients ask for.
     Writing,
-    /// The same with more than [`LONG`].
+    /// The same with more than 256 KiB.
     WritingLong,
     /// Writes long lists that clients ask for: whoever encodes messages without end holds up no question.
     Listing,
