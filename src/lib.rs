@@ -4,7 +4,7 @@
 //! and JSON) and `actors` (joins the two, one actor per node). `math` and `protocol` do not know each other.
 //!
 //! Beside them [`study`] (pure: `math` measured against theory), `report` (clock, files and drawings around the study)
-//! and `web`, the door for browsers.
+//! and `web`, the way in for browsers.
 //!
 //! | feature | default | adds |
 //! | --- | --- | --- |

@@ -228,6 +228,39 @@ fn nothing_is_cut_up_for_a_client_that_does_not_read() {
     });
 }
 
+/// Other topics bring more than the client takes: it may wait for room for ever.
+#[test]
+fn a_message_is_cut_up_in_time_however_much_other_topics_bring() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
+        subscribe_in_pieces(&mut subscriber, 65_536).await;
+        subscriber
+            .send(json!({"op": "subscribe", "topic": "/plain"}))
+            .await;
+        subscriber.receive().await;
+        for topic in ["/t", "/plain"] {
+            publisher.advertise(topic).await;
+        }
+        let pad = "x".repeat(128 * 1024);
+        for n in 0..100 {
+            let topic = if n == 80 { "/t" } else { "/plain" };
+            let msg = json!({"n": n, "pad": pad});
+            publisher
+                .send(json!({"op": "publish", "topic": topic, "msg": msg}))
+                .await;
+            sleep(Duration::from_millis(100)).await;
+        }
+        loop {
+            let (message, _) = next_message(&mut subscriber).await;
+            if message["topic"] == "/t" {
+                return;
+            }
+            assert!(message["msg"]["n"] != 99, "it never came");
+        }
+    });
+}
+
 /// Pieces of 64 bytes have more than as much around them: of 3 MB they are longer than any outbox takes.
 #[test]
 fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had_them() {

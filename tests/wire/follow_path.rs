@@ -301,3 +301,39 @@ fn a_paused_arm_is_on_no_way_that_there_were_feedback_of() {
         client.ask("/arm_sim/pause", json!({"data": false}));
     }
 }
+
+#[test]
+fn a_paused_arm_that_is_stepped_is_on_its_way_again() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.send(&goal("long", &through(&[point([0.3, 0.3], 1e3)])));
+    for _ in 0..3 {
+        let taken = client.ask("/arm_sim/step", json!({"steps": 50}));
+        let time = taken["time"].as_f64().unwrap();
+        let said = client.receive_where("feedback", |frame| frame["op"] == "action_feedback");
+        let stamp = &said["values"]["header"]["stamp"];
+        let nanosec = stamp["nanosec"].as_f64().unwrap();
+        let said = stamp["sec"].as_f64().unwrap() + nanosec / 1e9;
+        assert!((said - time).abs() < 1e-8, "{said} at {time}");
+    }
+}
+
+#[test]
+fn a_reset_is_answered_when_the_path_has_ended() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    for _ in 0..5 {
+        client.send(&goal("long", &through(&[point([0.3, 0.3], 1e3)])));
+        client.receive_where("feedback", |frame| frame["op"] == "action_feedback");
+        client.kept.clear();
+        client.ask("/arm_sim/reset", json!({}));
+        let ends = client
+            .kept
+            .iter()
+            .filter(|frame| frame["op"] == "action_result");
+        assert_eq!(ends.count(), 1, "{:?}", client.kept);
+    }
+}

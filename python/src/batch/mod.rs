@@ -8,6 +8,7 @@
 mod given;
 mod lanes;
 mod pool;
+mod stepping;
 mod windows;
 
 use std::sync::Mutex;
@@ -18,7 +19,6 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
-use rayon::ThreadPool;
 
 use crate::arm::for_either;
 use crate::fields::{self, Bound, Held, Numbers, Object, Whole, refused};
@@ -119,17 +119,16 @@ impl Batch {
         let arms = u64::try_from(self.arms).unwrap_or(u64::MAX);
         let threads = u64::try_from(self.threads).unwrap_or(1);
         let length = (threads.saturating_mul(STEPS_PER_LOOK) / arms).max(1);
-        let taken = self.take(
-            py,
-            pool.as_deref(),
-            Piece {
-                steps,
-                effort: effort.as_ref(),
-                done: 0,
-                length,
-                is_shared: pool.is_some(),
-            },
-        );
+        let first = Piece {
+            steps,
+            effort: effort.as_ref(),
+            done: 0,
+            length,
+            is_shared: pool.is_some(),
+        };
+        let taken = for_either!(Either, &self.own, lanes => {
+            stepping::take(py, lanes, &self.windows, pool.as_deref(), first)
+        });
         if taken.is_err() && effort.is_some() {
             for_either!(Either, &self.own, lanes => lanes::end_effort(&mut hold(py, lanes), steps));
         }
@@ -390,26 +389,5 @@ impl Batch {
             self.links(),
             self.threads
         )
-    }
-}
-
-impl Batch {
-    /// Takes all steps, from those of this piece on, with a look for signals between two pieces.
-    fn take(&self, py: Python<'_>, pool: Option<&ThreadPool>, first: Piece<'_>) -> PyResult<()> {
-        let mut piece = first;
-        while piece.done < piece.steps.most() {
-            for_either!(Either, &self.own, lanes => {
-                let mut lanes = hold(py, lanes);
-                let lanes = lanes.as_mut_slice();
-                self.windows.write(py, |shown| match pool {
-                    None => lanes::advance(lanes, shown, piece),
-                    Some(pool) => pool.install(|| lanes::advance(lanes, shown, piece)),
-                })?;
-            });
-            piece.done = piece.done.saturating_add(piece.length);
-            // No lock is held here: a signal's handler may want to look at the arms.
-            py.check_signals()?;
-        }
-        Ok(())
     }
 }

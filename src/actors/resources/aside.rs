@@ -15,8 +15,7 @@ use tokio::task::{spawn_blocking, yield_now};
 use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
 
-/// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other, and the arm and
-/// the gateway keep most of the machine.
+/// Threads at work at once on each kind of errand: one that has megabytes to do holds up no other.
 pub const PLACES: usize = 2;
 
 /// The kinds of errands. Each has places of its own.

@@ -142,8 +142,15 @@ pub(super) const TRANSFORMS: [Field; 1] = [required(
 
 /// Topics of the arm's state, in both spellings. News of a change on `/diagnostics` come before the answer to it, and
 /// stay.
-pub(super) const ARM_STATE: &[&str] = ARM_STATE_AND_FEEDBACK.split_at(6).0;
-/// The same, and feedback of a goal: after a pause and a reset there is no goal under way.
+pub(super) const ARM_STATE: &[&str] = &[
+    Topic::JointStates.name(),
+    Topic::JointStates.short_name(),
+    Topic::Clock.name(),
+    Topic::Clock.short_name(),
+    Topic::Tf.name(),
+    Topic::Tf.short_name(),
+];
+/// The same, and feedback of a goal: after a pause and a reset none is due.
 pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = &[
     Topic::JointStates.name(),
     Topic::JointStates.short_name(),

@@ -155,9 +155,19 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
 }
 
 impl<const N: usize> Handler<Settle> for PathFollower<N> {
-    type Result = ();
+    type Result = AtomicResponse<Self, ()>;
 
-    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
+    /// Looks at the arm first: its goal may have ended by a reset, which is to be said before that is answered.
+    fn handle(&mut self, _: Settle, _: &mut Context<Self>) -> Self::Result {
+        if self.active.is_none() {
+            return AtomicResponse::new(Box::pin(std::future::ready(()).into_actor(self)));
+        }
+        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
+        AtomicResponse::new(Box::pin(motion.map(|motion, node, ctx| match motion {
+            Ok(motion) => node.lead(&motion, None, ctx),
+            Err(_) => node.abort("the arm does not answer"),
+        })))
+    }
 }
 
 impl<const N: usize> Handler<ShutDown> for PathFollower<N> {
@@ -233,7 +243,7 @@ impl<const N: usize> PathFollower<N> {
         let time = motion.time - goal.began;
         let desired = goal.course.path.at(time);
         let standing = goal.course.judge(time, &motion.state);
-        let may_be_due = goal.client.wants_feedback && !motion.is_paused;
+        let may_be_due = goal.client.wants_feedback && !motion.stands_still;
         if may_be_due && goal.feedback.due(motion.time) {
             let values = feedback(motion.time, time, &desired, &motion.state);
             goal.client.feed_back(values);

@@ -129,11 +129,7 @@ impl<const N: usize> ArmSim<N> {
 
     /// Answers once all that the arm has said of goals is published: news of a goal go by way of its owner, and none
     /// may come after the answer that the arm stands still.
-    pub(super) fn once_settled(
-        &mut self,
-        ctx: &mut Context<Self>,
-        answer: impl FnOnce(&mut Self) + 'static,
-    ) {
+    pub(super) fn once_settled(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
         let owners = [&self.goals.settle, &self.goals.settle_path];
         let asked: Vec<_> = owners
             .into_iter()
@@ -141,7 +137,7 @@ impl<const N: usize> ArmSim<N> {
             .map(|owner| owner.send(Settle))
             .collect();
         if asked.is_empty() {
-            return answer(self);
+            return answer();
         }
         let settled = async move {
             for one in asked {
@@ -149,7 +145,7 @@ impl<const N: usize> ArmSim<N> {
                 let _ = one.await;
             }
         };
-        ctx.spawn(settled.into_actor(self).map(move |(), arm, _| answer(arm)));
+        ctx.spawn(settled.into_actor(self).map(move |(), _, _| answer()));
     }
 }
 

@@ -25,8 +25,8 @@ pub struct JointMotion<const N: usize> {
     pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
-    /// Whether its time is frozen.
-    pub is_paused: bool,
+    /// Whether it is paused, and no step has been taken since.
+    pub stands_still: bool,
 }
 
 /// The setpoint is moved on, if it is still the one that is known. The answer is whether it was. From
@@ -50,7 +50,7 @@ impl<const N: usize> Handler<ArmMotion<N>> for ArmSim<N> {
             setpoint: *self.simulation.pid().setpoint(),
             time: self.simulation.time(),
             resets: self.goals.past.resets,
-            is_paused: self.paused,
+            stands_still: self.paused && self.simulation.time() <= self.paused_at,
         }
     }
 }

@@ -56,6 +56,8 @@ pub struct ArmSim<const N: usize> {
     pub(super) simulation: Simulation<N>,
     pub(super) pacer: Pacer,
     pub(super) paused: bool,
+    /// Simulation time at the latest change of that, or at the reset since \[s\].
+    pub(super) paused_at: f64,
     /// A wake-up after a [`BREATHER`] is on its way.
     pub(super) catching_up: bool,
     /// The moment from which the pacer and the ticks count.
@@ -90,6 +92,7 @@ impl<const N: usize> ArmSim<N> {
             telemetry: Telemetry::new(gauges, &simulation),
             simulation,
             paused: false,
+            paused_at: 0.0,
             catching_up: false,
             epoch: Instant::now(),
             publish,

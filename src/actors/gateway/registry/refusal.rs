@@ -46,15 +46,15 @@ pub(crate) enum Refusal {
     CallerBusy(String),
     #[error("at most {MAX_WAITING_CALLS} calls of a connection wait for other clients' answers")]
     TooManyWaiting,
-    #[error("action: {0} is pursued by the runtime itself")]
+    #[error("action: {0} is served by the runtime itself")]
     RuntimeAction(String),
-    #[error("action: this connection does not pursue {0}")]
+    #[error("action: this connection does not serve {0}")]
     NotActionServer(String),
-    #[error("id: no goal of {0} with this id is pursued by this connection")]
+    #[error("id: this connection carries out no goal of {0} with this id")]
     StaleGoal(String),
     #[error("id: no goal of {0} with this id was sent by this connection")]
     NoGoal(String),
-    #[error("at most {MAX_WAITING_GOALS} goals of a connection are pursued by other clients")]
+    #[error("at most {MAX_WAITING_GOALS} goals of a connection are carried out by other clients")]
     TooManyGoals,
     #[error("action: no action is called {0}")]
     NoAction(String),

@@ -41,7 +41,7 @@ impl<const N: usize> Handler<Call<Reset<N>>> for ArmSim<N> {
             self.reset();
         }
         let values = *self.simulation.state();
-        self.once_settled(ctx, move |_| reply.conclude(Echo { values, rejected }));
+        self.once_settled(ctx, move || reply.conclude(Echo { values, rejected }));
     }
 }
 
@@ -50,6 +50,7 @@ impl<const N: usize> ArmSim<N> {
         let diverged = self.simulation.divergence().is_some();
         self.end_goal_for_reset();
         self.change(ArmInput::Reset);
+        self.paused_at = self.simulation.time();
         self.restart_pacer();
         self.restart_energy_drift();
         if diverged {

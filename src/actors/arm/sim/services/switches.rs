@@ -49,11 +49,11 @@ impl<const N: usize> Handler<Call<Pause>> for ArmSim<N> {
     fn handle(&mut self, call: Call<Pause>, ctx: &mut Context<Self>) {
         self.attend_call(ctx);
         let (reply, echo) = (call.reply, self.pause(call.ask));
-        let answer = move |_: &mut Self| reply.conclude(echo);
+        let answer = move || reply.conclude(echo);
         if self.paused {
             self.once_settled(ctx, answer);
         } else {
-            answer(self);
+            answer();
         }
     }
 }
@@ -64,6 +64,7 @@ impl<const N: usize> ArmSim<N> {
             && paused != self.paused
         {
             self.paused = paused;
+            self.paused_at = self.simulation.time();
             self.restart_pacer();
             self.publish_diagnostics();
         }

@@ -51,7 +51,7 @@ impl FailedAttempts {
     }
 }
 
-/// The address, or of IPv6 the network that one network has at least.
+/// The address, or of IPv6 its /64, which one site has at least.
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {

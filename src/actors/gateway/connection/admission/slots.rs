@@ -1,6 +1,6 @@
 //! A fixed number of slots. When all are in use, a newcomer evicts the oldest holder.
 //!
-//! Clients that finish quickly keep their slot; only idle ones are evicted. Refusing the newcomer would shut out honest
+//! Where clients finish quickly, only slow ones become the oldest. To refuse the newcomer instead would shut out honest
 //! clients.
 //!
 //! A holder that needs room which is counted elsewhere may evict the oldest ones until there is enough.

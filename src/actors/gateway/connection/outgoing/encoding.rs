@@ -1,7 +1,8 @@
 //! Topic messages that wait to be encoded for the client, one after the other, on another thread.
 //!
 //! **Invariant:** the messages of a topic keep their order: behind one that is being encoded they wait for it. Other
-//! topics, and answers, do not: whoever asks for long messages in another form hears of the arm in time all the same.
+//! topics wait only where they have to be encoded too, and answers never: whoever asks for long messages in another
+//! form hears of the arm in time all the same.
 
 use std::rc::{Rc, Weak};
 
@@ -88,8 +89,8 @@ impl EncodingTask {
             drop(outgoing);
             if let Frames::Encoded(encoded, newest) = &message.frames {
                 // Throttling keeps the newest: it has to see all of them.
-                while newest.is_none() && encoded.at_hand().is_none() && self.has_enough() {
-                    sleep(LOOK_AGAIN).await;
+                if newest.is_none() && encoded.at_hand().is_none() {
+                    self.wait_for_room().await;
                 }
                 if encoded.messages().await.messages.len() > FREE_FRAMES {
                     // Many clients may have as many to go through.
@@ -111,8 +112,18 @@ impl EncodingTask {
         }
     }
 
-    fn has_enough(&self) -> bool {
-        let outgoing = self.0.upgrade();
-        outgoing.is_some_and(|outgoing| outgoing.topic_bytes() > ENOUGH)
+    /// Waits while enough waits for the client, unless other topics bring more than it takes: among their messages this
+    /// one has its place too.
+    async fn wait_for_room(&self) {
+        let mut dropped = None;
+        while let Some(outgoing) = self.0.upgrade() {
+            let now = outgoing.outbox.borrow().dropped();
+            let goes_on = *dropped.get_or_insert(now) == now && outgoing.topic_bytes() > ENOUGH;
+            drop(outgoing);
+            if !goes_on {
+                return;
+            }
+            sleep(LOOK_AGAIN).await;
+        }
     }
 }

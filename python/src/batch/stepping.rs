@@ -1,0 +1,37 @@
+//! The steps of a batch, with looks for signals.
+//!
+//! **Invariant:** no lock is held when a signal's handler runs: it may want to look at the arms.
+
+use std::sync::Mutex;
+
+use pendularm::math::simulation::Simulation;
+use pyo3::prelude::{PyResult, Python};
+use rayon::ThreadPool;
+
+use super::lanes::{self, Piece};
+use super::windows::Windows;
+use crate::patience::hold;
+
+/// Takes all steps, from those of this piece on, with a look for signals between two pieces.
+pub(super) fn take<const N: usize>(
+    py: Python<'_>,
+    arms: &Mutex<Vec<Simulation<N>>>,
+    windows: &Windows,
+    pool: Option<&ThreadPool>,
+    first: Piece<'_>,
+) -> PyResult<()> {
+    let mut piece = first;
+    while piece.done < piece.steps.most() {
+        {
+            let mut arms = hold(py, arms);
+            let arms = arms.as_mut_slice();
+            windows.write(py, |shown| match pool {
+                None => lanes::advance(arms, shown, piece),
+                Some(pool) => pool.install(|| lanes::advance(arms, shown, piece)),
+            })?;
+        }
+        piece.done = piece.done.saturating_add(piece.length);
+        py.check_signals()?;
+    }
+    Ok(())
+}
