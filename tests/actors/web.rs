@@ -519,7 +519,7 @@ fn frame_head(opcode: u8, length: usize) -> Vec<u8> {
 }
 
 /// The close frame that the peer is sent: code and reason, behind whatever else comes.
-async fn farewell(stream: &mut DuplexStream) -> (u16, String) {
+async fn close_reason(stream: &mut DuplexStream) -> (u16, String) {
     let mut bytes = Vec::new();
     stream
         .read_to_end(&mut bytes)
@@ -560,7 +560,7 @@ fn a_message_that_does_not_end_is_given_up_after_a_minute() {
                 };
                 stream.write_all(&bytes).await.unwrap();
             }
-            let (code, why) = farewell(&mut stream).await;
+            let (code, why) = close_reason(&mut stream).await;
             assert_eq!(
                 (code, why.contains("within a minute")),
                 (1008, true),
@@ -604,7 +604,7 @@ fn a_peer_that_holds_most_is_closed_with_a_reason() {
             // It may have been closed already.
             let _ = hog.stream().write_all(&bytes).await;
         }
-        let (code, why) = farewell(&mut hog.into_stream()).await;
+        let (code, why) = close_reason(&mut hog.into_stream()).await;
         assert_eq!(code, 1013);
         assert!(
             why.starts_with("memory: this connection held the most"),

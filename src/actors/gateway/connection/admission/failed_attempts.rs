@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn an_address_is_a_household() {
+    fn an_address_of_ipv6_counts_by_its_prefix() {
         let same = |one: &str, other: &str| {
             network(one.parse().unwrap()) == network(other.parse().unwrap())
         };
