@@ -42,16 +42,20 @@ pub fn fault_changed(frame: &[u8]) -> bytes::Bytes {
 """
 
 
+def text_of(root, number, fault):
+    """The text of the fault's file, if the right text stands in it once; else nothing, and says why."""
+    what, file, right, _ = fault
+    path = root / file
+    text = path.read_text() if path.exists() else ""
+    if text.count(right) == 1:
+        return text
+    print(f"fault {number} ({what}): {file} has {text.count(right)} times {right!r}", file=sys.stderr)
+    return None
+
+
 def misplaced(root, faults):
-    """The faults (what is wrong, file, right text, wrong text) whose right text does not stand once in its file, by number; says why."""
-    missing = []
-    for number, (what, file, right, _) in enumerate(faults, 1):
-        path = root / file
-        count = path.read_text().count(right) if path.exists() else 0
-        if count != 1:
-            print(f"fault {number} ({what}): {file} has {count} times {right!r}", file=sys.stderr)
-            missing.append(number)
-    return missing
+    """The faults (what is wrong, file, right text, wrong text) that have no place in the sources any more, by number."""
+    return [number for number, fault in enumerate(faults, 1) if text_of(root, number, fault) is None]
 
 
 def plant(root, copy, parts, faults):
@@ -67,17 +71,13 @@ def plant(root, copy, parts, faults):
             shutil.copy(root / part, copy / part)
     library = copy / "src/lib.rs"
     library.write_text(library.read_text() + SWITCH)
-    missing = misplaced(root, faults)
-    for number, (_, file, right, wrong) in enumerate(faults, 1):
-        if number in missing:
-            continue
-        path = copy / file
-        text = path.read_text()
-        wrong = re.sub(r"\bR\((\d+)\)", rf"crate::fault_now({number}, \1)", wrong)
-        # Another fault may have changed the text since.
-        if text.count(right) != 1:
-            print(f"fault {number}: another stands in its place", file=sys.stderr)
+    missing = []
+    for number, fault in enumerate(faults, 1):
+        _, file, right, wrong = fault
+        text = text_of(copy, number, fault)
+        if text is None:
             missing.append(number)
             continue
-        path.write_text(text.replace(right, re.sub(r"\bF\b", f"crate::fault({number})", wrong)))
+        wrong = re.sub(r"\bR\((\d+)\)", rf"crate::fault_now({number}, \1)", wrong)
+        (copy / file).write_text(text.replace(right, re.sub(r"\bF\b", f"crate::fault({number})", wrong)))
     return missing

@@ -19,8 +19,8 @@ use crate::protocol::ros::tree::MessageTree;
 use crate::protocol::ros::{cbor, stamps};
 use crate::protocol::wire::{fragments, series};
 
-/// Longest message, or series of them, that is encoded where it is heard: in all the forms that there may be it takes
-/// a fraction of a millisecond.
+/// Longest message, or series of them, that is encoded where it is heard: in one form it takes some tenth of a
+/// millisecond, and each connection has a turn of its own.
 const SHORT: usize = 16 * 1024;
 /// Bytes of memory that encoding takes per byte of a message, beside its tree: the names of ROS 1 may double the
 /// message, the buffer grows by doubling, and names are put in order.

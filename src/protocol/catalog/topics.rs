@@ -221,6 +221,7 @@ impl Topic {
 
 #[cfg(test)]
 mod tests {
+    use super::ARM_STATE;
     use crate::protocol::catalog::{Rosapi, Service};
 
     /// A question answered, a listing or a computation leaves the arm as it is: what waits for a client stays.
@@ -230,9 +231,11 @@ mod tests {
         let changes = Service::ALL
             .into_iter()
             .chain(questions)
-            .filter(|service| !service.supersedes().is_empty())
-            .map(Service::name);
-        let mut changes: Vec<&str> = changes.collect();
+            .filter(|service| !service.supersedes().is_empty());
+        let mut changes: Vec<&str> = changes
+            .inspect(|service| assert!(service.supersedes().starts_with(ARM_STATE)))
+            .map(Service::name)
+            .collect();
         changes.sort_unstable();
         assert_eq!(
             changes,

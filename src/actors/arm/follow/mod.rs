@@ -162,11 +162,7 @@ impl<const N: usize> Handler<Settle> for PathFollower<N> {
         if self.active.is_none() {
             return AtomicResponse::new(Box::pin(std::future::ready(()).into_actor(self)));
         }
-        let motion = self.arm.motion.send(ArmMotion).into_actor(self);
-        AtomicResponse::new(Box::pin(motion.map(|motion, node, ctx| match motion {
-            Ok(motion) => node.lead(&motion, None, ctx),
-            Err(_) => node.abort("the arm does not answer"),
-        })))
+        AtomicResponse::new(Box::pin(self.go_on()))
     }
 }
 
@@ -226,11 +222,16 @@ impl<const N: usize> PathFollower<N> {
     /// Sees how the arm stands, and moves its setpoint on.
     fn look(&mut self, ctx: &mut Context<Self>) {
         self.timer = None;
+        ctx.wait(self.go_on());
+    }
+
+    /// The same, for whoever waits for it.
+    fn go_on(&self) -> impl ActorFuture<Self, Output = ()> + use<N> {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
-        ctx.wait(motion.map(|motion, node, ctx| match motion {
+        motion.map(|motion, node, ctx| match motion {
             Ok(motion) => node.lead(&motion, None, ctx),
             Err(_) => node.abort("the arm does not answer"),
-        }));
+        })
     }
 
     fn lead(&mut self, motion: &JointMotion<N>, done: Option<Done>, ctx: &mut Context<Self>) {
