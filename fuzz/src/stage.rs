@@ -201,11 +201,7 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
     RosapiNode::attach(&rosapi, nodes);
     let ik = Ik::<2>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
-    let tracker = GoalTracker {
-        track: arm.clone().recipient(),
-        command: arm.clone().recipient(),
-        end: arm.clone().recipient(),
-    };
+    let tracker = GoalTracker::of(&arm);
     let action = IkAction::<2>::new(ik.recipient(), tracker, registry.clone().recipient()).start();
     IkAction::attach(&action, nodes);
     let goals = GoalClient {

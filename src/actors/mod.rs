@@ -52,8 +52,9 @@
 //! - [`SimulationTime`], from `rosapi` and `rosout`: the time.
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
-//! - [`ArmMotion`], [`MoveSetpoint`], [`SettleWith`], from `follow`: how it moves; its setpoint moved on along a path;
-//!   who is to be asked before it says that it stands still.
+//! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
+//! - [`SettleWith`], from `ik_action` and `follow` when they start: who is to be asked before it says that it stands
+//!   still.
 //!
 //! To `arm_sim`, `ik_action`, `follow` and `tf_web`, from the runtime: [`node::ShutDown`], the end, at which steps that
 //! are still to be taken are refused and goals are aborted.

@@ -265,11 +265,7 @@ where
     Ik::attach(&ik, nodes);
     let follower = PathFollower::new(PathArm::of(&arm)).start();
     PathFollower::attach(&follower, nodes);
-    let tracker = GoalTracker {
-        track: arm.clone().recipient(),
-        command: arm.clone().recipient(),
-        end: arm.clone().recipient(),
-    };
+    let tracker = GoalTracker::of(&arm);
     let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
     IkAction::attach(&action, nodes);
     let busy = vec![

@@ -74,11 +74,7 @@ fn every_service_that_is_listed_is_served() {
         let arm = ArmSim::<2>::new(Arm::default(), Gains::default(), publish(), gauges).start();
         let mut nodes = Nodes::default();
         ArmSim::attach(&arm, &mut nodes);
-        let tracker = GoalTracker {
-            track: arm.clone().recipient(),
-            command: arm.clone().recipient(),
-            end: arm.clone().recipient(),
-        };
+        let tracker = GoalTracker::of(&arm);
         let pose = arm.clone().recipient();
         start_goal_nodes(&gateway.registry, pose, tracker, 1, &mut nodes);
         let pool = WorkerPool::without_threads();

@@ -228,9 +228,8 @@ where
     let ik = Ik::<N>::new(arm.clone().recipient()).start();
     Ik::attach(&ik, nodes);
     let tracker = GoalTracker {
-        track: arm.clone().recipient(),
         command: tap.clone().recipient(),
-        end: arm.clone().recipient(),
+        ..GoalTracker::of(&arm)
     };
     let action = IkAction::<N>::new(ik.recipient(), tracker, publish.clone()).start();
     IkAction::attach(&action, nodes);

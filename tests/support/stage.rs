@@ -17,7 +17,7 @@ use pendularm::actors::arm::ik_action::{
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
 use pendularm::actors::arm::sim::{
     ArmPose, ArmSim, CommandGoal, Enable, EndGoal, GoalJudged, Pause, Pose, Reset, SetParams,
-    SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+    SetSetpoint, SettleWith, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
@@ -75,11 +75,7 @@ where
         PathFollower::attach(&PathFollower::new(PathArm::of(&arm)).start(), &mut nodes);
         let frames = TfRepublisher::new(arm.clone().recipient(), registry.clone().recipient());
         TfRepublisher::attach(&frames.start(), &mut nodes);
-        let tracker = GoalTracker {
-            track: arm.clone().recipient(),
-            command: arm.clone().recipient(),
-            end: arm.clone().recipient(),
-        };
+        let tracker = GoalTracker::of(&arm);
         let pose = arm.clone().recipient();
         let (action, trial) = start_goal_nodes(&registry, pose, tracker, seed, &mut nodes);
         registry.send(Attach(nodes)).await.unwrap();
@@ -322,12 +318,19 @@ impl SilentArm {
             track: address.clone().recipient(),
             command: address.clone().recipient(),
             end: address.clone().recipient(),
+            settle: address.clone().recipient(),
         }
     }
 }
 
 impl Actor for SilentArm {
     type Context = Context<Self>;
+}
+
+impl Handler<SettleWith> for SilentArm {
+    type Result = ();
+
+    fn handle(&mut self, _: SettleWith, _: &mut Context<Self>) {}
 }
 
 impl Handler<ArmPose<2>> for SilentArm {

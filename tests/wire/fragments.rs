@@ -48,11 +48,15 @@ fn pieces_that_make_no_frame_cost_an_error_status_and_nothing_else() {
     let mut client = runtime.connect();
     let nested = json!({"op": "fragment", "id": 1, "data": "{}", "num": 0, "total": 1});
     let deep = format!("{{\"op\":{}", "[".repeat(200));
+    let pause = json!({"op": "call_service", "service": "/arm_sim/pause", "args": {"data": true}});
     for text in [
         "no frame".to_owned(),
         "{\"op\":".to_owned(),
         nested.to_string(),
         deep,
+        format!("{pause} {pause}"),
+        format!("{pause}\n{pause}"),
+        format!("{pause} more"),
     ] {
         for piece in pieces(&text, 8, &json!(7)) {
             client.send(&piece);

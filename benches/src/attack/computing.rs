@@ -25,6 +25,11 @@ pub const ATTACKS: &[Attack] = &[
         stability,
     ),
     Attack::new(
+        "overflowing-plans",
+        "100 clients ask for plans of loops whose numbers overflow",
+        overflowing_plans,
+    ),
+    Attack::new(
         "expressions",
         "20 clients ask for functions of 4 MiB: parentheses, powers, sums",
         expressions,
@@ -92,6 +97,16 @@ fn stability() -> Vec<Client> {
         )
     };
     Client::tcp().repeats_each(1..200, ask).times(20)
+}
+
+fn overflowing_plans() -> Vec<Client> {
+    let further = r#""gains":{"kp":[1e300,1e300],"kd":[1e300,1e300]},"setpoint":[1,1]"#;
+    let ask = call(
+        "/study/plan",
+        "1",
+        &format!(r#"{{"error":1e-6,"duration":10,{further}}}"#),
+    );
+    Client::tcp().repeats(&ask).times(100)
 }
 
 fn expressions() -> Vec<Client> {

@@ -40,6 +40,11 @@ pub const ATTACKS: &[Attack] = &[
         flat_cbor,
     ),
     Attack::new(
+        "cbor-topics",
+        "40 subscribers want cbor, each of a topic of its own with messages of a megabyte",
+        cbor_topics,
+    ),
+    Attack::new(
         "brackets-cbor",
         "10 subscribers want cbor of a million and a half brackets, 100 deep",
         brackets_cbor,
@@ -149,6 +154,16 @@ fn two_deep_cbor() -> Vec<Client> {
 
 fn flat_cbor() -> Vec<Client> {
     cbor_of(&many("1,"))
+}
+
+fn cbor_topics() -> Vec<Client> {
+    let msg = format!(r#"{{"data":[{}1]}}"#, "1.5,".repeat(MIB / 4));
+    let pair = |k| {
+        let topic = format!("/attack/cbor{k}");
+        let subscriber = Client::web().says(&subscribe(&topic, r#","compression":"cbor""#));
+        [subscriber, publisher(&topic, &msg)]
+    };
+    (0..40).flat_map(pair).collect()
 }
 
 fn brackets_cbor() -> Vec<Client> {

@@ -119,6 +119,11 @@ pub struct StopFollowing {
 
 impl<const N: usize> Actor for PathFollower<N> {
     type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        let own = ctx.address().recipient();
+        self.arm.settle.do_send(SettleWith(own));
+    }
 }
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
@@ -127,8 +132,6 @@ impl<const N: usize> Handler<FollowPath<N>> for PathFollower<N> {
     type Result = ();
 
     fn handle(&mut self, goal: FollowPath<N>, ctx: &mut Context<Self>) {
-        let own = ctx.address().recipient();
-        self.arm.settle.do_send(SettleWith(own));
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, ctx| match motion {
             Ok(motion) => node.begin(goal, &motion, ctx),

@@ -22,7 +22,7 @@ pub use self::messages::{
 use self::services::requests;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
-    CommandGoal, EndGoal, GoalJudged, Settle, TrackGoal, Tracking, joint_names,
+    ArmSim, CommandGoal, EndGoal, GoalJudged, Settle, SettleWith, TrackGoal, Tracking, joint_names,
 };
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
@@ -54,6 +54,21 @@ pub struct GoalTracker<const N: usize> {
     pub command: Recipient<CommandGoal<N>>,
     /// Ends it.
     pub end: Recipient<EndGoal<N>>,
+    /// Hears whom to ask for news that are not passed on yet.
+    pub settle: Recipient<SettleWith>,
+}
+
+impl<const N: usize> GoalTracker<N> {
+    /// The ways to this arm.
+    #[must_use]
+    pub fn of(arm: &Addr<ArmSim<N>>) -> Self {
+        Self {
+            track: arm.clone().recipient(),
+            command: arm.clone().recipient(),
+            end: arm.clone().recipient(),
+            settle: arm.clone().recipient(),
+        }
+    }
 }
 
 impl<const N: usize> IkAction<N> {
@@ -91,6 +106,11 @@ impl<const N: usize> IkAction<N> {
 
 impl<const N: usize> Actor for IkAction<N> {
     type Context = Context<Self>;
+
+    fn started(&mut self, ctx: &mut Context<Self>) {
+        let own = ctx.address().recipient();
+        self.arm.settle.do_send(SettleWith(own));
+    }
 }
 
 // ---- handlers -------------------------------------------------------------------------------------------------------
@@ -178,8 +198,7 @@ impl<const N: usize> IkAction<N> {
                 target: target.position,
                 criteria,
                 solution,
-                owner: own.clone().recipient(),
-                settle: own.recipient(),
+                owner: own.recipient(),
             })
             .await
             .map_err(|_| GoalRejected::NoAnswer(Node::ArmSim.name()))

@@ -38,7 +38,6 @@ impl<const N: usize> Handler<TrackGoal<N>> for ArmSim<N> {
         self.attend(ctx);
         self.goals.preempt(&self.simulation);
         let before = self.goals.latest;
-        self.goals.settle = Some(message.settle);
         self.goals.tracked = Some(Tracked {
             number: message.number,
             goal: Goal::new(message.target, message.criteria, self.simulation.time()),
@@ -130,12 +129,8 @@ impl<const N: usize> ArmSim<N> {
     /// Answers once all that the arm has said of goals is published: news of a goal go by way of its owner, and none
     /// may come after the answer that the arm stands still.
     pub(super) fn once_settled(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
-        let owners = [&self.goals.settle, &self.goals.settle_path];
-        let asked: Vec<_> = owners
-            .into_iter()
-            .flatten()
-            .map(|owner| owner.send(Settle))
-            .collect();
+        let owners = self.goals.owners.iter();
+        let asked: Vec<_> = owners.map(|owner| owner.send(Settle)).collect();
         if asked.is_empty() {
             return answer();
         }
@@ -153,6 +148,6 @@ impl<const N: usize> Handler<SettleWith> for ArmSim<N> {
     type Result = ();
 
     fn handle(&mut self, SettleWith(owner): SettleWith, _: &mut Context<Self>) {
-        self.goals.settle_path = Some(owner);
+        self.goals.owners.push(owner);
     }
 }

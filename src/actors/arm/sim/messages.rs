@@ -91,8 +91,6 @@ pub struct TrackGoal<const N: usize> {
     pub solution: [f64; N],
     /// Hears of progress and of the end, unless that is the answer to its own message.
     pub owner: Recipient<GoalJudged<N>>,
-    /// The same, to be asked whether it has.
-    pub settle: Recipient<Settle>,
 }
 
 /// Answered by an owner of goals when all that reached it before has been dealt with. From the arm, before it says
@@ -102,8 +100,8 @@ pub struct TrackGoal<const N: usize> {
 #[rtype(result = "()")]
 pub struct Settle;
 
-/// Feedback is published by the sender too, who is to be asked before the arm says that it stands still. From
-/// `joint_trajectory_controller`, with each of its goals.
+/// The sender tells clients of goals, and is to be asked before the arm says that it stands still. From `ik_action` and
+/// `joint_trajectory_controller`, when they start.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]
 pub struct SettleWith(pub Recipient<Settle>);

@@ -20,10 +20,8 @@ pub(crate) struct Goals<const N: usize> {
     pub(crate) latest: Option<GoalJudged<N>>,
     /// Everything before the last reset.
     pub(crate) past: Past,
-    /// Who owns the goals, to be asked whether all news have been heard; none before the first.
-    pub(crate) settle: Option<Recipient<Settle>>,
-    /// Likewise who leads the arm along paths.
-    pub(crate) settle_path: Option<Recipient<Settle>>,
+    /// The nodes that tell clients of goals, to be asked whether all news have been passed on.
+    pub(crate) owners: Vec<Recipient<Settle>>,
     /// Progress on its way, whose arrival is to be waited for.
     pub(crate) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }

@@ -193,10 +193,14 @@ fn read(frame: RawFrame) -> Result<Incoming, FrameError> {
 }
 
 /// A frame that came in pieces is one like any other: the same bounds hold, and the same leniency. `None` if there is
-/// nothing but white space.
+/// nothing but white space; of a text with more than one frame nothing is done.
 fn read_whole(text: &str) -> Option<Result<Incoming, FrameError>> {
     let mut frames = FrameReader::new();
     frames.push(text.as_bytes());
     frames.push(b"\n");
-    frames.next_raw().map(|frame| frame.and_then(read))
+    let frame = frames.next_raw()?;
+    Some(match (frame, frames.next_raw()) {
+        (Ok(_), Some(_)) => Err(FrameError::MoreBehind),
+        (frame, _) => frame.and_then(read),
+    })
 }
