@@ -26,7 +26,7 @@ run: ## Build, then serve clients in the foreground until SIGINT or SIGTERM; ARG
 	@echo "make run: $(TARGET_DIR)/release/pendularm $(ARGS)"
 	@exec "$(TARGET_DIR)/release/pendularm" $(ARGS)
 
-# Tests of the wire wait more than they reckon: as many again run beside those that have a processor.
+# Tests of the wire wait more than they compute: as many again run beside those that have a processor.
 test: ## Run every test that needs Rust alone, but the slow ones
 	@echo "make test: unit, property, wire and documentation tests"
 	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$((2 * $$(getconf _NPROCESSORS_ONLN)))} $(CARGO) test --locked

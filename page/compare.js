@@ -1,5 +1,5 @@
 // @ts-check
-// Any number of integrators and timesteps against a reference: the same arm, from the same state, reckoned offline by the
+// Any number of integrators and timesteps against a reference: the same arm, from the same state, computed offline by the
 // runtime, drawn over one another and played back together.
 // Invariant: what is compared is what the runtime answered; the live arm is not touched.
 

@@ -1,6 +1,6 @@
 // @ts-check
 // The largest stable timestep of each method on its button, and in the Stability panel why it is that.
-// Invariant: nothing stale is shown: while limits are reckoned, one in each frame, there is none.
+// Invariant: nothing stale is shown: while limits are computed, one in each frame, there is none.
 
 import { byId, el, setText } from "./dom.js";
 import { METHODS } from "./format.js";
@@ -12,7 +12,7 @@ import { state, watch } from "./store.js";
 import { openTab } from "./tabs.js";
 import { limitsKey, whyText } from "./why.js";
 
-/** A setpoint that is dragged changes many times a second; limits are reckoned once it rests [ms]. */
+/** A setpoint that is dragged changes many times a second; limits are computed once it rests [ms]. */
 const REST_MS = 200;
 
 /** @type {Map<string, HTMLElement>} */
@@ -21,7 +21,7 @@ const labels = new Map();
 let limits = {};
 let key = "";
 let timer = 0;
-let reckons = false;
+let computes = false;
 
 export function startLimits() {
   for (const cause of ["integrator", "gains", "params", "setpoint", "enabled", "stability", "links"]) watch(cause, look);
@@ -29,7 +29,7 @@ export function startLimits() {
     openTab("stability");
     byId("why-text").scrollIntoView({ block: "nearest" });
   });
-  onFrame(reckon);
+  onFrame(compute);
 }
 
 /** Where the limit of `method` is shown. @param {string} method */
@@ -44,20 +44,20 @@ function look() {
   if (now !== key) {
     key = now;
     limits = {};
-    reckons = false;
+    computes = false;
     clearTimeout(timer);
-    timer = setTimeout(() => { reckons = true; wake(); }, REST_MS);
+    timer = setTimeout(() => { computes = true; wake(); }, REST_MS);
   }
   show();
 }
 
 /** One method in a frame: a limit takes some milliseconds. Gives whether more are to come. */
-function reckon() {
-  if (!reckons) return false;
+function compute() {
+  if (!computes) return false;
   const found = loopInForce(state);
   const next = METHODS.find(([method]) => !(method in limits));
   if (!found || !next) {
-    reckons = false;
+    computes = false;
     return false;
   }
   limits[next[0]] = limitOf(found.loop, next[0], true);

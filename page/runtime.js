@@ -34,7 +34,7 @@ const STABILITY_MS = 200;
 export const DEFAULT_EPSILON = 0.02;
 
 let bridge;
-let arrived = 0; // joint states since the last reckoning of the rate
+let arrived = 0; // joint states since the rate was last computed
 let counted = performance.now();
 let missingPolls = 0;
 let lastTrajectory = -Infinity;
@@ -322,7 +322,7 @@ export function sendSetpoint(positions) {
   });
 }
 
-/** Asks about the loop in force, unless its answer is there; reckoning takes a while, so only the newest question counts. */
+/** Asks about the loop in force, unless its answer is there; computing takes a while, so only the newest question counts. */
 const askNow = latestOnly(async (asked) => {
   const answer = await bridge.call("/study/stability", asked);
   const missing = nobodyProvides(answer);

@@ -1,6 +1,6 @@
 //! The equation of motion and the kinematics, for one state or for many.
 //!
-//! **Invariant:** the numbers are those of the functions that step the live arm; nothing is reckoned a second time.
+//! **Invariant:** the numbers are those of the functions that step the live arm; nothing is computed a second time.
 
 use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
 use pendularm::math::{self, dynamics, kinematics};

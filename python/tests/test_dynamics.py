@@ -1,4 +1,4 @@
-"""The equation of motion against reference values that were reckoned in 160 digits by another derivation."""
+"""The equation of motion against reference values that were computed in 160 digits by another derivation."""
 
 import json
 from pathlib import Path

@@ -16,8 +16,8 @@ use actix::prelude::*;
 use glam::DVec2;
 use pendularm::actors::arm::sim::{
     ArmPose, ArmSettings, ArmSim, CommandGoal, Disturb, Enable, EndGoal, GoalJudged, MAX_STEPS,
-    Pause, Reset, STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, Settle,
-    SimulationTime, Step, Stepped, StepsEnd, TURN_MESSAGES, TakeSnapshot, TrackGoal,
+    Pause, Reset, STEPS_IN_A_ROW, SetGains, SetIntegrator, SetParams, SetSetpoint, SimulationTime,
+    Step, Stepped, StepsEnd, TURN_MESSAGES, TakeSnapshot, TrackGoal,
 };
 use pendularm::actors::node::{
     Ask, Asker, Call, Done, Interest, Publish, Reply, ShutDown, Unserved,
@@ -392,12 +392,6 @@ impl Handler<GoalJudged<3>> for Owner {
     }
 }
 
-impl Handler<Settle> for Owner {
-    type Result = ();
-
-    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
-}
-
 /// A step of a second is told by itself: ten thousand of them are not told at once, and each is.
 #[test]
 fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
@@ -433,7 +427,6 @@ fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
             criteria: Criteria::default(),
             solution: rest,
             owner: owner.clone().recipient(),
-            settle: owner.recipient(),
         };
         bench.arm.send(goal).await.unwrap();
         let (number, positions) = (1, rest);

@@ -34,7 +34,7 @@ fn every_method_has_its_order_in_every_scene_but_where_the_effort_is_held() {
 }
 
 #[test]
-fn evaluations_are_counted_and_not_reckoned() {
+fn evaluations_are_counted_and_not_estimated() {
     for scene in scenes() {
         for method in Method::ALL {
             let outcome = scene.run(method, 8192);

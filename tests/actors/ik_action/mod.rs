@@ -22,7 +22,7 @@ use pendularm::actors::arm::ik_action::{
     CancelGoal, CancelRejected, GoalRejected, GoalTracker, IkAction, Meant, SendGoal,
 };
 use pendularm::actors::arm::sim::{
-    ArmPose, CommandGoal, GoalJudged, SetIntegrator, Settle, TrackGoal, Tracking,
+    ArmPose, CommandGoal, GoalJudged, SetIntegrator, TrackGoal, Tracking,
 };
 use pendularm::actors::node::{Interest, Publish, ask};
 use pendularm::math::goal::{Criteria, Outcome};

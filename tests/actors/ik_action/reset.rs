@@ -49,12 +49,6 @@ impl Handler<GoalJudged<2>> for Owner {
     }
 }
 
-impl Handler<Settle> for Owner {
-    type Result = ();
-
-    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
-}
-
 /// Between the announcement of a goal and its setpoint another client's reset may come. Then the reset counts as the
 /// later of the two, and the setpoint must not pull the arm out of its starting pose.
 #[test]
@@ -70,7 +64,6 @@ fn a_reset_that_overtakes_a_goals_setpoint_makes_it_void() {
                 criteria: Criteria::default(),
                 solution: [0.0, 1.5],
                 owner: owner.clone().recipient(),
-                settle: owner.clone().recipient(),
             })
         };
         let command = |number| CommandGoal {
@@ -109,7 +102,6 @@ fn a_goal_is_not_judged_before_its_setpoint_has_come() {
                 },
                 solution: [0.0, 0.0],
                 owner: owner.clone().recipient(),
-                settle: owner.recipient(),
             })
             .await
             .unwrap();
