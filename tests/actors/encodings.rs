@@ -13,7 +13,7 @@ use pendularm::actors::resources::aside::{Errand, PlaceAside};
 use pendularm::protocol::catalog::Service;
 use pendularm::protocol::op::MAX_ARGS;
 use serde_json::{Value, json};
-use tokio::time::sleep;
+use tokio::time::{Instant, sleep};
 
 async fn subscribe_in_pieces(peer: &mut Peer, size: usize) -> Value {
     peer.send(json!({"op": "subscribe", "topic": "/t", "fragment_size": size}))
@@ -258,6 +258,41 @@ fn a_message_is_cut_up_in_time_however_much_other_topics_bring() {
             }
             assert!(message["msg"]["n"] != 99, "it never came");
         }
+    });
+}
+
+/// They may be held back for hours, and nobody who has gone waits for them.
+#[test]
+fn what_a_throttle_holds_back_holds_up_no_other_message_and_no_end() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        subscribe_in_pieces(&mut subscriber, 4096).await;
+        subscriber
+            .send(
+                json!({"op": "subscribe", "topic": "/big", "throttle_rate": 100_000_000,
+                "queue_length": 3}),
+            )
+            .await;
+        subscriber.receive().await;
+        for (topic, length) in [("/big", 1_100_000), ("/t", 20_000)] {
+            publisher.advertise(topic).await;
+            let msg = json!({"pad": "x".repeat(length)});
+            for _ in 0..if topic == "/big" { 4 } else { 1 } {
+                publisher
+                    .send(json!({"op": "publish", "topic": topic, "msg": msg}))
+                    .await;
+            }
+        }
+        let began = Instant::now();
+        for topic in ["/big", "/t"] {
+            assert_eq!(next_message(&mut subscriber).await.0["topic"], topic);
+        }
+        assert!(began.elapsed() < Duration::from_secs(1));
+        publish_long(&mut publisher, "/t").await;
+        subscriber.half_close().await;
+        subscriber.rest().await;
+        assert!(began.elapsed() < Duration::from_secs(2));
     });
 }
 

@@ -232,6 +232,29 @@ fn a_paused_record_shows_where_it_stands() {
 }
 
 #[test]
+fn after_the_answer_that_it_stands_or_is_elsewhere_no_state_from_before_comes() {
+    let entries = in_virtual_time(run());
+    in_virtual_time(async {
+        let show = Show::of("stale", &entries).await;
+        let mut client = show.connect();
+        client
+            .send(
+                &json!({"op": "subscribe", "topic": "/joint_states", "throttle_rate": 300,
+                "queue_length": 20}),
+            )
+            .await;
+        client.messages_for(ms(700), "/joint_states").await;
+        drive(&mut client, "pause", json!({})).await;
+        let stood = position(&mut client).await;
+        let heard = client.messages_for(ms(2000), "/joint_states").await;
+        assert!(
+            heard.iter().all(|state| time_of(state) >= stood - 0.02),
+            "{stood} s: {heard:?}"
+        );
+    });
+}
+
+#[test]
 fn the_arm_is_asked_about_as_it_was_and_not_changed() {
     let entries = in_virtual_time(run());
     in_virtual_time(async {

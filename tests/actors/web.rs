@@ -579,6 +579,32 @@ fn a_message_that_does_not_end_is_given_up_after_a_minute() {
     });
 }
 
+/// Its first part has come with the last byte of the message before it.
+#[test]
+fn a_message_that_begins_behind_another_is_given_up_after_a_minute_too() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut stream = open(&gateway, WIDE).await.into_stream();
+        let whole = br#"{"op":"advertise","topic":"/t","type":"std_msgs/msg/String"}"#;
+        let bytes = [
+            frame_head(0x81, whole.len()),
+            whole.to_vec(),
+            frame_head(0x01, 1000),
+            vec![b' '; 1000],
+        ];
+        let began = Instant::now();
+        stream.write_all(&bytes.concat()).await.unwrap();
+        for _ in 0..FRAME_TIME.as_secs() - 1 {
+            sleep(Duration::from_secs(1)).await;
+            stream.write_all(&frame_head(0x8a, 0)).await.unwrap();
+        }
+        let (code, why) = close_reason(&mut stream).await;
+        assert_eq!(code, 1008, "{why}");
+        let time = began.elapsed();
+        assert!(time <= FRAME_TIME + PING_INTERVAL, "{time:?}");
+    });
+}
+
 #[test]
 fn a_peer_that_holds_most_is_closed_with_a_reason() {
     in_virtual_time(async {

@@ -320,6 +320,41 @@ fn a_paused_arm_that_is_stepped_is_on_its_way_again() {
     }
 }
 
+/// A topic that has the action's name throttles nothing of a goal.
+#[test]
+fn the_result_of_a_path_is_the_last_that_comes_of_it() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.send(
+        &json!({"op": "subscribe", "topic": ACTION, "throttle_rate": 100, "queue_length": 3,
+            "type": "std_msgs/msg/String"}),
+    );
+    client.send(&goal("short", &through(&[point([0.1, 0.1], 0.3)])));
+    client.receive_where("the result", |frame| frame["op"] == "action_result");
+    let said = client.receive_for(Duration::from_millis(500));
+    assert!(
+        said.iter().all(|frame| frame["op"] != "action_feedback"),
+        "{said:?}"
+    );
+}
+
+/// Stepped in between, and paused again.
+#[test]
+fn an_arm_that_is_paused_anew_is_on_no_way_either() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.ask("/arm_sim/step", json!({"steps": 10}));
+    client.ask("/arm_sim/pause", json!({"data": true}));
+    client.send(&goal("long", &through(&[point([0.3, 0.3], 1e3)])));
+    let said = client.receive_for(Duration::from_millis(300));
+    assert!(
+        said.iter().all(|frame| frame["op"] != "action_feedback"),
+        "{said:?}"
+    );
+}
+
 #[test]
 fn a_reset_is_answered_when_the_path_has_ended() {
     let runtime = Runtime::start();

@@ -8,6 +8,7 @@
 use super::entry::{Field, ServiceEntry, required, service};
 use super::node::Node;
 use super::table::{fields, table};
+use super::topics::ARM_STATE;
 
 /// Where they stand.
 pub const PLAYER_PREFIX: &str = "/rosbag2_player/";
@@ -16,25 +17,28 @@ table! {
     /// One of them.
     pub enum Playback of ServiceEntry {
         /// Stands still.
-        Pause = of_player("/rosbag2_player/pause", "rosbag2_interfaces/srv/Pause"),
+        Pause = of_player("/rosbag2_player/pause", "rosbag2_interfaces/srv/Pause").supersedes(ARM_STATE),
         /// Goes on.
         Resume = of_player("/rosbag2_player/resume", "rosbag2_interfaces/srv/Resume"),
         /// Does the other of the two.
-        TogglePaused = of_player("/rosbag2_player/toggle_paused", "rosbag2_interfaces/srv/TogglePaused"),
+        TogglePaused = of_player("/rosbag2_player/toggle_paused", "rosbag2_interfaces/srv/TogglePaused")
+            .supersedes(ARM_STATE),
         /// Whether it stands still.
         IsPaused = of_player("/rosbag2_player/is_paused", "rosbag2_interfaces/srv/IsPaused")
             .response(fields![required("paused", "bool", "")]),
         /// How fast it goes: 1 as it was recorded, negative numbers backward.
         SetRate = of_player("/rosbag2_player/set_rate", "rosbag2_interfaces/srv/SetRate")
             .request(&RATE)
-            .response(&SUCCESS),
+            .response(&SUCCESS)
+            .supersedes(ARM_STATE),
         /// The same, asked for.
         GetRate = of_player("/rosbag2_player/get_rate", "rosbag2_interfaces/srv/GetRate")
             .response(&RATE),
         /// Goes to a time since the record's beginning.
         Seek = of_player("/rosbag2_player/seek", "rosbag2_interfaces/srv/Seek")
             .request(fields![required("time", "builtin_interfaces/msg/Time", "s, ns")])
-            .response(&SUCCESS),
+            .response(&SUCCESS)
+            .supersedes(ARM_STATE),
         /// Where it is, and how long the record.
         GetPosition = of_player("/rosbag2_player/get_position", "pendularm_interfaces/srv/GetPosition")
             .response(fields![

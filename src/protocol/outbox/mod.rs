@@ -91,6 +91,18 @@ impl Outbox {
             let number = self.number();
             self.enqueue(number, frame);
         }
+        self.keep_bounded();
+    }
+
+    /// Adds feedback of a goal, which may be lost as a message may: no throttle is for it, also not one of a topic
+    /// that has the action's name.
+    pub fn push_feedback(&mut self, frame: Bytes) {
+        let number = self.number();
+        self.enqueue(number, frame);
+        self.keep_bounded();
+    }
+
+    fn keep_bounded(&mut self) {
         self.drop_oldest(|outbox| outbox.topic_bytes().saturating_sub(MAX_TOPIC_BYTES));
     }
 
@@ -276,6 +288,12 @@ impl Outbox {
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
         self.topic_bytes + self.throttles.bytes()
+    }
+
+    /// Bytes of those that may be taken now: without those held back.
+    #[must_use]
+    pub const fn queued_bytes(&self) -> usize {
+        self.topic_bytes
     }
 
     /// Topic messages dropped so far for want of room. What throttling replaces by something newer is not counted.

@@ -60,11 +60,14 @@ impl<const N: usize> Handler<Call<Pause>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     fn pause(&mut self, ask: Pause) -> Echo<bool> {
+        if ask.paused == Some(true) {
+            // One that was stepped meanwhile stands still again.
+            self.paused_at = self.simulation.time();
+        }
         if let Some(paused) = ask.paused
             && paused != self.paused
         {
             self.paused = paused;
-            self.paused_at = self.simulation.time();
             self.restart_pacer();
             self.publish_diagnostics();
         }

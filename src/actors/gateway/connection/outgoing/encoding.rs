@@ -14,8 +14,8 @@ use crate::actors::gateway::messages::{Deliver, Frames};
 use crate::actors::gateway::turns;
 use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
-/// While more bytes of topic messages than this wait for the client, nothing more is encoded for it: it might be
-/// dropped unread.
+/// While more bytes of topic messages than this are ready to be written, nothing more is encoded for the client: it
+/// might be dropped unread. Messages that a throttle holds back do not count: they may be for hours.
 const ENOUGH: usize = MAX_TOPIC_BYTES / 2;
 
 impl Outgoing {
@@ -47,7 +47,8 @@ impl Outgoing {
     /// Puts messages that are ready into the outbox; gives them back if they are not.
     fn pass(&self, message: Deliver) -> Option<Deliver> {
         match message.frames {
-            Frames::Plain(frame) | Frames::Feedback(frame) => self.push(&message.topic, frame),
+            Frames::Plain(frame) => self.push(&message.topic, frame),
+            Frames::Feedback(frame) => self.push_feedback(frame),
             Frames::Encoded(ref encoded, newest) => {
                 let Some(made) = encoded.at_hand() else {
                     return Some(message);
@@ -118,7 +119,7 @@ impl EncodingTask {
         let mut dropped = None;
         while let Some(outgoing) = self.0.upgrade() {
             let now = outgoing.outbox.borrow().dropped();
-            let goes_on = *dropped.get_or_insert(now) == now && outgoing.topic_bytes() > ENOUGH;
+            let goes_on = *dropped.get_or_insert(now) == now && outgoing.queued_bytes() > ENOUGH;
             drop(outgoing);
             if !goes_on {
                 return;

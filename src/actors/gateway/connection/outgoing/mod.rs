@@ -96,6 +96,15 @@ impl Outgoing {
         self.charge.count_dropped(dropped);
     }
 
+    /// Adds feedback of a goal.
+    pub(super) fn push_feedback(&self, frame: Bytes) {
+        let mut outbox = self.outbox.borrow_mut();
+        let before = outbox.dropped();
+        outbox.push_feedback(frame);
+        let dropped = outbox.dropped() - before;
+        self.charge.count_dropped(dropped);
+    }
+
     /// Adds a response or a status. Discards held-back and unencoded messages on `superseded` topics: they are older.
     pub(super) fn push_response(&self, frame: Bytes, superseded: &[&'static str]) {
         let mut outbox = self.outbox.borrow_mut();
@@ -161,7 +170,7 @@ impl Outgoing {
     pub(super) fn topics_alone(&self) -> Option<usize> {
         let outbox = self.outbox.borrow();
         let alone = !outbox.is_empty() && !outbox.has_responses();
-        alone.then(|| outbox.topic_bytes().min(WRITE_BYTES))
+        alone.then(|| outbox.queued_bytes().min(WRITE_BYTES))
     }
 
     /// Whether there is nothing to be written now.
@@ -179,9 +188,9 @@ impl Outgoing {
         self.outbox.borrow().response_cost()
     }
 
-    /// Bytes of topic messages that wait.
-    pub(super) fn topic_bytes(&self) -> usize {
-        self.outbox.borrow().topic_bytes()
+    /// Bytes of topic messages that may be written now.
+    pub(super) fn queued_bytes(&self) -> usize {
+        self.outbox.borrow().queued_bytes()
     }
 
     /// The client has taken some of what is being written. Over TCP a write is over then.

@@ -14,6 +14,8 @@ pub(super) struct FrameHeads {
     /// Bytes of its payload that have come, and that are still to come.
     received: u64,
     left: u64,
+    /// A further frame belongs to the message: none so far had its last.
+    goes_on: bool,
 }
 
 impl FrameHeads {
@@ -39,8 +41,18 @@ impl FrameHeads {
             bytes = behind;
             if let Some(length) = self.length() {
                 (self.come, self.received, self.left) = (0, 0, length);
+                let [first, ..] = self.head;
+                let is_control = first & 0x08 != 0;
+                if !is_control {
+                    self.goes_on = first & 0x80 == 0;
+                }
             }
         }
+    }
+
+    /// Whether something has begun that is not complete: a frame, or a message of several.
+    pub(super) const fn is_within(&self) -> bool {
+        self.come > 0 || self.left > 0 || self.goes_on
     }
 
     /// The length of the payload, once all of the head has come.
@@ -111,6 +123,27 @@ mod tests {
         let mut heads = FrameHeads::default();
         assert_eq!(heads.follow(&frame(70_000, true)[..50_014]), 50_000);
         assert_eq!(heads.follow(&[0; 10]), 50_010);
+    }
+
+    #[test]
+    fn a_message_is_complete_with_its_last_frame_and_no_sooner() {
+        let mut heads = FrameHeads::default();
+        let ping = [0x89, 0x80, 0, 0, 0, 0];
+        let (begin, go_on, end) = ([0x01, 1, 7], [0x00, 1, 7], [0x80, 1, 7]);
+        for (bytes, is_within) in [
+            (&ping[..], false),
+            (&begin, true),
+            (&ping, true),
+            (&go_on, true),
+            (&end[..1], true),
+            (&end[1..], false),
+            (&ping[..3], true),
+            (&ping[3..], false),
+            (&[0x81, 0], false),
+        ] {
+            heads.follow(bytes);
+            assert_eq!(heads.is_within(), is_within, "{bytes:?}");
+        }
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub(super) struct Watched<S> {
     /// The longest frame so far, if it was longer than what is read at a time: the WebSocket's buffer has grown to it,
     /// and stays so.
     longest: usize,
-    /// Arrival time of the first pending byte, plus all time spent not reading.
+    /// Arrival time of the first byte of what is not complete, plus all time spent not reading.
     began: Option<Instant>,
     /// They belong to one that has just been read.
     is_complete: bool,
@@ -106,10 +106,12 @@ impl<S> Watched<S> {
 
     /// Reading goes on after so long a time: what was complete has been dealt with.
     pub(super) fn read_on(&mut self, unread: Duration) {
+        self.began = self.began.map(|began| began + unread);
         if std::mem::take(&mut self.is_complete) {
+            // The next message may have come with its end, in part.
+            self.began = self.heads.is_within().then(Instant::now);
             self.settle(0);
         }
-        self.began = self.began.map(|began| began + unread);
     }
 
     /// A control frame with so much payload has come: it may stand between the parts of a message.
@@ -119,7 +121,7 @@ impl<S> Watched<S> {
 
     fn settle(&mut self, pending: usize) {
         self.pending = pending;
-        if pending == 0 {
+        if pending == 0 && !self.heads.is_within() {
             self.began = None;
         }
         // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
