@@ -353,6 +353,10 @@ def test_a_function_may_be_the_metric():
             "piece must be between 1 and 24937 with 401 samples, got 1000000",
         ),
         (
+            lambda: pendularm.sweep({"kp": [1]}, piece=1_000_001, samples=2),
+            "piece must be between 1 and 1000000 with 2 samples, got 1000001",
+        ),
+        (
             lambda: pendularm.sweep({"timestep": [1e-3, 1e-320]}, duration=1),
             "duration / timestep must be at most 10000000 steps, got inf",
         ),
@@ -375,6 +379,12 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     with pytest.raises(ValueError) as refusal:
         wrong()
     assert str(refusal.value).startswith(said)
+
+
+def test_an_axis_may_be_longer_than_a_batch():
+    # The last of all is found, by its place in the axis; the other ones are taken.
+    with pytest.raises(ValueError, match=r"^gravity\[1000000\] must be finite and at least 0, got -1$"):
+        pendularm.sweep({"gravity": [9.81] * 1_000_000 + [-1.0]})
 
 
 def test_one_step_is_a_run():
