@@ -330,6 +330,10 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"kp": [1]}, samples=11.0), "samples must be a whole number, got 11.0"),
         (lambda: pendularm.sweep({"kp": [1]}, piece="1"), "piece must be a whole number, got '1'"),
         (lambda: pendularm.sweep({"kp": [1]}, duration="1"), "duration must be a number, got '1'"),
+        (lambda: pendularm.sweep({"kp": [1]}, duration=10**400), "duration must be finite, got a number that no"),
+        (lambda: pendularm.sweep({"kp": [1, 10**400]}), "every kp must be finite, got a number that no double holds"),
+        (lambda: pendularm.sweep({"gravity": [-(10**400)]}), "every gravity must be finite, got a number that no"),
+        (lambda: pendularm.sweep({"kp": [1]}, servo="no"), "servo must be True or False, got 'no'"),
         (
             lambda: pendularm.sweep({"kp": [1]}, lambda run: {1: run.energy[-1]}, duration=0.1),
             "metric must name its numbers by text, got 1",

@@ -206,7 +206,7 @@ def sweep(
         links=links,
         duration=duration,
         samples=samples,
-        servo=bool(servo),
+        servo=_flag("servo", servo),
     )
     question.check()
     kept = None
@@ -294,9 +294,17 @@ def _whole(name: str, value: Any) -> int:
         raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
 
 
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {value!r:.60}")
+    return bool(value)
+
+
 def _number(name: str, value: Any) -> float:
     try:
         return float(_numbers(value))
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got a number that no double holds") from None
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
 
@@ -320,6 +328,8 @@ def _column(name: str, values: Sequence[Any], links: int) -> Any:
             column = np.array([np.broadcast_to(_numbers(value), (links,)) for value in values])
         else:
             column = np.array([float(_numbers(value)) for value in values])
+    except OverflowError:
+        raise ValueError(f"every {name} must be finite, got a number that no double holds") from None
     except (TypeError, ValueError):
         each = f" or an array of {links}" if name in PER_JOINT else ""
         raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
