@@ -70,13 +70,31 @@ def test_a_report_can_be_read(tmp_path):
     assert table["pose"][0] == "3 links, bent"
 
 
-def test_a_report_that_cannot_be_read_is_said_so(tmp_path):
-    (tmp_path / "error.csv").write_text("")
-    with pytest.raises(ValueError, match=r"error\.csv has no head"):
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (b"", "has no head"),
+        (b"\n1,2\n", "has no head"),
+        (b"a,b\n1,2\n3\n", "has 1 cells in row 2, and 2 in its head"),
+        (b"a,b\n1,2.5e", "ends amid a line"),
+        (b"a,b\n1,2.5", "ends amid a line"),
+        (b"a,b\n1,\xff\n", "cannot be read: 'utf-8' codec can't decode byte 0xff"),
+        (b"a\n" + b"1" * 200_000 + b"\n", "cannot be read: field larger than field limit"),
+        (b'a\n"1\n2\n', "cannot be read: unexpected end of data"),
+        (b"a,b,a\n1,2,3\n", "has two columns of the name 'a'"),
+        (b"\0" * 100, "cannot be read: line contains NUL"),
+    ],
+)
+def test_a_report_that_cannot_be_read_is_said_so(tmp_path, table, said):
+    (tmp_path / "error.csv").write_bytes(table)
+    with pytest.raises(ValueError, match=rf"error\.csv {said}"):
         pendularm.read_report(tmp_path)
-    (tmp_path / "error.csv").write_text("a,b\n1,2\n3\n")
-    with pytest.raises(ValueError, match=r"error\.csv has 1 cells in row 2, and 2 in its head"):
-        pendularm.read_report(tmp_path)
+
+
+def test_a_byte_order_mark_is_no_part_of_a_name(tmp_path):
+    (tmp_path / "error.csv").write_bytes(b"\xef\xbb\xbfa,b\r\n1,x\r\n")
+    table = pendularm.read_report(tmp_path)["error"]
+    assert {name: column.tolist() for name, column in table.items()} == {"a": [1.0], "b": ["x"]}
 
 
 def test_no_report_is_said_so(tmp_path):
