@@ -1,5 +1,7 @@
 """The program that comes with the wheel: on the path, as a module, with its arguments and its signals."""
 
+import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,6 +30,30 @@ def test_bad_arguments_come_back_as_exit_status_2(way):
     run = subprocess.run([*way, "--links", "7"], capture_output=True, text=True)
     assert run.returncode == 2
     assert "--links" in run.stderr
+
+
+@pytest.mark.parametrize("there", [True, False], ids=["beside it", "nowhere"])
+def test_a_module_in_a_folder_of_its_own_finds_the_program_beside_it(tmp_path, there):
+    # As `pip install --target` leaves it, with a record of a program that is elsewhere.
+    shutil.copytree(Path(pendularm.__file__).parent, tmp_path / "pendularm")
+    record = tmp_path / f"pendularm-{pendularm.__version__}.dist-info" / "RECORD"
+    record.parent.mkdir()
+    record.write_text("../../bin/pendularm,,\n")
+    (record.parent / "METADATA").write_text(f"Name: pendularm\nVersion: {pendularm.__version__}\n")
+    if there:
+        (tmp_path / "bin").mkdir()
+        shutil.copy(PROGRAM, tmp_path / "bin")
+    run = subprocess.run(
+        [sys.executable, "-m", "pendularm", "--version"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    if there:
+        assert run.stdout == f"pendularm {pendularm.__version__} (web)\n"
+    else:
+        assert "FileNotFoundError: this installation of pendularm has no program" in run.stderr
 
 
 def test_it_comes_with_completions_and_a_manual():
