@@ -4,7 +4,8 @@ arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` 
 The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has
 a random stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number.
 They truncate themselves, and reset an arm in the call after its end, whose action is ignored
-(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh.
+(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh. An environment can be neither deeply copied nor
+pickled, and a process that is forked while another thread steps it must not use it.
 """
 
 from collections.abc import Sequence
