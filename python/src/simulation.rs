@@ -52,7 +52,8 @@ impl Divergence {
 /// It begins as a fresh runtime does: stretched along +x, at rest, the controller off. `method` is `euler`,
 /// `midpoint`, `verlet` or `rk4`; `timestep` [s] is the control period too; `gains` is `{"kp": [N m/rad], "ki": [N
 /// m/(rad s)], "kd": [N m s/rad]}`, (links,) each, and what is left out of it is as in a fresh runtime. Threads may
-/// share one.
+/// share one. It can be neither copied nor pickled, and a process that is forked while another thread steps it must not
+/// use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Simulation {

@@ -82,7 +82,7 @@ def test_the_action_of_an_arm_that_has_ended_is_ignored(name):
         assert np.array_equal(found, known)
         assert found.dtype == known.dtype
     # Now the others have ended, and the one in the middle goes on.
-    with pytest.raises(ValueError, match=r"effort\[1\]\[0\] must be finite, got NaN"):
+    with pytest.raises(ValueError, match=r"^actions\[1\]\[0\] must be finite, got NaN"):
         one.step(np.full((3, 2), np.nan, np.float32))
 
 
@@ -143,6 +143,16 @@ def test_actions_have_a_row_for_each_arm(actions):
     one.reset(seed=0)
     with pytest.raises(ValueError, match=r"action must have the shape \(2,\)"):
         one.step(actions)
+
+
+def test_what_the_batch_refuses_has_the_callers_name(name):
+    for arms in [0, 2.5, 10**7]:
+        with pytest.raises(ValueError, match=f"^num_envs must be between 1 and 1000000, got {arms}$"):
+            gymnasium.make_vec(name, arms)
+    one = gymnasium.make(name).unwrapped
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match=r"^action\[1\] must be finite, got NaN$"):
+        one.step(np.array([0, np.nan], np.float32))
 
 
 def test_a_step_needs_a_reset():

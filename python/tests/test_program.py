@@ -1,5 +1,7 @@
 """The program that comes with the wheel: on the path, as a module, with its arguments and its signals."""
 
+import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -28,6 +30,30 @@ def test_bad_arguments_come_back_as_exit_status_2(way):
     run = subprocess.run([*way, "--links", "7"], capture_output=True, text=True)
     assert run.returncode == 2
     assert "--links" in run.stderr
+
+
+@pytest.mark.parametrize("there", [True, False], ids=["beside it", "nowhere"])
+def test_a_module_in_a_folder_of_its_own_finds_the_program_beside_it(tmp_path, there):
+    # As `pip install --target` leaves it, with a record of a program that is elsewhere.
+    shutil.copytree(Path(pendularm.__file__).parent, tmp_path / "pendularm")
+    record = tmp_path / f"pendularm-{pendularm.__version__}.dist-info" / "RECORD"
+    record.parent.mkdir()
+    record.write_text("../../bin/pendularm,,\n")
+    (record.parent / "METADATA").write_text(f"Name: pendularm\nVersion: {pendularm.__version__}\n")
+    if there:
+        (tmp_path / "bin").mkdir()
+        shutil.copy(PROGRAM, tmp_path / "bin")
+    run = subprocess.run(
+        [sys.executable, "-m", "pendularm", "--version"],
+        env={**os.environ, "PYTHONPATH": str(tmp_path)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+    )
+    if there:
+        assert run.stdout == f"pendularm {pendularm.__version__} (web)\n"
+    else:
+        assert "FileNotFoundError: this installation of pendularm has no program" in run.stderr
 
 
 def test_it_comes_with_completions_and_a_manual():
@@ -70,13 +96,31 @@ def test_a_report_can_be_read(tmp_path):
     assert table["pose"][0] == "3 links, bent"
 
 
-def test_a_report_that_cannot_be_read_is_said_so(tmp_path):
-    (tmp_path / "error.csv").write_text("")
-    with pytest.raises(ValueError, match=r"error\.csv has no head"):
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (b"", "has no head"),
+        (b"\n1,2\n", "has no head"),
+        (b"a,b\n1,2\n3\n", "has 1 cells in row 2, and 2 in its head"),
+        (b"a,b\n1,2.5e", "ends amid a line"),
+        (b"a,b\n1,2.5", "ends amid a line"),
+        (b"a,b\n1,\xff\n", "cannot be read: 'utf-8' codec can't decode byte 0xff"),
+        (b"a\n" + b"1" * 200_000 + b"\n", "cannot be read: field larger than field limit"),
+        (b'a\n"1\n2\n', "cannot be read: unexpected end of data"),
+        (b"a,b,a\n1,2,3\n", "has two columns of the name 'a'"),
+        (b"\0" * 100, "cannot be read: line contains NUL"),
+    ],
+)
+def test_a_report_that_cannot_be_read_is_said_so(tmp_path, table, said):
+    (tmp_path / "error.csv").write_bytes(table)
+    with pytest.raises(ValueError, match=rf"error\.csv {said}"):
         pendularm.read_report(tmp_path)
-    (tmp_path / "error.csv").write_text("a,b\n1,2\n3\n")
-    with pytest.raises(ValueError, match=r"error\.csv has 1 cells in row 2, and 2 in its head"):
-        pendularm.read_report(tmp_path)
+
+
+def test_a_byte_order_mark_is_no_part_of_a_name(tmp_path):
+    (tmp_path / "error.csv").write_bytes(b"\xef\xbb\xbfa,b\r\n1,x\r\n")
+    table = pendularm.read_report(tmp_path)["error"]
+    assert {name: column.tolist() for name, column in table.items()} == {"a": [1.0], "b": ["x"]}
 
 
 def test_no_report_is_said_so(tmp_path):

@@ -330,6 +330,10 @@ def test_a_function_may_be_the_metric():
         (lambda: pendularm.sweep({"kp": [1]}, samples=11.0), "samples must be a whole number, got 11.0"),
         (lambda: pendularm.sweep({"kp": [1]}, piece="1"), "piece must be a whole number, got '1'"),
         (lambda: pendularm.sweep({"kp": [1]}, duration="1"), "duration must be a number, got '1'"),
+        (lambda: pendularm.sweep({"kp": [1]}, duration=10**400), "duration must be finite, got a number that no"),
+        (lambda: pendularm.sweep({"kp": [1, 10**400]}), "every kp must be finite, got a number that no double holds"),
+        (lambda: pendularm.sweep({"gravity": [-(10**400)]}), "every gravity must be finite, got a number that no"),
+        (lambda: pendularm.sweep({"kp": [1]}, servo="no"), "servo must be True or False, got 'no'"),
         (
             lambda: pendularm.sweep({"kp": [1]}, lambda run: {1: run.energy[-1]}, duration=0.1),
             "metric must name its numbers by text, got 1",
@@ -351,6 +355,10 @@ def test_a_function_may_be_the_metric():
         (
             lambda: pendularm.sweep({"kp": [1]}, piece=10**6),
             "piece must be between 1 and 24937 with 401 samples, got 1000000",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, piece=1_000_001, samples=2),
+            "piece must be between 1 and 1000000 with 2 samples, got 1000001",
         ),
         (
             lambda: pendularm.sweep({"timestep": [1e-3, 1e-320]}, duration=1),
@@ -375,6 +383,12 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
     with pytest.raises(ValueError) as refusal:
         wrong()
     assert str(refusal.value).startswith(said)
+
+
+def test_an_axis_may_be_longer_than_a_batch():
+    # The last of all is found, by its place in the axis; the other ones are taken.
+    with pytest.raises(ValueError, match=r"^gravity\[1000000\] must be finite and at least 0, got -1$"):
+        pendularm.sweep({"gravity": [9.81] * 1_000_000 + [-1.0]})
 
 
 def test_one_step_is_a_run():

@@ -11,9 +11,12 @@ def program() -> Path:
 
     Raises `FileNotFoundError` where this package was installed from something else than a wheel of `make wheel`.
     """
-    for file in files("pendularm") or []:
-        if file.name == "pendularm" and file.parent.name == "bin":
-            return Path(str(file.locate())).resolve()
+    # With `pip install --target` it is beside the package, and the record names a place where it is not.
+    beside = Path(__file__).resolve().parent.parent / "bin" / "pendularm"
+    recorded = [Path(str(file.locate())) for file in files("pendularm") or [] if file.parent.name == "bin"]
+    for path in [beside, *recorded]:
+        if path.name == "pendularm" and path.is_file():
+            return path.resolve()
     raise FileNotFoundError("this installation of pendularm has no program: only wheels made by `make wheel` bring it")
 
 

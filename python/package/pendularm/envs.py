@@ -4,7 +4,8 @@ arms ``gymnasium.make_vec("Pendularm-v0", num_envs=1024)``; `PendularmReach-v0` 
 The vector environments are a `Batch`. Each of their arms is what the single environment would be, to the bit, and has
 a random stream of its own: under the seed `s`, arm `i` is the single environment under `s + i`, whatever their number.
 They truncate themselves, and reset an arm in the call after its end, whose action is ignored
-(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh.
+(`AutoresetMode.NEXT_STEP`). All arrays that are returned are fresh. An environment can be neither deeply copied nor
+pickled, and a process that is forked while another thread steps it must not use it.
 """
 
 from collections.abc import Sequence
@@ -150,6 +151,11 @@ def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     return array
 
 
+def _named(refusal: ValueError, theirs: str, ours: str) -> ValueError:
+    """The batch's refusal of a field, by the name that the caller knows."""
+    return ValueError(str(refusal).replace(theirs, ours, 1))
+
+
 class _Single(gymnasium.Env[Observation, Action]):
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
     task_of: ClassVar[type[_Task]]
@@ -169,7 +175,11 @@ class _Single(gymnasium.Env[Observation, Action]):
         return self._task.observe()[0], {}
 
     def step(self, action: Action) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
-        self._task.go_on(_checked("action", action, self.action_space)[None])
+        action = _checked("action", action, self.action_space)
+        try:
+            self._task.go_on(action[None])
+        except ValueError as refusal:
+            raise _named(refusal, "effort[0]", "action") from None
         return self._task.observe()[0], float(self._task.reward()[0]), bool(self._task.lost()[0]), False, {}
 
 
@@ -190,7 +200,10 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             max_episode_steps = self.task_of.most_steps
         if max_episode_steps < 1:
             raise ValueError(f"max_episode_steps must be at least 1, got {max_episode_steps}")
-        self._task = self.task_of(num_envs, links, threads)
+        try:
+            self._task = self.task_of(num_envs, links, threads)
+        except ValueError as refusal:
+            raise _named(refusal, "n_arms", "num_envs") from None
         self._most_steps = max_episode_steps
         self.num_envs = num_envs
         self.render_mode = render_mode
@@ -232,7 +245,11 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             raise gymnasium.error.ResetNeeded("reset has to come before the first step")
         # Arms that have ended are stepped with the others, by no effort, and begin anew wherever that leads.
         again = self._ended
-        self._task.go_on(np.where(again[:, None], 0, _checked("actions", actions, self.action_space)))
+        actions = np.where(again[:, None], 0, _checked("actions", actions, self.action_space))
+        try:
+            self._task.go_on(actions)
+        except ValueError as refusal:
+            raise _named(refusal, "effort", "actions") from None
         self._elapsed += 1
         rewards, lost = self._task.reward(), self._task.lost()
         if again.any():

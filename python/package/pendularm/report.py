@@ -2,6 +2,7 @@
 
 import csv
 import os
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str
 
     A column is of doubles, the same bits as were measured, with NaN where there is none; or of text.
     `pandas.DataFrame` takes a table as it is. Raises `FileNotFoundError` where there is no report, and `ValueError`,
-    with the file's name, for a table that is not whole.
+    with the file's name, for a table that cannot be read, ends amid a line, or has a row of too few or too many cells.
     """
     files = sorted(Path(folder).glob("*.csv"))
     if not files:
@@ -27,12 +28,23 @@ def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str
 
 
 def _table(file: Path) -> dict[str, Column]:
-    with file.open(encoding="utf-8", newline="") as lines:
-        rows = csv.reader(lines)
-        head = next(rows, None)
-        cells = list(rows)
-    if not head:
+    try:
+        # Some programs put a byte order mark in front, which is no part of a name.
+        text = file.read_bytes().decode("utf-8-sig")
+        if "\0" in text:
+            # Python 3.10 says this, and later ones take it.
+            raise csv.Error("line contains NUL")
+        rows = list(csv.reader(StringIO(text, newline=""), strict=True))
+    except (UnicodeDecodeError, csv.Error) as why:
+        raise ValueError(f"{file} cannot be read: {why}") from None
+    if not rows or not rows[0]:
         raise ValueError(f"{file} has no head")
+    # A number that was cut short may still be one.
+    if not text.endswith("\n"):
+        raise ValueError(f"{file} ends amid a line")
+    head, *cells = rows
+    if repeated := [name for at, name in enumerate(head) if name in head[:at]]:
+        raise ValueError(f"{file} has two columns of the name {repeated[0]!r}")
     for number, row in enumerate(cells, 1):
         if len(row) != len(head):
             raise ValueError(f"{file} has {len(row)} cells in row {number}, and {len(head)} in its head")

@@ -231,7 +231,8 @@ def plan(
 
     Without `gains` the arm is left to itself for `duration` [s] (10 unless given) from `q0` [rad] and `qdot0` [rad/s],
     and no `setpoint` may be given; with them it moves to `setpoint` [rad] (4 s unless given), and holding the effort
-    counts as error. Raises `ValueError` where the motion cannot be known so well for so long.
+    counts as error. A member that is left out of them is zeros. Raises `ValueError` where the motion cannot be known so
+    well for so long.
     """
     return Plan(
         **_native.plan(

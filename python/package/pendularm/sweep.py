@@ -7,6 +7,7 @@ results.
 import math
 import operator
 import os
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -48,6 +49,12 @@ AT_ONCE = 1_000_000
 
 MOST_ROWS = 10_000_000
 """Samples times settings of a piece: some 1 GB where it is done."""
+
+MOST_ARMS = 1_000_000
+"""Arms of a `Batch`, and so settings of a piece."""
+
+TRIED_AT_ONCE = 16_384
+"""Values of a setting that one `Batch` tries before the sweep begins."""
 
 PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
 STATES = ("setpoint", "q0", "qdot0")
@@ -185,9 +192,9 @@ def sweep(
         raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
     if piece is None:
         piece = max(1, min(1024, MOST_ROWS // 10 // samples))
-    piece = _whole("piece", piece)
-    if not 1 <= piece <= MOST_ROWS // samples:
-        raise ValueError(f"piece must be between 1 and {MOST_ROWS // samples} with {samples} samples, got {piece}")
+    piece, most = _whole("piece", piece), min(MOST_ARMS, MOST_ROWS // samples)
+    if not 1 <= piece <= most:
+        raise ValueError(f"piece must be between 1 and {most} with {samples} samples, got {piece}")
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
     if metric not in METRICS if isinstance(metric, str) else not callable(metric):
@@ -199,7 +206,7 @@ def sweep(
         links=links,
         duration=duration,
         samples=samples,
-        servo=bool(servo),
+        servo=_flag("servo", servo),
     )
     question.check()
     kept = None
@@ -251,7 +258,7 @@ class _Question:
         """Tries every value once, so that a bad one is refused here and by its own name."""
         settings = {**self.axes, **self.fixed}
         for name, values in settings.items():
-            _begin({name: values}, len(values), self.links)
+            _try(name, values, self.links)
         timesteps = settings.get("timestep", [TIMESTEP])
         longest = float(max(timesteps))
         # A quotient that falls short of 1 by rounding alone counts as that, as in a rollout.
@@ -287,9 +294,17 @@ def _whole(name: str, value: Any) -> int:
         raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
 
 
+def _flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {value!r:.60}")
+    return bool(value)
+
+
 def _number(name: str, value: Any) -> float:
     try:
         return float(_numbers(value))
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got a number that no double holds") from None
     except (TypeError, ValueError):
         raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
 
@@ -313,6 +328,8 @@ def _column(name: str, values: Sequence[Any], links: int) -> Any:
             column = np.array([np.broadcast_to(_numbers(value), (links,)) for value in values])
         else:
             column = np.array([float(_numbers(value)) for value in values])
+    except OverflowError:
+        raise ValueError(f"every {name} must be finite, got a number that no double holds") from None
     except (TypeError, ValueError):
         each = f" or an array of {links}" if name in PER_JOINT else ""
         raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
@@ -340,6 +357,21 @@ def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
     still = np.zeros((arms, links))
     batch.set_state(settings.get("q0", still), settings.get("qdot0", still))
     return batch
+
+
+def _try(name: str, values: Any, links: int) -> None:
+    """Gives the values to arms, some at once, so that a bad one is refused by its name and place."""
+    for start in range(0, len(values), TRIED_AT_ONCE):
+        some = values[start : start + TRIED_AT_ONCE]
+        try:
+            _begin({name: some}, len(some), links)
+        except ValueError as refusal:
+            said = str(refusal)
+            # The batch counts from the first of these.
+            row = re.match(rf"{name}\[(\d+)\]", said)
+            if row:
+                said = f"{name}[{start + int(row[1])}]{said[row.end() :]}"
+            raise ValueError(said) from None
 
 
 def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | None) -> None:

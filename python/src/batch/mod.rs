@@ -50,7 +50,8 @@ enum Either {
 /// overwritten by every call that changes the arms: copy what is to be kept. They cannot be written. An array that is
 /// handed in has one row per arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where
 /// they lie. `threads` share the work, as many as there are cores unless given; with 1 the caller does it alone. Calls
-/// on one batch from several threads wait for each other.
+/// on one batch from several threads wait for each other. It can be neither copied nor pickled, and a process that is
+/// forked while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {
