@@ -7,7 +7,7 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::process;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -18,6 +18,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::error::CommandError;
 use super::output::hint;
+use super::timed::Timed;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::same_type;
 use crate::protocol::op::token::Token;
@@ -31,8 +32,7 @@ const LINE_BYTES: u64 = 128 * 1024 * 1024;
 /// A connection.
 #[derive(Debug)]
 pub(super) struct Session {
-    stream: TcpStream,
-    lines: BufReader<TcpStream>,
+    lines: BufReader<Timed>,
     line: Vec<u8>,
     calls: u64,
     patience: Option<Duration>,
@@ -79,10 +79,12 @@ impl Session {
             address: address.to_owned(),
             why,
         })?;
-        let lines = stream.try_clone().map_err(no_socket)?;
-        let mut session = Self {
+        let timed = Timed {
             stream,
-            lines: BufReader::new(lines),
+            deadline: None,
+        };
+        let mut session = Self {
+            lines: BufReader::new(timed),
             line: Vec::new(),
             calls: 0,
             patience,
@@ -93,9 +95,16 @@ impl Session {
         Ok(session)
     }
 
-    /// Sends a frame.
+    /// Has what is awaited next come within `--timeout` from now on.
+    pub(super) fn await_next(&mut self) {
+        self.lines.get_mut().deadline = self.patience.map(|patience| Instant::now() + patience);
+    }
+
+    /// Sends a frame; what answers it is awaited from then on.
     pub(super) fn send(&mut self, frame: &Value) -> Result<(), CommandError> {
-        let sent = self.stream.write_all(format!("{frame}\n").as_bytes());
+        self.await_next();
+        let line = format!("{frame}\n");
+        let sent = self.lines.get_mut().write_all(line.as_bytes());
         if sent.is_err() {
             // The runtime has closed; its reason is still to be read.
             loop {
@@ -221,6 +230,7 @@ impl Session {
 
     /// The next message on a topic that was subscribed to.
     pub(super) fn message(&mut self, topic: &str) -> Result<Box<RawValue>, CommandError> {
+        self.await_next();
         loop {
             let said = self.receive()?;
             if let (true, Some(msg)) = (said.op == "publish" && said.topic == topic, said.msg) {
@@ -231,7 +241,11 @@ impl Session {
 
     /// Another way to send, for [`on_signal`].
     pub(super) fn sender(&self) -> Result<TcpStream, CommandError> {
-        self.stream.try_clone().map_err(no_socket)
+        let stream = self.lines.get_ref().stream.try_clone();
+        stream.map_err(|why| CommandError::System {
+            what: "the socket",
+            why,
+        })
     }
 }
 
@@ -241,21 +255,12 @@ fn dial(address: &str, patience: Option<Duration>) -> io::Result<TcpStream> {
         match TcpStream::connect_timeout(&one, patience.unwrap_or(CONNECT).min(CONNECT)) {
             Ok(stream) => {
                 stream.set_nodelay(true)?;
-                stream.set_read_timeout(patience)?;
-                stream.set_write_timeout(patience)?;
                 return Ok(stream);
             }
             Err(error) => why = error,
         }
     }
     Err(why)
-}
-
-fn no_socket(why: io::Error) -> CommandError {
-    CommandError::System {
-        what: "the socket",
-        why,
-    }
 }
 
 /// Has SIGINT and SIGTERM do `first` from now on, and end the process with status 1 the second time.

@@ -105,11 +105,11 @@ fn a_server_that_is_none_or_does_not_answer_gives_status_3() {
         (b"HTTP/1.1 400 Bad Request\r\n", false, "no frame came"),
         (b"{\"op\":", true, "within a frame"),
         (b"[1, 2]\n", false, "no frame came"),
-        (b"", false, "nothing came within 0.2 s"),
+        (b"", false, "nothing that was awaited came within 0.2 s"),
         (
             b"{\"op\":\"service_response\",\"id\":7}\n",
             false,
-            "nothing came",
+            "nothing that was awaited came",
         ),
     ] {
         let address = server(says, closes).to_string();

@@ -1,0 +1,110 @@
+//! The commands against a server that means them harm: they end in time, in words, and hold little of what it sends.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::common::{self, PATIENCE};
+
+/// A server that answers questions for types and topics, and does `then` at the first other frame.
+fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        for line in BufReader::new(stream.try_clone().unwrap()).lines() {
+            let Ok(line) = line else { return };
+            let said: Value = serde_json::from_str(&line).unwrap();
+            let service = said["service"].as_str().unwrap_or_default();
+            if !service.starts_with("/rosapi/") {
+                return then(&mut stream);
+            }
+            let values = json!({"type": "std_msgs/msg/String"});
+            let answer = json!({"op": "service_response", "id": said["id"], "values": values, "result": true});
+            stream.write_all(format!("{answer}\n").as_bytes()).unwrap();
+        }
+    });
+    address
+}
+
+fn start(arguments: &[&str], address: &str) -> Child {
+    let mut command = common::program();
+    command.args(arguments).args(["--connect", address]);
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// Exit status, standard output and standard error of a command that has to end by itself within `common::PATIENCE`.
+#[track_caller]
+fn end(mut child: Child) -> (Option<i32>, String, String) {
+    fn all(mut from: impl std::io::Read + Send + 'static) -> thread::JoinHandle<String> {
+        thread::spawn(move || {
+            let mut text = String::new();
+            from.read_to_string(&mut text).unwrap();
+            text
+        })
+    }
+    let out = all(child.stdout.take().unwrap());
+    let complaint = all(child.stderr.take().unwrap());
+    let deadline = Instant::now() + PATIENCE;
+    while child.try_wait().unwrap().is_none() && Instant::now() < deadline {
+        thread::sleep(Duration::from_millis(5));
+    }
+    let is_going = child.try_wait().unwrap().is_none();
+    let _ = child.kill();
+    assert!(!is_going, "it goes on and on");
+    let status = child.wait().unwrap().code();
+    (status, out.join().unwrap(), complaint.join().unwrap())
+}
+
+/// Sends the same again and again until nobody reads it.
+fn drip(bytes: &'static [u8]) -> impl Fn(&mut TcpStream) + Send {
+    move |stream| {
+        while stream.write_all(bytes).is_ok() {
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+const ECHO: [&str; 3] = ["topic", "echo", "/t"];
+const CALL: [&str; 3] = ["service", "call", "/t"];
+const GOAL: [&str; 3] = ["action", "send_goal", "/t"];
+const FOREIGN: &[u8] = b"{\"op\":\"publish\",\"topic\":\"/other\",\"msg\":{}}\n";
+
+#[test]
+fn what_was_not_awaited_puts_no_timeout_off() {
+    for command in [ECHO, CALL, GOAL] {
+        for bytes in [FOREIGN, b" "] {
+            let arguments = [&command[..], &["--timeout", "0.3"]].concat();
+            let (status, out, complaint) = end(start(&arguments, &server(drip(bytes))));
+            assert_eq!((status, out.as_str()), (Some(3), ""), "{command:?}");
+            let expected = "pendularm: nothing that was awaited came within 0.3 s\n";
+            assert_eq!(complaint, expected, "{command:?}");
+        }
+    }
+}
+
+/// The messages take twice as long together as each may.
+#[test]
+fn each_message_has_the_whole_time_to_come() {
+    let address = server(|stream| {
+        for _ in 0..5 {
+            thread::sleep(Duration::from_millis(400));
+            let message = b"{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":1}\n";
+            stream.write_all(message).unwrap();
+        }
+    });
+    let (status, out, complaint) = end(start(
+        &[&ECHO[..], &["--timeout", "1", "-n", "5"]].concat(),
+        &address,
+    ));
+    assert_eq!((status, complaint.as_str()), (Some(0), ""));
+    assert_eq!(out, "1\n---\n".repeat(5));
+}
