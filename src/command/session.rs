@@ -22,12 +22,14 @@ use super::timed::Timed;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::same_type;
 use crate::protocol::op::token::Token;
+use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 /// How long each address of the host may take to accept the connection.
 const CONNECT: Duration = Duration::from_secs(5);
 
-/// Longest line that is read \[bytes\]: more than the runtime lets wait for one client.
-const LINE_BYTES: u64 = 128 * 1024 * 1024;
+/// Longest frame that is read \[bytes\]: the runtime's longest answer is a trajectory of a million steps, each of three
+/// numbers of 25 bytes with their commas, 75 MB together.
+const MAX_ANSWER: usize = 80 * 1024 * 1024;
 
 /// A connection.
 #[derive(Debug)]
@@ -116,8 +118,13 @@ impl Session {
 
     /// The next frame that is no status. An error ends the command.
     pub(super) fn receive(&mut self) -> Result<Received, CommandError> {
+        self.receive_within(MAX_ANSWER)
+    }
+
+    /// The same, of at most so many bytes.
+    fn receive_within(&mut self, longest: usize) -> Result<Received, CommandError> {
         loop {
-            let said = self.read()?;
+            let said = self.read(longest)?;
             if said.op != "status" {
                 return Ok(said);
             }
@@ -131,11 +138,15 @@ impl Session {
         }
     }
 
-    fn read(&mut self) -> Result<Received, CommandError> {
+    fn read(&mut self, longest: usize) -> Result<Received, CommandError> {
         self.line.clear();
-        let mut bounded = (&mut self.lines).take(LINE_BYTES);
+        // A byte more tells a frame that is longer.
+        let mut bounded = (&mut self.lines).take(longest as u64 + 1);
         match bounded.read_until(b'\n', &mut self.line) {
             Ok(0) => Err(CommandError::Lost("the runtime closed it".to_owned())),
+            Ok(length) if length > longest => Err(CommandError::Lost(format!(
+                "a frame is longer than {longest} bytes"
+            ))),
             Ok(_) => serde_json::from_slice(&self.line).map_err(|error| {
                 let whole = self.line.ends_with(b"\n");
                 let what = if whole {
@@ -166,8 +177,8 @@ impl Session {
         loop {
             let said = self.receive()?;
             if said.op == "service_response" && said.id == id {
-                return match (said.result, &said.values) {
-                    (true, Some(values)) => Ok(values.clone()),
+                return match said.values {
+                    Some(values) if said.result => Ok(values),
                     _ => Err(said.refusal(service)),
                 };
             }
@@ -232,7 +243,7 @@ impl Session {
     pub(super) fn message(&mut self, topic: &str) -> Result<Box<RawValue>, CommandError> {
         self.await_next();
         loop {
-            let said = self.receive()?;
+            let said = self.receive_within(MAX_TOPIC_BYTES)?;
             if let (true, Some(msg)) = (said.op == "publish" && said.topic == topic, said.msg) {
                 return Ok(msg);
             }

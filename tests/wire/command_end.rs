@@ -128,23 +128,6 @@ fn a_server_that_is_none_or_does_not_answer_gives_status_3() {
     }
 }
 
-/// More than the runtime lets wait for one client, and no end of a line.
-#[test]
-fn a_line_without_end_is_not_read_without_end() {
-    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
-    let address = listener.local_addr().unwrap().to_string();
-    let server = thread::spawn(move || {
-        let (mut stream, _) = listener.accept().unwrap();
-        let chunk = vec![b' '; 1 << 20];
-        (0..1024)
-            .take_while(|_| stream.write_all(&chunk).is_ok())
-            .count()
-    });
-    let said = output(&["topic", "list", "--connect", &address]);
-    assert!(complaint(&said, 3).contains("within a frame"));
-    assert!(server.join().unwrap() < 200, "MiB");
-}
-
 #[test]
 fn a_token_is_shown_from_the_option_or_the_variable() {
     let token = "open-sesame-once-more";

@@ -108,3 +108,78 @@ fn each_message_has_the_whole_time_to_come() {
     assert_eq!((status, complaint.as_str()), (Some(0), ""));
     assert_eq!(out, "1\n---\n".repeat(5));
 }
+
+/// Publishes this text on the topic, once.
+fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
+    move |stream| {
+        // Who has had enough of it does not read the rest.
+        let _ = writeln!(
+            stream,
+            "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}"
+        );
+        thread::sleep(PATIENCE);
+    }
+}
+
+/// A message of `/diagnostics` with these keys, each of the value `v`.
+fn parts(keys: &[&str]) -> String {
+    let values: Vec<Value> = keys
+        .iter()
+        .map(|key| json!({"key": key, "value": "v"}))
+        .collect();
+    let part = json!({"level": 0, "name": "a", "message": "b", "values": values});
+    json!({ "status": [part] }).to_string()
+}
+
+#[test]
+fn a_long_key_of_diagnostics_pads_no_other_line() {
+    let longest = "k".repeat(70_000);
+    let long = &longest[..60_000];
+    let mut many = vec![""; 10_000];
+    many.push(long);
+    for (keys, limit) in [(vec!["a", &longest], 80_000), (many, 600_000)] {
+        let address = server(say("/diagnostics", parts(&keys)));
+        let (status, out, complaint) = end(start(&["diagnostics"], &address));
+        assert_eq!((status, complaint.as_str()), (Some(0), ""));
+        assert_eq!(out.lines().count(), 1 + keys.len());
+        assert!(out.lines().nth(1).unwrap().ends_with("  v"));
+        let key = keys.last().unwrap();
+        assert!(out.ends_with(&format!("\n  {key}  v\n")) && out.len() < limit);
+    }
+}
+
+/// Any client may send such a message: of 2 MB, in YAML of 250 MB.
+#[cfg(target_os = "linux")]
+#[test]
+fn yaml_is_printed_before_all_of_it_is_written() {
+    let (depth, count) = (120, 1_000_000);
+    let msg = "[".repeat(depth) + &"1,".repeat(count) + "1" + &"]".repeat(depth);
+    let address = server(say("/t", msg));
+    let mut child = std::process::Command::new("bash")
+        .args(["-c", "ulimit -v 200000; exec \"$@\"", "bash"])
+        .arg(common::program().get_program())
+        .args(ECHO)
+        .args(["--once", "--connect", &address])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let last = lines.map(Result::unwrap).enumerate().last();
+    assert_eq!(last, Some((count + 1, "---".to_owned())));
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn a_frame_that_no_runtime_sends_is_read_no_further() {
+    for (command, limit) in [(ECHO, 4 * 1024 * 1024 + 1), (CALL, 80 * 1024 * 1024)] {
+        let address = server(move |stream| {
+            let chunk = [b' '; 1 << 16];
+            while stream.write_all(&chunk).is_ok() {}
+        });
+        let (status, out, complaint) = end(start(&command, &address));
+        assert_eq!((status, out.as_str()), (Some(3), ""));
+        let expected =
+            format!("pendularm: the connection ended: a frame is longer than {limit} bytes\n");
+        assert_eq!(complaint, expected);
+    }
+}
