@@ -79,7 +79,10 @@ pub(super) fn send_goal(asked: &Asked) -> Result<(), CommandError> {
         let said = session.receive()?;
         let values = said.values.as_ref().map_or("null", |values| values.get());
         match said.op.as_str() {
-            "action_feedback" => asked.show_next(&raw(format!("{{\"feedback\":{values}}}"))?)?,
+            "action_feedback" => {
+                asked.show_next(&raw(format!("{{\"feedback\":{values}}}"))?)?;
+                session.await_next();
+            }
             "action_result" => {
                 let number = said
                     .status

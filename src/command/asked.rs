@@ -12,7 +12,7 @@ use super::error::{CommandError, plain};
 use super::field::FieldPath;
 use super::output::print;
 use super::session::Session;
-use super::yaml;
+use super::{spelling, yaml};
 use crate::protocol::op::token::Token;
 
 /// The name of the option that shows a token; its value is read where the environment is.
@@ -110,23 +110,19 @@ impl Asked {
 
     /// Prints an answer.
     pub(super) fn show(&self, raw: &RawValue) -> Result<(), CommandError> {
-        print(&self.spelled(raw)?)
+        self.spell(raw, "")
     }
 
     /// Prints one of several answers, each a document of its own in YAML.
     pub(super) fn show_next(&self, raw: &RawValue) -> Result<(), CommandError> {
-        let mut text = self.spelled(raw)?;
-        if !self.has("json") {
-            text.push_str("---\n");
-        }
-        print(&text)
+        self.spell(raw, "---\n")
     }
 
-    fn spelled(&self, raw: &RawValue) -> Result<String, CommandError> {
+    fn spell(&self, raw: &RawValue, end: &str) -> Result<(), CommandError> {
         if self.has("json") {
-            return Ok(yaml::json_line(raw));
+            return print(&spelling::json_line(raw));
         }
-        yaml::lines(raw).map_err(|error| CommandError::Lost(format!("no frame came: {error}")))
+        spelling::print_yaml(raw, end, &mut print)
     }
 
     /// Prints names, and their types if they are to be shown.

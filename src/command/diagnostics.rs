@@ -15,6 +15,8 @@ use crate::protocol::catalog::Topic;
 const TOPIC: &str = Topic::Diagnostics.name();
 /// The levels of `diagnostic_msgs/msg/DiagnosticStatus`, by their numbers.
 const LEVELS: [&str; 4] = ["OK", "WARN", "ERROR", "STALE"];
+/// Widest column of keys, in bytes: the runtime's own have room, and one that is longer pads no other line.
+const KEY_WIDTH: usize = 40;
 
 pub(super) fn command() -> Command {
     verb(
@@ -67,7 +69,7 @@ fn page(part: &Value) -> String {
         .unwrap_or(&"STALE");
     let details = list(part, "values");
     let widths = details.iter().map(|one| text(one, "key").len());
-    let width = widths.max().unwrap_or(0);
+    let width = widths.max().unwrap_or(0).min(KEY_WIDTH);
     let mut page = plain(&format!("{level} {}", title(part))) + "\n";
     for one in details {
         let (key, value) = (text(one, "key"), text(one, "value"));

@@ -32,8 +32,8 @@ pub enum CommandError {
     /// The connection is gone.
     #[error("the connection ended: {0}")]
     Lost(String),
-    /// Nothing came in time.
-    #[error("nothing came within {} s", .0.as_secs_f64())]
+    /// What was awaited did not come in time.
+    #[error("nothing that was awaited came within {} s", .0.as_secs_f64())]
     Late(Duration),
     /// The system refused what a command needs.
     #[error("{what}: {why}")]

@@ -14,6 +14,8 @@ mod package;
 mod param;
 mod service;
 mod session;
+mod spelling;
+mod timed;
 mod topic;
 mod verbs;
 mod yaml;

@@ -7,7 +7,7 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::process;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -18,21 +18,23 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::error::CommandError;
 use super::output::hint;
+use super::timed::Timed;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::same_type;
 use crate::protocol::op::token::Token;
+use crate::protocol::outbox::MAX_TOPIC_BYTES;
 
 /// How long each address of the host may take to accept the connection.
 const CONNECT: Duration = Duration::from_secs(5);
 
-/// Longest line that is read \[bytes\]: more than the runtime lets wait for one client.
-const LINE_BYTES: u64 = 128 * 1024 * 1024;
+/// Longest frame that is read \[bytes\]: the runtime's longest answer is a trajectory of a million steps, each of three
+/// numbers of 25 bytes with their commas, 75 MB together.
+const MAX_ANSWER: usize = 80 * 1024 * 1024;
 
 /// A connection.
 #[derive(Debug)]
 pub(super) struct Session {
-    stream: TcpStream,
-    lines: BufReader<TcpStream>,
+    lines: BufReader<Timed>,
     line: Vec<u8>,
     calls: u64,
     patience: Option<Duration>,
@@ -79,10 +81,12 @@ impl Session {
             address: address.to_owned(),
             why,
         })?;
-        let lines = stream.try_clone().map_err(no_socket)?;
-        let mut session = Self {
+        let timed = Timed {
             stream,
-            lines: BufReader::new(lines),
+            deadline: None,
+        };
+        let mut session = Self {
+            lines: BufReader::new(timed),
             line: Vec::new(),
             calls: 0,
             patience,
@@ -93,9 +97,16 @@ impl Session {
         Ok(session)
     }
 
-    /// Sends a frame.
+    /// Has what is awaited next come within `--timeout` from now on.
+    pub(super) fn await_next(&mut self) {
+        self.lines.get_mut().deadline = self.patience.map(|patience| Instant::now() + patience);
+    }
+
+    /// Sends a frame; what answers it is awaited from then on.
     pub(super) fn send(&mut self, frame: &Value) -> Result<(), CommandError> {
-        let sent = self.stream.write_all(format!("{frame}\n").as_bytes());
+        self.await_next();
+        let line = format!("{frame}\n");
+        let sent = self.lines.get_mut().write_all(line.as_bytes());
         if sent.is_err() {
             // The runtime has closed; its reason is still to be read.
             loop {
@@ -107,8 +118,13 @@ impl Session {
 
     /// The next frame that is no status. An error ends the command.
     pub(super) fn receive(&mut self) -> Result<Received, CommandError> {
+        self.receive_within(MAX_ANSWER)
+    }
+
+    /// The same, of at most so many bytes.
+    fn receive_within(&mut self, longest: usize) -> Result<Received, CommandError> {
         loop {
-            let said = self.read()?;
+            let said = self.read(longest)?;
             if said.op != "status" {
                 return Ok(said);
             }
@@ -122,11 +138,15 @@ impl Session {
         }
     }
 
-    fn read(&mut self) -> Result<Received, CommandError> {
+    fn read(&mut self, longest: usize) -> Result<Received, CommandError> {
         self.line.clear();
-        let mut bounded = (&mut self.lines).take(LINE_BYTES);
+        // A byte more tells a frame that is longer.
+        let mut bounded = (&mut self.lines).take(longest as u64 + 1);
         match bounded.read_until(b'\n', &mut self.line) {
             Ok(0) => Err(CommandError::Lost("the runtime closed it".to_owned())),
+            Ok(length) if length > longest => Err(CommandError::Lost(format!(
+                "a frame is longer than {longest} bytes"
+            ))),
             Ok(_) => serde_json::from_slice(&self.line).map_err(|error| {
                 let whole = self.line.ends_with(b"\n");
                 let what = if whole {
@@ -157,8 +177,8 @@ impl Session {
         loop {
             let said = self.receive()?;
             if said.op == "service_response" && said.id == id {
-                return match (said.result, &said.values) {
-                    (true, Some(values)) => Ok(values.clone()),
+                return match said.values {
+                    Some(values) if said.result => Ok(values),
                     _ => Err(said.refusal(service)),
                 };
             }
@@ -221,8 +241,9 @@ impl Session {
 
     /// The next message on a topic that was subscribed to.
     pub(super) fn message(&mut self, topic: &str) -> Result<Box<RawValue>, CommandError> {
+        self.await_next();
         loop {
-            let said = self.receive()?;
+            let said = self.receive_within(MAX_TOPIC_BYTES)?;
             if let (true, Some(msg)) = (said.op == "publish" && said.topic == topic, said.msg) {
                 return Ok(msg);
             }
@@ -231,7 +252,11 @@ impl Session {
 
     /// Another way to send, for [`on_signal`].
     pub(super) fn sender(&self) -> Result<TcpStream, CommandError> {
-        self.stream.try_clone().map_err(no_socket)
+        let stream = self.lines.get_ref().stream.try_clone();
+        stream.map_err(|why| CommandError::System {
+            what: "the socket",
+            why,
+        })
     }
 }
 
@@ -241,21 +266,12 @@ fn dial(address: &str, patience: Option<Duration>) -> io::Result<TcpStream> {
         match TcpStream::connect_timeout(&one, patience.unwrap_or(CONNECT).min(CONNECT)) {
             Ok(stream) => {
                 stream.set_nodelay(true)?;
-                stream.set_read_timeout(patience)?;
-                stream.set_write_timeout(patience)?;
                 return Ok(stream);
             }
             Err(error) => why = error,
         }
     }
     Err(why)
-}
-
-fn no_socket(why: io::Error) -> CommandError {
-    CommandError::System {
-        what: "the socket",
-        why,
-    }
 }
 
 /// Has SIGINT and SIGTERM do `first` from now on, and end the process with status 1 the second time.

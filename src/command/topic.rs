@@ -200,7 +200,7 @@ pub(super) fn publish(asked: &Asked) -> Result<(), CommandError> {
             } else {
                 print(&format!(
                     "publishing #{count}: {}",
-                    super::yaml::json_line(spelled)
+                    super::spelling::json_line(spelled)
                 ))?;
             }
         }

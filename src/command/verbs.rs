@@ -38,7 +38,7 @@ pub(super) fn verb(name: &'static str, about: &'static str, notes: &str) -> Comm
     let timeout = option(
         "timeout",
         "SECONDS",
-        "How long it may say nothing that was awaited [default: for ever; 5 s for the connection]",
+        "How long an answer or the next message may take [default: for ever; 5 s for the connection]",
     )
     .value_parser(read_positive);
     let json = flag(

@@ -30,6 +30,8 @@ mod closing;
 mod command;
 #[cfg(feature = "cli")]
 mod command_end;
+#[cfg(feature = "cli")]
+mod command_hostile;
 #[path = "../support/common.rs"]
 mod common;
 mod divergence;

@@ -1,0 +1,185 @@
+//! The commands against a server that means them harm: they end in time, in words, and hold little of what it sends.
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::process::{Child, Stdio};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+
+use crate::common::{self, PATIENCE};
+
+/// A server that answers questions for types and topics, and does `then` at the first other frame.
+fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        for line in BufReader::new(stream.try_clone().unwrap()).lines() {
+            let Ok(line) = line else { return };
+            let said: Value = serde_json::from_str(&line).unwrap();
+            let service = said["service"].as_str().unwrap_or_default();
+            if !service.starts_with("/rosapi/") {
+                return then(&mut stream);
+            }
+            let values = json!({"type": "std_msgs/msg/String"});
+            let answer = json!({"op": "service_response", "id": said["id"], "values": values, "result": true});
+            stream.write_all(format!("{answer}\n").as_bytes()).unwrap();
+        }
+    });
+    address
+}
+
+fn start(arguments: &[&str], address: &str) -> Child {
+    let mut command = common::program();
+    command.args(arguments).args(["--connect", address]);
+    command
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// Exit status, standard output and standard error of a command that has to end by itself within `common::PATIENCE`.
+#[track_caller]
+fn end(mut child: Child) -> (Option<i32>, String, String) {
+    fn all(mut from: impl std::io::Read + Send + 'static) -> thread::JoinHandle<String> {
+        thread::spawn(move || {
+            let mut text = String::new();
+            from.read_to_string(&mut text).unwrap();
+            text
+        })
+    }
+    let out = all(child.stdout.take().unwrap());
+    let complaint = all(child.stderr.take().unwrap());
+    let deadline = Instant::now() + PATIENCE;
+    while child.try_wait().unwrap().is_none() && Instant::now() < deadline {
+        thread::sleep(Duration::from_millis(5));
+    }
+    let is_going = child.try_wait().unwrap().is_none();
+    let _ = child.kill();
+    assert!(!is_going, "it goes on and on");
+    let status = child.wait().unwrap().code();
+    (status, out.join().unwrap(), complaint.join().unwrap())
+}
+
+/// Sends the same again and again until nobody reads it.
+fn drip(bytes: &'static [u8]) -> impl Fn(&mut TcpStream) + Send {
+    move |stream| {
+        while stream.write_all(bytes).is_ok() {
+            thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+const ECHO: [&str; 3] = ["topic", "echo", "/t"];
+const CALL: [&str; 3] = ["service", "call", "/t"];
+const GOAL: [&str; 3] = ["action", "send_goal", "/t"];
+const FOREIGN: &[u8] = b"{\"op\":\"publish\",\"topic\":\"/other\",\"msg\":{}}\n";
+
+#[test]
+fn what_was_not_awaited_puts_no_timeout_off() {
+    for command in [ECHO, CALL, GOAL] {
+        for bytes in [FOREIGN, b" "] {
+            let arguments = [&command[..], &["--timeout", "0.3"]].concat();
+            let (status, out, complaint) = end(start(&arguments, &server(drip(bytes))));
+            assert_eq!((status, out.as_str()), (Some(3), ""), "{command:?}");
+            let expected = "pendularm: nothing that was awaited came within 0.3 s\n";
+            assert_eq!(complaint, expected, "{command:?}");
+        }
+    }
+}
+
+/// The messages take twice as long together as each may.
+#[test]
+fn each_message_has_the_whole_time_to_come() {
+    let address = server(|stream| {
+        for _ in 0..5 {
+            thread::sleep(Duration::from_millis(400));
+            let message = b"{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":1}\n";
+            stream.write_all(message).unwrap();
+        }
+    });
+    let (status, out, complaint) = end(start(
+        &[&ECHO[..], &["--timeout", "1", "-n", "5"]].concat(),
+        &address,
+    ));
+    assert_eq!((status, complaint.as_str()), (Some(0), ""));
+    assert_eq!(out, "1\n---\n".repeat(5));
+}
+
+/// Publishes this text on the topic, once.
+fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
+    move |stream| {
+        // Who has had enough of it does not read the rest.
+        let _ = writeln!(
+            stream,
+            "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}"
+        );
+        thread::sleep(PATIENCE);
+    }
+}
+
+/// A message of `/diagnostics` with these keys, each of the value `v`.
+fn parts(keys: &[&str]) -> String {
+    let values: Vec<Value> = keys
+        .iter()
+        .map(|key| json!({"key": key, "value": "v"}))
+        .collect();
+    let part = json!({"level": 0, "name": "a", "message": "b", "values": values});
+    json!({ "status": [part] }).to_string()
+}
+
+#[test]
+fn a_long_key_of_diagnostics_pads_no_other_line() {
+    let longest = "k".repeat(70_000);
+    let long = &longest[..60_000];
+    let mut many = vec![""; 10_000];
+    many.push(long);
+    for (keys, limit) in [(vec!["a", &longest], 80_000), (many, 600_000)] {
+        let address = server(say("/diagnostics", parts(&keys)));
+        let (status, out, complaint) = end(start(&["diagnostics"], &address));
+        assert_eq!((status, complaint.as_str()), (Some(0), ""));
+        assert_eq!(out.lines().count(), 1 + keys.len());
+        assert!(out.lines().nth(1).unwrap().ends_with("  v"));
+        let key = keys.last().unwrap();
+        assert!(out.ends_with(&format!("\n  {key}  v\n")) && out.len() < limit);
+    }
+}
+
+/// Any client may send such a message: of 2 MB, in YAML of 250 MB.
+#[cfg(target_os = "linux")]
+#[test]
+fn yaml_is_printed_before_all_of_it_is_written() {
+    let (depth, count) = (120, 1_000_000);
+    let msg = "[".repeat(depth) + &"1,".repeat(count) + "1" + &"]".repeat(depth);
+    let address = server(say("/t", msg));
+    let mut child = std::process::Command::new("bash")
+        .args(["-c", "ulimit -v 200000; exec \"$@\"", "bash"])
+        .arg(common::program().get_program())
+        .args(ECHO)
+        .args(["--once", "--connect", &address])
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let last = lines.map(Result::unwrap).enumerate().last();
+    assert_eq!(last, Some((count + 1, "---".to_owned())));
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+}
+
+#[test]
+fn a_frame_that_no_runtime_sends_is_read_no_further() {
+    for (command, limit) in [(ECHO, 4 * 1024 * 1024 + 1), (CALL, 80 * 1024 * 1024)] {
+        let address = server(move |stream| {
+            let chunk = [b' '; 1 << 16];
+            while stream.write_all(&chunk).is_ok() {}
+        });
+        let (status, out, complaint) = end(start(&command, &address));
+        assert_eq!((status, out.as_str()), (Some(3), ""));
+        let expected =
+            format!("pendularm: the connection ended: a frame is longer than {limit} bytes\n");
+        assert_eq!(complaint, expected);
+    }
+}
