@@ -84,11 +84,8 @@ pub(super) fn send_goal(asked: &Asked) -> Result<(), CommandError> {
                 session.await_next();
             }
             "action_result" => {
-                let number = said
-                    .status
-                    .as_u64()
-                    .and_then(|status| usize::try_from(status).ok());
-                let status = number
+                let status = said
+                    .status_number()
                     .and_then(|number| STATUSES.get(number))
                     .unwrap_or(&"UNKNOWN");
                 if !said.result {

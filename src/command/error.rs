@@ -32,7 +32,7 @@ pub enum CommandError {
     /// The connection is gone.
     #[error("the connection ended: {0}")]
     Lost(String),
-    /// What was awaited did not come in time.
+    /// Nothing that was awaited came in time.
     #[error("nothing that was awaited came within {} s", .0.as_secs_f64())]
     Late(Duration),
     /// The system refused what a command needs.

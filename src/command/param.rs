@@ -71,8 +71,8 @@ pub(super) fn list(asked: &Asked) -> Result<(), CommandError> {
 pub(super) fn get(asked: &Asked) -> Result<(), CommandError> {
     let values = call(asked, Rosapi::GetParam, &json!({"name": full_name(asked)}))?;
     // JSON within JSON.
-    match serde_json::from_str::<Value>(&values.value) {
-        Ok(Value::String(text)) if !asked.has("json") => print(&format!("{text}\n")),
+    match serde_json::from_str::<String>(&values.value) {
+        Ok(text) if !asked.has("json") => print(&format!("{text}\n")),
         _ => {
             let value = RawValue::from_string(values.value);
             asked.show(&value.map_err(|error| CommandError::Lost(error.to_string()))?)

@@ -3,6 +3,7 @@
 //! **Invariant:** what comes is read line by line, each of bounded length, and every refusal ends the command with the
 //! runtime's own words.
 
+use std::collections::BTreeMap;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::process;
@@ -18,7 +19,7 @@ use tokio::signal::unix::{SignalKind, signal};
 
 use super::error::CommandError;
 use super::output::hint;
-use super::timed::Timed;
+use super::timed::TimedStream;
 use crate::protocol::catalog::rosapi::PREFIX;
 use crate::protocol::names::same_type;
 use crate::protocol::op::token::Token;
@@ -34,18 +35,18 @@ const MAX_ANSWER: usize = 80 * 1024 * 1024;
 /// A connection.
 #[derive(Debug)]
 pub(super) struct Session {
-    lines: BufReader<Timed>,
+    lines: BufReader<TimedStream>,
     line: Vec<u8>,
     calls: u64,
     patience: Option<Duration>,
 }
 
-/// A frame of the runtime's, as far as a command needs it.
+/// A frame of the runtime's, as far as a command needs it. The values in it are left as they are spelled: read into a
+/// tree they would take seventy times their bytes.
 #[derive(Debug, Deserialize)]
 pub(super) struct Received {
     pub(super) op: String,
-    #[serde(default)]
-    pub(super) id: Value,
+    id: Option<Box<RawValue>>,
     #[serde(default)]
     topic: String,
     #[serde(default)]
@@ -55,19 +56,26 @@ pub(super) struct Received {
     #[serde(default)]
     pub(super) result: bool,
     /// A text, or the number of an action's status.
-    #[serde(default)]
-    pub(super) status: Value,
+    status: Option<Box<RawValue>>,
 }
 
 impl Received {
     /// Why it was refused: `status`, or a text in place of the values.
     pub(super) fn refusal(&self, name: &str) -> CommandError {
-        let values = self.values.as_ref().map(|values| values.get());
-        let text = values.and_then(|values| serde_json::from_str::<String>(values).ok());
-        let status = self.status.as_str().filter(|status| !status.is_empty());
-        let why = status.map(str::to_owned).or(text);
+        let status: Option<String> = read_as(self.status.as_deref());
+        let status = status.filter(|status| !status.is_empty());
+        let why = status.or_else(|| read_as(self.values.as_deref()));
         CommandError::refused(&why.unwrap_or_else(|| format!("{name} failed, and said no more")))
     }
+
+    /// The number of an action's status.
+    pub(super) fn status_number(&self) -> Option<usize> {
+        read_as(self.status.as_deref())
+    }
+}
+
+fn read_as<T: DeserializeOwned>(raw: Option<&RawValue>) -> Option<T> {
+    serde_json::from_str(raw?.get()).ok()
 }
 
 impl Session {
@@ -81,7 +89,7 @@ impl Session {
             address: address.to_owned(),
             why,
         })?;
-        let timed = Timed {
+        let timed = TimedStream {
             stream,
             deadline: None,
         };
@@ -172,11 +180,11 @@ impl Session {
         args: &Value,
     ) -> Result<Box<RawValue>, CommandError> {
         self.calls += 1;
-        let id = json!(self.calls);
+        let id = self.calls;
         self.send(&json!({"op": "call_service", "id": id, "service": service, "args": args}))?;
         loop {
             let said = self.receive()?;
-            if said.op == "service_response" && said.id == id {
+            if said.op == "service_response" && read_as(said.id.as_deref()) == Some(id) {
                 return match said.values {
                     Some(values) if said.result => Ok(values),
                     _ => Err(said.refusal(service)),
@@ -194,9 +202,9 @@ impl Session {
     ) -> Result<T, CommandError> {
         let service = format!("{PREFIX}{question}");
         let values = self.call(&service, args)?;
-        let mut values: Value = serde_json::from_str(values.get()).unwrap_or_default();
-        let member = values.get_mut(member).map(Value::take).unwrap_or_default();
-        serde_json::from_value(member)
+        let values: BTreeMap<String, &RawValue> =
+            serde_json::from_str(values.get()).unwrap_or_default();
+        serde_json::from_str(values.get(member).map_or("null", |value| value.get()))
             .map_err(|error| CommandError::refused(&format!("{service} answered: {error}")))
     }
 

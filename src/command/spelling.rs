@@ -45,7 +45,7 @@ pub(super) fn print_yaml(
     end: &str,
     print: &mut dyn FnMut(&str) -> Result<(), CommandError>,
 ) -> Result<(), CommandError> {
-    let mut pieces = Pieces {
+    let mut pieces = PrintedText {
         text: String::new(),
         print,
         failed: None,
@@ -65,7 +65,7 @@ pub(super) fn print_yaml(
 }
 
 /// Text that is printed whenever it has become long.
-struct Pieces<'a> {
+struct PrintedText<'a> {
     text: String,
     print: &'a mut dyn FnMut(&str) -> Result<(), CommandError>,
     /// Why nothing more is printed.
@@ -84,7 +84,7 @@ enum Slot {
 
 /// Writes a value of JSON as YAML while it is read.
 struct YamlWriter<'a, 'b> {
-    pieces: &'a mut Pieces<'b>,
+    pieces: &'a mut PrintedText<'b>,
     /// Spaces before the name or the dash that it stands behind.
     indent: usize,
     place: Slot,

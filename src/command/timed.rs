@@ -8,12 +8,12 @@ use std::time::{Duration, Instant};
 
 /// A stream, and until when it is read and written.
 #[derive(Debug)]
-pub(super) struct Timed {
+pub(super) struct TimedStream {
     pub(super) stream: TcpStream,
     pub(super) deadline: Option<Instant>,
 }
 
-impl Timed {
+impl TimedStream {
     /// The time that is left; none is for ever.
     fn left(&self) -> io::Result<Option<Duration>> {
         let left = self
@@ -26,14 +26,14 @@ impl Timed {
     }
 }
 
-impl Read for Timed {
+impl Read for TimedStream {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         self.stream.set_read_timeout(self.left()?)?;
         self.stream.read(buffer)
     }
 }
 
-impl Write for Timed {
+impl Write for TimedStream {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.stream.set_write_timeout(self.left()?)?;
         self.stream.write(bytes)

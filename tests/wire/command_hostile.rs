@@ -31,6 +31,7 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
     address
 }
 
+/// A command that asks the server there.
 fn start(arguments: &[&str], address: &str) -> Child {
     let mut command = common::program();
     command.args(arguments).args(["--connect", address]);
@@ -148,6 +149,39 @@ fn a_long_key_of_diagnostics_pads_no_other_line() {
     }
 }
 
+/// A command that may take so many kilobytes of memory.
+#[cfg(target_os = "linux")]
+fn start_within(kilobytes: u32, arguments: &[&str], address: &str) -> Child {
+    let mut command = std::process::Command::new("bash");
+    command
+        .args(["-c", &format!("ulimit -v {kilobytes}; exec \"$@\""), "bash"])
+        .arg(common::program().get_program())
+        .args(arguments)
+        .args(["--connect", address])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    command.spawn().unwrap()
+}
+
+/// As a tree the values of 4 MB would take 260 MB.
+#[cfg(target_os = "linux")]
+#[test]
+fn values_that_say_nothing_to_a_command_are_not_spread_out() {
+    for member in ["id", "status"] {
+        let address = server(move |stream| {
+            let value = "[[[1]]],".repeat(500_000);
+            let foreign = format!("{{\"op\":\"service_response\",\"{member}\":[{value}1]}}\n");
+            let answer = "{\"op\":\"service_response\",\"id\":1,\"values\":{},\"result\":true}\n";
+            let _ = stream.write_all((foreign + answer).as_bytes());
+            thread::sleep(PATIENCE);
+        });
+        let (status, out, complaint) = end(start_within(200_000, &CALL, &address));
+        assert_eq!((status, complaint.as_str()), (Some(0), ""), "{member}");
+        assert_eq!(out, "{}\n", "{member}");
+    }
+}
+
 /// Any client may send such a message: of 2 MB, in YAML of 250 MB.
 #[cfg(target_os = "linux")]
 #[test]
@@ -155,14 +189,8 @@ fn yaml_is_printed_before_all_of_it_is_written() {
     let (depth, count) = (120, 1_000_000);
     let msg = "[".repeat(depth) + &"1,".repeat(count) + "1" + &"]".repeat(depth);
     let address = server(say("/t", msg));
-    let mut child = std::process::Command::new("bash")
-        .args(["-c", "ulimit -v 200000; exec \"$@\"", "bash"])
-        .arg(common::program().get_program())
-        .args(ECHO)
-        .args(["--once", "--connect", &address])
-        .stdout(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let arguments = [&ECHO[..], &["--once"]].concat();
+    let mut child = start_within(200_000, &arguments, &address);
     let lines = BufReader::new(child.stdout.take().unwrap()).lines();
     let last = lines.map(Result::unwrap).enumerate().last();
     assert_eq!(last, Some((count + 1, "---".to_owned())));
