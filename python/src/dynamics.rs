@@ -8,7 +8,8 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Arm, Chain, for_either};
-use crate::fields::{Bound, Held, Numbers, Object, Real, Rows, joints_or, refused};
+use crate::arrays::{Numbers, Rows};
+use crate::fields::{Bound, Held, Object, Real, joints_or, refused};
 
 /// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

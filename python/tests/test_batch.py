@@ -150,6 +150,54 @@ def test_arrays_go_in_as_they_lie():
     assert batch.position.tolist() == other.position[::-1].tolist()
 
 
+def packed(numbers):
+    """A field of a packed record: its doubles lie at odd places."""
+    records = np.zeros(len(numbers), [("name", "u1"), ("field", numbers.dtype, numbers.shape[1:])])
+    records["field"] = numbers
+    return records["field"]
+
+
+@pytest.mark.parametrize(
+    "laid",
+    [np.asfortranarray, lambda numbers: numbers.T.copy().T, packed, lambda numbers: numbers[::-1].copy()[::-1]],
+    ids=["fortran", "transposed", "packed", "backwards"],
+)
+def test_numbers_are_those_of_their_indices_however_they_lie(links, laid):
+    random = np.random.default_rng(3)
+    numbers = random.uniform(0.1, 1, (5, links))
+    batch, other = pendularm.Batch(5, links), pendularm.Batch(5, links)
+    for one, given in [(batch, laid), (other, np.copy)]:
+        one.set_integrator(timestep=given(0.001 * numbers[:, 0]))
+        one.set_params(given(numbers[:, 1]), given(numbers), given(numbers))
+        one.set_gains(given(numbers), given(numbers), given(numbers))
+        one.set_setpoint(given(numbers), given(numbers))
+        one.set_state(given(numbers), given(numbers))
+        one.enable()
+        one.step(20, given(numbers))
+    assert laid(numbers).tolist() == numbers.tolist()
+    assert batch.time.tolist() == other.time.tolist()
+    assert batch.effort.tolist() == other.effort.tolist()
+    assert batch.position.tolist() == other.position.tolist()
+    arm, single = pendularm.Arm(links), pendularm.Simulation(pendularm.Arm(links))
+    assert pendularm.end_effector(arm, laid(numbers)).tolist() == pendularm.end_effector(arm, numbers).tolist()
+    single.set_state(laid(numbers[:links, 0]))
+    assert single.position.tolist() == numbers[:links, 0].tolist()
+
+
+def test_a_mask_may_be_a_view():
+    batch, mask = pendularm.Batch(3), np.array([True, False, True])
+    views = [np.stack([mask, ~mask], axis=1)[:, 0], np.repeat(mask, 2)[::2], mask[::-1], packed(mask)]
+    for view in views:
+        chosen = view.tolist()
+        batch.set_state([0.5, 0.5])
+        batch.set_state([0.25, 0.25], arms=view)
+        assert (batch.position[:, 0] == 0.25).tolist() == chosen
+        batch.reset(view)
+        assert (batch.position[:, 0] == 0).tolist() == chosen
+    batch.reset((batch.position > 0)[:, 0])
+    assert not batch.position.any()
+
+
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [

@@ -7,7 +7,8 @@ use pendularm::math::integrator::Method;
 use pyo3::prelude::{PyAnyMethods, PyResult};
 
 use super::Batch;
-use crate::fields::{self, Bound, Numbers, Object, Rows, refused};
+use crate::arrays::{Numbers, Rows, laid_out};
+use crate::fields::{self, Bound, Object, refused};
 
 impl Batch {
     /// A row for each arm, or one for all, where something was handed in.
@@ -86,7 +87,7 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
         .call_method1("asarray", (arms,))
         .map_err(|_| expected())?;
     if let Ok(mask) = array.cast::<PyArray1<bool>>() {
-        let mask = mask.to_vec()?;
+        let mask = laid_out(mask)?.to_vec()?;
         if mask.len() != count {
             return Err(expected());
         }

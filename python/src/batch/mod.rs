@@ -21,7 +21,8 @@ use pendularm::math::simulation::Simulation;
 use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
-use crate::fields::{self, Bound, Held, Numbers, Object, Whole, refused};
+use crate::arrays::Numbers;
+use crate::fields::{self, Bound, Held, Object, Whole, refused};
 use crate::patience::hold;
 use given::{chosen, read, read_methods, read_steps};
 use lanes::{Piece, Steps};
