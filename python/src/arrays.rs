@@ -8,6 +8,7 @@ use numpy::ndarray::Dimension;
 use numpy::{
     Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
+use pyo3::intern;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult};
 use pyo3::types::PyDict;
 
@@ -108,14 +109,21 @@ impl<'py> Numbers<'py> {
 /// The array itself where it may be read as one slice, its rows one after the other, and a copy of it elsewhere.
 ///
 /// A slice of an array whose columns lie side by side would have its numbers in another order, and a field of a packed
-/// record has a stride that is no whole number of doubles.
+/// record has a stride that is no whole number of doubles. An array that cannot be written may be one that shows a
+/// batch's arms, which other threads step meanwhile: they are not to be kept from it.
 pub(crate) fn laid_out<'py, T: Element, D: Dimension>(
     array: &Held<'py, PyArray<T, D>>,
 ) -> PyResult<Held<'py, PyArray<T, D>>> {
-    if array.is_c_contiguous() && array.is_aligned() {
+    if array.is_c_contiguous() && array.is_aligned() && is_writeable(array)? {
         return Ok(array.clone());
     }
     Ok(array.call_method1("copy", ("C",))?.cast_into()?)
+}
+
+fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
+    let py = array.py();
+    let flags = array.getattr(intern!(py, "flags"))?;
+    flags.getattr(intern!(py, "writeable"))?.is_truthy()
 }
 
 /// Converts whatever NumPy can make doubles of; complex numbers and text are none.
@@ -143,15 +151,6 @@ pub(crate) struct Rows<'a> {
 }
 
 impl Rows<'_> {
-    /// The same, in memory of its own.
-    pub(crate) fn into_owned(self) -> Rows<'static> {
-        Rows {
-            values: Cow::Owned(self.values.into_owned()),
-            width: self.width,
-            is_one: self.is_one,
-        }
-    }
-
     /// The same, where a single row goes with every row of others.
     pub(crate) fn of_one_for_all(self) -> Self {
         Self {

@@ -144,7 +144,10 @@ def test_arrays_go_in_as_they_lie():
     batch.step(5, effort)
     other.step(5, effort.tolist())
     assert batch.position.tolist() == other.position.tolist()
-    # A batch's own arrays too, where they are not written meanwhile.
+    # A batch's own arrays too.
+    batch.step(2, batch.position)
+    other.step(2, other.position.copy())
+    assert batch.velocity.tolist() == other.velocity.tolist()
     other.set_state(batch.position, batch.velocity)
     batch.set_state(batch.position[::-1], batch.velocity[::-1])
     assert batch.position.tolist() == other.position[::-1].tolist()
@@ -214,7 +217,7 @@ def test_a_mask_may_be_a_view():
         (lambda batch: batch.step(1, [[1, 2]]), "effort must have the shape (2,) or (3, 2), got [1, 2]"),
         (lambda batch: batch.step(1, [np.nan, 0]), "effort[0] must be finite, got NaN"),
         (
-            lambda batch: batch.step(1, batch.position),
+            lambda batch: batch.step(1, batch.position.base),
             "this batch's own arrays are in use elsewhere: hand in copies of them",
         ),
         (lambda batch: batch.set_gains(ki=[[0, 0], [0, -1], [0, 0]]), "ki[1][1] must be finite and at least 0, got -1"),
@@ -275,7 +278,7 @@ def test_what_is_refused_has_not_happened():
     batch.enable()
     batch.step(100)
     before = batch.energy.tolist()
-    pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position[:1]))
+    pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base[:1]))
     pushing.start()
     try:
         # From its first piece on; there are a dozen.
@@ -306,6 +309,77 @@ def test_calls_of_several_threads_wait_for_each_other():
         thread.join()
     alone.step(12_000)
     assert batch.position.tolist() == alone.position.tolist()
+
+
+def test_a_call_waits_for_the_whole_of_another():
+    batch, alone = pendularm.Batch(1, threads=1), pendularm.Batch(1, threads=1)
+    pushing = threading.Thread(target=batch.step, args=(1_500_000, [0.5, 0.0]))
+    pushing.start()
+    # From its first piece on; there are six.
+    while batch.time[0] == 0:
+        time.sleep(0.001)
+    assert batch.time[0] < 1500
+    batch.step(1000, [0.0, 0.25])
+    pushing.join()
+    alone.step(1_500_000, [0.5, 0.0])
+    alone.step(1000, [0.0, 0.25])
+    assert batch.time[0] == alone.time[0]
+    assert batch.position.tolist() == alone.position.tolist()
+
+
+def test_who_only_looks_keeps_nobody_from_stepping():
+    arm, batch, said = pendularm.Arm(), pendularm.Batch(2000, threads=1), []
+
+    def call(change):
+        try:
+            change()
+        except ValueError as refusal:
+            said.append(refusal)
+
+    changes = [lambda: batch.step(1000), lambda: [(batch.enable(True), batch.reset()) for _ in range(100)]]
+    threads = [threading.Thread(target=call, args=(change,)) for change in changes]
+    for thread in threads:
+        thread.start()
+    looks = 0
+    while any(thread.is_alive() for thread in threads):
+        pendularm.dynamics.kinetic_energy(arm, batch.position, batch.velocity)
+        looks += batch.energy.size
+    assert looks
+    assert not said
+
+
+WAITING = """
+import os, pendularm, signal, threading, time
+batch = pendularm.Batch(1, threads=1)
+# The handler runs in the middle of the main thread's own call, and waits for nothing.
+signal.signal(signal.SIGALRM, lambda *_: print(batch.energy.size, batch.reset(), flush=True))
+signal.setitimer(signal.ITIMER_REAL, 0.2)
+batch.step(2_000_000)
+assert 0 < batch.time[0] < 2000
+threading.Thread(target=batch.step, args=(10**12,), daemon=True).start()
+while batch.time[0] < 2000:
+    time.sleep(0.01)
+print("waiting", flush=True)
+try:
+    batch.reset()
+except KeyboardInterrupt:
+    print("heard", flush=True)
+    os._exit(0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers that send signals here")
+def test_who_waits_hears_signals():
+    with subprocess.Popen([sys.executable, "-c", WAITING], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == "1 None\n"
+        assert run.stdout.readline() == "waiting\n"
+        time.sleep(0.2)
+        began = time.monotonic()
+        run.send_signal(signal.SIGINT)
+        assert run.stdout.readline() == "heard\n"
+        assert time.monotonic() - began < 5
+        assert run.wait(60) == 0
 
 
 FORKED = """
