@@ -5,7 +5,7 @@
 use std::convert::Infallible;
 use std::fmt::Display;
 
-use pendularm::math::integrator::Method;
+use pendularm::math::integrator::{Method, UnknownMethod};
 use pendularm::math::pid::Gains;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
@@ -111,7 +111,7 @@ pub(crate) fn joints_or<const N: usize>(
     value.map_or(Ok(missing), |value| joints(field, value, bound))
 }
 
-/// A value handed in for a number of this type; it is judged where its field's name is known.
+/// A value handed in for one of this type; it is judged where its field's name is known.
 #[derive(Debug)]
 pub(crate) enum Handed<T> {
     Is(T),
@@ -122,6 +122,10 @@ pub(crate) enum Handed<T> {
 pub(crate) type Real = Handed<f64>;
 /// A whole number that is not negative.
 pub(crate) type Whole = Handed<u64>;
+/// True or false, Python's or NumPy's.
+pub(crate) type Flag = Handed<bool>;
+/// The name of something.
+pub(crate) type Name = Handed<String>;
 
 impl<'a, 'py, T: FromPyObject<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
     type Error = Infallible;
@@ -140,6 +144,30 @@ impl Real {
             Self::Is(value) => Ok(value),
             Self::Other(value) => Err(refused(format_args!(
                 "{field} must be a number, got {value}"
+            ))),
+        }
+    }
+}
+
+impl Flag {
+    /// Whether it is true.
+    pub(crate) fn read(self, field: &str) -> PyResult<bool> {
+        match self {
+            Self::Is(value) => Ok(value),
+            Self::Other(value) => Err(refused(format_args!(
+                "{field} must be True or False, got {value}"
+            ))),
+        }
+    }
+}
+
+impl Name {
+    /// The method of this name.
+    pub(crate) fn method(self, field: &str) -> PyResult<Method> {
+        match self {
+            Self::Is(name) => method(field, &name),
+            Self::Other(value) => Err(refused(format_args!(
+                "{field} {UnknownMethod}, got {value}"
             ))),
         }
     }

@@ -229,6 +229,7 @@ def test_a_mask_may_be_a_view():
         ),
         (lambda batch: batch.set_integrator("leapfrog"), 'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"'),
         (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
+        (lambda batch: batch.enable("yes"), "data must be True or False, got 'yes'"),
         (lambda batch: batch.reset([3]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.reset([True]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.set_state([0, "a"]), "position must be an array of numbers, got [0, 'a']"),

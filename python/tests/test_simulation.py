@@ -158,6 +158,14 @@ def test_arms_are_values():
             "position must be an array of numbers, got array([1.+0.j, 2.+1.j])",
         ),
         (lambda arm: arm.set_state(["1", "2"]), "position must be an array of numbers, got ['1', '2']"),
+        (lambda arm: pendularm.Simulation(5), "arm must be an Arm, got 5"),
+        (lambda arm: setattr(arm, "arm", None), "arm must be an Arm, got None"),
+        (lambda arm: pendularm.Simulation(method=5), "method must be one of euler, midpoint, verlet, rk4, got 5"),
+        (lambda arm: setattr(arm, "method", b"rk4"), "method must be one of euler, midpoint, verlet, rk4, got b'rk4'"),
+        (lambda arm: arm.enable("yes"), "data must be True or False, got 'yes'"),
+        (lambda arm: arm.enable(1), "data must be True or False, got 1"),
+        (lambda arm: pendularm.inverse_kinematics(None, 1, 1), "arm must be an Arm, got None"),
+        (lambda arm: pendularm.dynamics.gravity_load("arm", [0, 0]), "arm must be an Arm, got 'arm'"),
     ],
 )
 def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
@@ -167,6 +175,19 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
         wrong(arm)
     assert str(refusal.value) == said
     assert (arm.position.tolist(), arm.gains["kd"].tolist(), arm.timestep, arm.method) == before
+
+
+def test_the_controller_is_turned_on_by_numpys_truth_too():
+    arm, batch = pendularm.Simulation(), pendularm.Batch(1)
+    for one in [arm, batch]:
+        one.set_setpoint([1, 1])
+        one.enable(np.True_)
+        one.step()
+        assert one.effort.any()
+        one.enable(np.False_)
+        one.step()
+        assert not one.effort.any()
+    assert not arm.enabled
 
 
 def test_gains_may_be_any_mapping():

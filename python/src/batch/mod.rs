@@ -22,7 +22,7 @@ use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
 use crate::arrays::Numbers;
-use crate::fields::{self, Bound, Held, Object, Whole, refused};
+use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
 use crate::patience::{Turns, hold};
 use given::{chosen, read, read_methods, read_steps};
 use lanes::{Piece, Steps};
@@ -303,8 +303,9 @@ impl Batch {
     }
 
     /// Turns the controllers on or off. From off to on an integral starts at zero.
-    #[pyo3(signature = (data=true))]
-    fn enable(&self, py: Python<'_>, data: bool) -> PyResult<()> {
+    #[pyo3(signature = (data=Flag::Is(true)), text_signature = "($self, data=True)")]
+    fn enable(&self, py: Python<'_>, data: Flag) -> PyResult<()> {
+        let data = data.read("data")?;
         let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
