@@ -6,13 +6,14 @@ use std::borrow::Cow;
 
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+    Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
 };
 use pyo3::intern;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult};
 use pyo3::types::PyDict;
 
-use crate::fields::{Bound, Held, Object, held, refused, shown};
+use crate::fields::{Bound, Held, Object, Real, held, refused, shown};
 
 /// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side, row by
 /// row.
@@ -23,6 +24,12 @@ pub(crate) struct Numbers<'py> {
 
 impl<'py> Numbers<'py> {
     pub(crate) fn read(field: &str, value: &Object<'py>) -> PyResult<Self> {
+        if is_masked(value)? {
+            return Err(refused(format_args!(
+                "{field} must have no masked numbers, got {}",
+                shown(value)
+            )));
+        }
         let array = match value.cast::<PyArrayDyn<f64>>() {
             Ok(array) => array.clone(),
             Err(_) => converted(value).map_err(|_| {
@@ -126,13 +133,27 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
     flags.getattr(intern!(py, "writeable"))?.is_truthy()
 }
 
-/// Converts whatever NumPy can make doubles of; complex numbers and text are none.
+/// Whether this is a masked array some of whose numbers are not to be looked at.
+fn is_masked(value: &Object<'_>) -> PyResult<bool> {
+    if !value.is_instance_of::<PyUntypedArray>() || value.is_exact_instance_of::<PyUntypedArray>() {
+        return Ok(false);
+    }
+    let masked = value.py().import("numpy.ma")?;
+    masked.call_method1("is_masked", (value,))?.is_truthy()
+}
+
+/// Converts whatever NumPy can make doubles of; complex numbers, text and `None` are none.
 fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let py = value.py();
     let numpy = py.import("numpy")?;
     let array = numpy.call_method1("asarray", (value,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let array = if kind == "O" {
+        // NumPy would read texts, and make a NaN of None.
+        for one in array.getattr("flat")?.try_iter()? {
+            let Ok(one) = one?.extract::<Real>();
+            one.read("each")?;
+        }
         numpy.call_method1("asarray", (array, "float64"))?
     } else {
         let how = PyDict::new(py);

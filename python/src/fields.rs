@@ -9,9 +9,10 @@ use pendularm::math::integrator::{Method, UnknownMethod};
 use pendularm::math::pid::Gains;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyFloat};
 use pyo3::{Borrowed, PyTypeInfo};
 
+use crate::arm::Arm;
 use crate::arrays::Numbers;
 
 /// The numbers that a field may be.
@@ -127,15 +128,44 @@ pub(crate) type Flag = Handed<bool>;
 /// The name of something.
 pub(crate) type Name = Handed<String>;
 
-impl<'a, 'py, T: FromPyObject<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
+impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
     type Error = Infallible;
 
     fn extract(value: Borrowed<'a, 'py, PyAny>) -> Result<Self, Infallible> {
-        Ok(value
-            .extract()
-            .map_or_else(|_| Self::Other(shown(&value)), Self::Is))
+        if T::is_meant(value)
+            && let Ok(found) = value.extract()
+        {
+            return Ok(Self::Is(found));
+        }
+        Ok(Self::Other(shown(&value)))
     }
 }
+
+/// A type that values are handed in for.
+pub(crate) trait Meant<'a, 'py>: FromPyObject<'a, 'py> {
+    /// Whether nothing of a value is lost that Python can make one of this type from.
+    fn is_meant(_value: Borrowed<'a, 'py, PyAny>) -> bool {
+        true
+    }
+}
+
+impl Meant<'_, '_> for f64 {
+    /// NumPy's complex numbers would lose their imaginary parts.
+    fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
+        let is_complex = || {
+            let numpy = value.py().import("numpy")?;
+            numpy
+                .call_method1("iscomplexobj", (value,))?
+                .extract::<bool>()
+        };
+        value.is_instance_of::<PyFloat>() || is_complex().is_ok_and(|is_complex| !is_complex)
+    }
+}
+
+impl Meant<'_, '_> for u64 {}
+impl Meant<'_, '_> for bool {}
+impl Meant<'_, '_> for String {}
+impl<'py> Meant<'_, 'py> for Held<'py, Arm> {}
 
 impl Real {
     /// The number, whichever it is.

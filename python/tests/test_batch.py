@@ -187,9 +187,10 @@ def test_numbers_are_those_of_their_indices_however_they_lie(links, laid):
     assert single.position.tolist() == numbers[:links, 0].tolist()
 
 
-def test_a_mask_may_be_a_view():
+def test_a_mask_may_be_a_view_or_of_objects():
     batch, mask = pendularm.Batch(3), np.array([True, False, True])
     views = [np.stack([mask, ~mask], axis=1)[:, 0], np.repeat(mask, 2)[::2], mask[::-1], packed(mask)]
+    views.append(mask.astype(object))
     for view in views:
         chosen = view.tolist()
         batch.set_state([0.5, 0.5])

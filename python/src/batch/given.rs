@@ -82,10 +82,17 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
         ))
     };
     let py = arms.py();
-    let array = py
-        .import("numpy")?
+    let numpy = py.import("numpy")?;
+    let mut array = numpy
         .call_method1("asarray", (arms,))
         .map_err(|_| expected())?;
+    if array.getattr("dtype")?.getattr("kind")?.eq("O")? {
+        // Truths among objects would be taken for the indices 0 and 1.
+        let listed = array.call_method0("tolist")?;
+        array = numpy
+            .call_method1("asarray", (listed,))
+            .map_err(|_| expected())?;
+    }
     if let Ok(mask) = array.cast::<PyArray1<bool>>() {
         let mask = laid_out(mask)?.to_vec()?;
         if mask.len() != count {

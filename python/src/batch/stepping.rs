@@ -1,6 +1,7 @@
 //! The steps of a batch, with looks for signals.
 //!
-//! **Invariant:** a signal's handler that looks at the arms, or changes them, waits for nothing: it runs between two pieces.
+//! **Invariant:** a signal's handler that looks at the arms, or changes them, waits for nothing: it runs between two
+//! pieces.
 
 use std::sync::Mutex;
 
