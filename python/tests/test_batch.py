@@ -384,6 +384,22 @@ def test_who_waits_hears_signals():
         assert run.wait(60) == 0
 
 
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted by what Linux lists")
+def test_threads_of_batches_that_have_gone_end():
+    def count():
+        return len(os.listdir("/proc/self/task"))
+
+    before = count()
+    for threads in range(2, 40):
+        pendularm.Batch(64, threads=threads).step()
+    # Of the last four numbers of threads.
+    most = before + sum(range(36, 40))
+    until = time.monotonic() + 30
+    while count() > most:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+
+
 FORKED = """
 import os, pendularm
 batch = pendularm.Batch(256, threads=2)
