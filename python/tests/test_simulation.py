@@ -171,7 +171,7 @@ def test_arms_are_values():
         ),
         (
             lambda arm: pendularm.Simulation(timestep=np.complex128(0.1 + 1j)),
-            "timestep must be a number, got np.complex128(0.1+1j)",
+            f"timestep must be a number, got {np.complex128(0.1 + 1j)!r}",
         ),
         (lambda arm: arm.disturb([0, 0], np.array(1j)), "duration must be a number, got array(0.+1.j)"),
         (lambda arm: pendularm.Simulation(5), "arm must be an Arm, got 5"),
