@@ -8,7 +8,7 @@ use pendularm::math::pid::Gains;
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pyfunction, pymethods};
 use pyo3::types::PyDict;
 
-use crate::fields::{self, Bound, Held, Object, Real, Whole, joints_or, refused};
+use crate::fields::{self, Bound, Handed, Held, Object, Real, Whole, joints_or, refused};
 
 /// Rods of 2 or 3 links.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,9 +116,22 @@ fn read<const N: usize>(
     Rods::new(lengths, masses, gravity).map_err(refused)
 }
 
-/// The arm that is handed in, or the default one.
-pub(crate) fn or_default(arm: Option<&Held<'_, Arm>>) -> Chain {
-    arm.map_or_else(|| Chain::Two(Rods::default()), |arm| arm.get().chain)
+/// An arm that is handed in.
+pub(crate) type Given<'py> = Handed<Held<'py, Arm>>;
+
+impl Given<'_> {
+    /// Its rods.
+    pub(crate) fn chain(self) -> PyResult<Chain> {
+        match self {
+            Self::Is(arm) => Ok(arm.get().chain),
+            Self::Other(value) => Err(refused(format_args!("arm must be an Arm, got {value}"))),
+        }
+    }
+}
+
+/// The rods of the arm that is handed in, or the default ones.
+pub(crate) fn or_default(arm: Option<Given<'_>>) -> PyResult<Chain> {
+    arm.map_or_else(|| Ok(Chain::Two(Rods::default())), Given::chain)
 }
 
 /// The gains of a fresh runtime: `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each.

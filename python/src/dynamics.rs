@@ -7,8 +7,9 @@ use pendularm::math::{self, dynamics, kinematics};
 use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
-use crate::arm::{Arm, Chain, for_either};
-use crate::fields::{Bound, Held, Numbers, Object, Real, Rows, joints_or, refused};
+use crate::arm::{Chain, Given, for_either};
+use crate::arrays::{Numbers, Rows};
+use crate::fields::{Bound, Held, Object, Real, joints_or, refused};
 
 /// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,10 +104,10 @@ fn all_rows<'py, const K: usize>(
 #[pyfunction]
 pub(crate) fn mass_matrix<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q)];
         each_row(py, fields, Shape::Square, |[q], out| {
             out.extend(dynamics::mass_matrix(arm, &q).as_flattened());
@@ -119,11 +120,11 @@ pub(crate) fn mass_matrix<'py>(
 #[pyfunction]
 pub(crate) fn coriolis<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
     qd: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q), ("qd", &qd)];
         each_row(py, fields, Shape::Joints, |[q, qd], out| {
             out.extend(dynamics::coriolis(arm, &q, &qd));
@@ -135,10 +136,10 @@ pub(crate) fn coriolis<'py>(
 #[pyfunction]
 pub(crate) fn gravity_load<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q)];
         each_row(py, fields, Shape::Joints, |[q], out| {
             out.extend(dynamics::gravity_load(arm, &q));
@@ -151,12 +152,12 @@ pub(crate) fn gravity_load<'py>(
 #[pyfunction]
 pub(crate) fn forward_dynamics<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
     qd: Object<'py>,
     effort: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q), ("qd", &qd), ("effort", &effort)];
         all_rows(py, arm.lengths().len(), fields, Shape::Joints, |rows, count, out| {
             forward_dynamics_of_rows(arm, rows, count, out);
@@ -198,12 +199,12 @@ fn forward_dynamics_of_rows<const N: usize>(
 #[pyfunction]
 pub(crate) fn inverse_dynamics<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
     qd: Object<'py>,
     qdd: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q), ("qd", &qd), ("qdd", &qdd)];
         each_row(py, fields, Shape::Joints, |[q, qd, qdd], out| {
             out.extend(dynamics::inverse_dynamics(arm, &q, &qd, &qdd));
@@ -215,11 +216,11 @@ pub(crate) fn inverse_dynamics<'py>(
 #[pyfunction]
 pub(crate) fn kinetic_energy<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
     qd: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q), ("qd", &qd)];
         each_row(py, fields, Shape::One, |[q, qd], out| {
             out.push(dynamics::kinetic_energy(arm, &q, &qd));
@@ -232,10 +233,10 @@ pub(crate) fn kinetic_energy<'py>(
 #[pyfunction]
 pub(crate) fn potential_energy<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q)];
         each_row(py, fields, Shape::One, |[q], out| {
             out.push(dynamics::potential_energy(arm, &q));
@@ -247,10 +248,10 @@ pub(crate) fn potential_energy<'py>(
 #[pyfunction]
 pub(crate) fn end_effector<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     q: Object<'py>,
 ) -> PyResult<Object<'py>> {
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let fields = [("q", &q)];
         each_row(py, fields, Shape::Point, |[q], out| {
             out.extend(kinematics::forward(arm.lengths(), &q).position.to_array());
@@ -266,7 +267,7 @@ pub(crate) fn end_effector<'py>(
 #[pyo3(signature = (arm, x, y, phi=None, *, present=None))]
 pub(crate) fn inverse_kinematics<'py>(
     py: Python<'py>,
-    arm: Held<'py, Arm>,
+    arm: Given<'py>,
     x: Real,
     y: Real,
     phi: Option<Real>,
@@ -276,7 +277,7 @@ pub(crate) fn inverse_kinematics<'py>(
         position: [x.read("x")?, y.read("y")?].into(),
         orientation: phi.map(|phi| phi.read("phi")).transpose()?,
     };
-    for_either!(Chain, &arm.get().chain, arm => {
+    for_either!(Chain, &arm.chain()?, arm => {
         let present = joints_or("present", present.as_ref(), Bound::Finite, [0.0; _])?;
         let positions = kinematics::solve(arm.lengths(), &present, &target).map_err(refused)?;
         Ok(positions.to_pyarray(py))

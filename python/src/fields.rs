@@ -2,17 +2,18 @@
 //!
 //! **Invariant:** a value that is refused is a `ValueError` that names its field, what it must be, and what it was.
 
-use std::borrow::Cow;
 use std::convert::Infallible;
 use std::fmt::Display;
 
-use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
-use pendularm::math::integrator::Method;
+use pendularm::math::integrator::{Method, UnknownMethod};
 use pendularm::math::pid::Gains;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyFloat};
 use pyo3::{Borrowed, PyTypeInfo};
+
+use crate::arm::Arm;
+use crate::arrays::Numbers;
 
 /// The numbers that a field may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,160 +45,6 @@ impl Bound {
 /// A refusal.
 pub(crate) fn refused(why: impl Display) -> PyErr {
     PyValueError::new_err(why.to_string())
-}
-
-/// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side.
-pub(crate) struct Numbers<'py> {
-    field: String,
-    array: PyReadonlyArrayDyn<'py, f64>,
-}
-
-impl<'py> Numbers<'py> {
-    pub(crate) fn read(field: &str, value: &Object<'py>) -> PyResult<Self> {
-        let array = match value.cast::<PyArrayDyn<f64>>() {
-            Ok(array) => array.clone(),
-            Err(_) => converted(value).map_err(|_| {
-                refused(format_args!(
-                    "{field} must be an array of numbers, got {}",
-                    shown(value)
-                ))
-            })?,
-        };
-        let array = array.try_readonly().map_err(|_| {
-            refused(format_args!(
-                "{field} is being written by a batch: hand in a copy of it"
-            ))
-        })?;
-        Ok(Self {
-            field: field.to_owned(),
-            array,
-        })
-    }
-
-    pub(crate) fn shape(&self) -> &[usize] {
-        self.array.shape()
-    }
-
-    /// The numbers, row by row.
-    pub(crate) fn values(&self) -> Cow<'_, [f64]> {
-        match self.array.as_slice() {
-            Ok(values) => Cow::Borrowed(values),
-            Err(_) => Cow::Owned(self.array.as_array().iter().copied().collect()),
-        }
-    }
-
-    /// The numbers as one row of `width` for each of `arms`, or one row for all of them.
-    pub(crate) fn rows(
-        &self,
-        arms: usize,
-        width: usize,
-        bound: Option<Bound>,
-    ) -> PyResult<Rows<'_>> {
-        let field = &self.field;
-        let shape = self.shape();
-        if shape != [width] && shape != [arms, width] {
-            return Err(refused(format_args!(
-                "{field} must have the shape ({width},) or ({arms}, {width}), got {shape:?}"
-            )));
-        }
-        let is_one = shape.len() == 1;
-        let values = self.values();
-        if let Some(bound) = bound {
-            held(field, &values, bound, |at| match is_one {
-                true => format!("[{at}]"),
-                false => format!("[{}][{}]", at / width, at % width),
-            })?;
-        }
-        Ok(Rows {
-            values,
-            width,
-            is_one,
-        })
-    }
-
-    /// The numbers as one for each of `arms`, or one for all of them.
-    pub(crate) fn column(&self, arms: usize, bound: Bound) -> PyResult<Rows<'_>> {
-        let field = &self.field;
-        let shape = self.shape();
-        if !shape.is_empty() && shape != [arms] {
-            return Err(refused(format_args!(
-                "{field} must be a number or have the shape ({arms},), got {shape:?}"
-            )));
-        }
-        let values = self.values();
-        held(field, &values, bound, |arm| {
-            if shape.is_empty() {
-                String::new()
-            } else {
-                format!("[{arm}]")
-            }
-        })?;
-        Ok(Rows {
-            values,
-            width: 1,
-            is_one: shape.is_empty(),
-        })
-    }
-}
-
-/// Converts whatever NumPy can make doubles of; complex numbers and text are none.
-fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
-    let py = value.py();
-    let numpy = py.import("numpy")?;
-    let array = numpy.call_method1("asarray", (value,))?;
-    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
-    let array = if kind == "O" {
-        numpy.call_method1("asarray", (array, "float64"))?
-    } else {
-        let how = PyDict::new(py);
-        how.set_item("casting", "same_kind")?;
-        array.call_method("astype", ("float64",), Some(&how))?
-    };
-    Ok(array.cast_into()?)
-}
-
-/// One row for each arm, or one for all of them.
-#[derive(Debug)]
-pub(crate) struct Rows<'a> {
-    values: Cow<'a, [f64]>,
-    width: usize,
-    is_one: bool,
-}
-
-impl Rows<'_> {
-    /// The same, in memory of its own.
-    pub(crate) fn into_owned(self) -> Rows<'static> {
-        Rows {
-            values: Cow::Owned(self.values.into_owned()),
-            width: self.width,
-            is_one: self.is_one,
-        }
-    }
-
-    /// The same, where a single row goes with every row of others.
-    pub(crate) fn of_one_for_all(self) -> Self {
-        Self {
-            is_one: self.values.len() == self.width,
-            ..self
-        }
-    }
-
-    /// The row of an arm. `N` is the width that was asked for.
-    pub(crate) fn row<const N: usize>(&self, arm: usize) -> [f64; N] {
-        let start = if self.is_one { 0 } else { arm * N };
-        let row = self
-            .values
-            .get(start..start + N)
-            .and_then(|row| row.try_into().ok());
-        debug_assert!(row.is_some(), "the shape has been checked");
-        row.unwrap_or([f64::NAN; N])
-    }
-
-    /// The number of an arm, of a column.
-    pub(crate) fn number(&self, arm: usize) -> f64 {
-        let [number] = self.row(arm);
-        number
-    }
 }
 
 /// Something of Python's, with the proof that its lock is held.
@@ -250,9 +97,9 @@ pub(crate) fn joints<const N: usize>(
             shown(value)
         )));
     }
-    let values = numbers.values();
-    held(field, &values, bound, |joint| format!("[{joint}]"))?;
-    <[f64; N]>::try_from(&*values).map_err(refused)
+    let values = numbers.values()?;
+    held(field, values, bound, |joint| format!("[{joint}]"))?;
+    <[f64; N]>::try_from(values).map_err(refused)
 }
 
 /// As [`joints`], or `missing` where nothing is handed in.
@@ -265,7 +112,7 @@ pub(crate) fn joints_or<const N: usize>(
     value.map_or(Ok(missing), |value| joints(field, value, bound))
 }
 
-/// A value handed in for a number of this type; it is judged where its field's name is known.
+/// A value handed in for one of this type; it is judged where its field's name is known.
 #[derive(Debug)]
 pub(crate) enum Handed<T> {
     Is(T),
@@ -276,16 +123,49 @@ pub(crate) enum Handed<T> {
 pub(crate) type Real = Handed<f64>;
 /// A whole number that is not negative.
 pub(crate) type Whole = Handed<u64>;
+/// True or false, Python's or NumPy's.
+pub(crate) type Flag = Handed<bool>;
+/// The name of something.
+pub(crate) type Name = Handed<String>;
 
-impl<'a, 'py, T: FromPyObject<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
+impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
     type Error = Infallible;
 
     fn extract(value: Borrowed<'a, 'py, PyAny>) -> Result<Self, Infallible> {
-        Ok(value
-            .extract()
-            .map_or_else(|_| Self::Other(shown(&value)), Self::Is))
+        if T::is_meant(value)
+            && let Ok(found) = value.extract()
+        {
+            return Ok(Self::Is(found));
+        }
+        Ok(Self::Other(shown(&value)))
     }
 }
+
+/// A type that values are handed in for.
+pub(crate) trait Meant<'a, 'py>: FromPyObject<'a, 'py> {
+    /// Whether nothing of a value is lost that Python can make one of this type from.
+    fn is_meant(_value: Borrowed<'a, 'py, PyAny>) -> bool {
+        true
+    }
+}
+
+impl Meant<'_, '_> for f64 {
+    /// NumPy's complex numbers would lose their imaginary parts.
+    fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
+        let is_complex = || {
+            let numpy = value.py().import("numpy")?;
+            numpy
+                .call_method1("iscomplexobj", (value,))?
+                .extract::<bool>()
+        };
+        value.is_instance_of::<PyFloat>() || is_complex().is_ok_and(|is_complex| !is_complex)
+    }
+}
+
+impl Meant<'_, '_> for u64 {}
+impl Meant<'_, '_> for bool {}
+impl Meant<'_, '_> for String {}
+impl<'py> Meant<'_, 'py> for Held<'py, Arm> {}
 
 impl Real {
     /// The number, whichever it is.
@@ -294,6 +174,30 @@ impl Real {
             Self::Is(value) => Ok(value),
             Self::Other(value) => Err(refused(format_args!(
                 "{field} must be a number, got {value}"
+            ))),
+        }
+    }
+}
+
+impl Flag {
+    /// Whether it is true.
+    pub(crate) fn read(self, field: &str) -> PyResult<bool> {
+        match self {
+            Self::Is(value) => Ok(value),
+            Self::Other(value) => Err(refused(format_args!(
+                "{field} must be True or False, got {value}"
+            ))),
+        }
+    }
+}
+
+impl Name {
+    /// The method of this name.
+    pub(crate) fn method(self, field: &str) -> PyResult<Method> {
+        match self {
+            Self::Is(name) => method(field, &name),
+            Self::Other(value) => Err(refused(format_args!(
+                "{field} {UnknownMethod}, got {value}"
             ))),
         }
     }

@@ -8,6 +8,7 @@
 //! signal asks for it.
 
 mod arm;
+mod arrays;
 mod batch;
 mod dynamics;
 mod fields;

@@ -2,7 +2,9 @@
 //!
 //! **Invariant:** a signal is heard within a fraction of a second, whatever is computed.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 
 use pyo3::prelude::{PyResult, Python};
@@ -41,4 +43,65 @@ pub(crate) fn until_done<T: Send>(
 pub(crate) fn hold<'a, T>(py: Python<'_>, one: &'a Mutex<T>) -> MutexGuard<'a, T> {
     one.lock_py_attached(py)
         .unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The threads that want to change a thing that they share: one at a time, in the order in which they came.
+///
+/// A handler of a signal that comes in the middle of its thread's turn has that turn too; it would wait for itself.
+#[derive(Debug, Default)]
+pub(crate) struct Turns {
+    /// The thread whose turn it is, and those that wait.
+    line: Mutex<VecDeque<ThreadId>>,
+    moved: Condvar,
+}
+
+/// A turn, or a place in the line; it ends when this is dropped.
+#[derive(Debug)]
+pub(crate) struct Turn<'a> {
+    of: &'a Turns,
+    thread: ThreadId,
+}
+
+impl Turns {
+    /// Waits until it is this thread's turn, with the interpreter's lock released; `None` where it is already.
+    ///
+    /// # Errors
+    /// Any that a signal's handler raises, such as `KeyboardInterrupt`.
+    pub(crate) fn take(&self, py: Python<'_>) -> PyResult<Option<Turn<'_>>> {
+        let thread = thread::current().id();
+        let mut line = self.line();
+        if line.front() == Some(&thread) {
+            return Ok(None);
+        }
+        line.push_back(thread);
+        let is_first = line.len() == 1;
+        drop(line);
+        let turn = Turn { of: self, thread };
+        if !is_first {
+            until_done(py, || {
+                let line = self.line();
+                if line.front() == Some(&thread) {
+                    return Some(());
+                }
+                drop(self.moved.wait_timeout(line, PIECE));
+                None
+            })?;
+        }
+        Ok(Some(turn))
+    }
+
+    fn line(&self) -> MutexGuard<'_, VecDeque<ThreadId>> {
+        self.line.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        let mut line = self.of.line();
+        // A handler that ran while its thread waited came later than that.
+        if let Some(place) = line.iter().rposition(|thread| *thread == self.thread) {
+            line.remove(place);
+        }
+        self.of.moved.notify_all();
+    }
 }

@@ -14,8 +14,10 @@ use pendularm::math::simulation::Simulation as Loop;
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::PyDict;
 
-use crate::arm::{Arm, Chain, for_either, or_default};
-use crate::fields::{self, Bound, Held, Object, Real, Whole, joints, joints_or, refused};
+use crate::arm::{Arm, Chain, Given, for_either, or_default};
+use crate::fields::{
+    self, Bound, Flag, Held, Name, Object, Real, Whole, joints, joints_or, refused,
+};
 use crate::patience::{hold, until_done};
 
 /// Steps between two looks at the clock: some hundred microseconds.
@@ -80,18 +82,18 @@ where
 impl Simulation {
     #[new]
     #[pyo3(
-        signature = (arm=None, *, method="rk4", timestep=Real::Is(0.001), gains=None),
+        signature = (arm=None, *, method=Name::Is("rk4".to_owned()), timestep=Real::Is(0.001), gains=None),
         text_signature = "(arm=None, *, method=\"rk4\", timestep=0.001, gains=None)"
     )]
     fn new(
-        arm: Option<&Held<'_, Arm>>,
-        method: &str,
+        arm: Option<Given<'_>>,
+        method: Name,
         timestep: Real,
         gains: Option<&Object<'_>>,
     ) -> PyResult<Self> {
-        let method = fields::method("method", method)?;
+        let method = method.method("method")?;
         let timestep = fields::number("timestep", timestep, Bound::Positive)?;
-        let own = match or_default(arm) {
+        let own = match or_default(arm)? {
             Chain::Two(arm) => Either::Two(begin(arm, method, timestep, gains)?),
             Chain::Three(arm) => Either::Three(begin(arm, method, timestep, gains)?),
         };
@@ -123,9 +125,11 @@ impl Simulation {
     }
 
     /// Turns the controller on or off. From off to on the integral starts at zero.
-    #[pyo3(signature = (data=true))]
-    fn enable(&self, py: Python<'_>, data: bool) {
+    #[pyo3(signature = (data=Flag::Is(true)), text_signature = "($self, data=True)")]
+    fn enable(&self, py: Python<'_>, data: Flag) -> PyResult<()> {
+        let data = data.read("data")?;
         for_either!(Either, &self.own, one => hold(py, one).enable(data));
+        Ok(())
     }
 
     /// Has the controller hold the arm at `positions` [rad] and `velocities` [rad/s] (zeros unless given), (links,)
@@ -207,8 +211,8 @@ impl Simulation {
     }
 
     #[setter]
-    fn set_arm(&self, py: Python<'_>, arm: &Held<'_, Arm>) -> PyResult<()> {
-        match (&self.own, &arm.get().chain) {
+    fn set_arm(&self, py: Python<'_>, arm: Given<'_>) -> PyResult<()> {
+        match (&self.own, &arm.chain()?) {
             (Either::Two(one), Chain::Two(arm)) => hold(py, one).set_arm(*arm),
             (Either::Three(one), Chain::Three(arm)) => hold(py, one).set_arm(*arm),
             _ => return Err(refused("arm must have as many links as the one before")),
@@ -286,8 +290,8 @@ impl Simulation {
     }
 
     #[setter]
-    fn set_method(&self, py: Python<'_>, method: &str) -> PyResult<()> {
-        let method = fields::method("method", method)?;
+    fn set_method(&self, py: Python<'_>, method: Name) -> PyResult<()> {
+        let method = method.method("method")?;
         for_either!(Either, &self.own, one => hold(py, one).set_method(method));
         Ok(())
     }

@@ -16,8 +16,8 @@ use pendularm::study::stability::{ADVISED_PART, LimitSearch, Limits};
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
-use crate::arm::{Arm, Chain, for_either, or_default};
-use crate::fields::{self, Bound, Held, Object, Real, Whole, joints_or, refused};
+use crate::arm::{Chain, Given, for_either, or_default};
+use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, joints_or, refused};
 use crate::patience::until_done;
 
 /// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
@@ -26,18 +26,23 @@ const EVALUATIONS_PER_LOOK: u64 = 2000;
 // ---- stability ------------------------------------------------------------------------------------------------------
 
 #[pyfunction]
-#[pyo3(signature = (arm=None, *, integrator="rk4", gains=None, setpoint=None, q=None, qd=None))]
+#[pyo3(
+    signature = (
+        arm=None, *, integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, q=None, qd=None
+    ),
+    text_signature = "(arm=None, *, integrator=\"rk4\", gains=None, setpoint=None, q=None, qd=None)"
+)]
 pub(crate) fn stability<'py>(
     py: Python<'py>,
-    arm: Option<Held<'py, Arm>>,
-    integrator: &str,
+    arm: Option<Given<'py>>,
+    integrator: Name,
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     q: Option<Object<'py>>,
     qd: Option<Object<'py>>,
 ) -> PyResult<Held<'py, PyDict>> {
-    let method = fields::method("integrator", integrator)?;
-    for_either!(Chain, or_default(arm.as_ref()), arm => {
+    let method = integrator.method("integrator")?;
+    for_either!(Chain, or_default(arm)?, arm => {
         let gains = fields::gains(gains.as_ref(), Gains::default())?;
         let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
@@ -104,8 +109,9 @@ fn read_state<const N: usize>(
 #[pyfunction]
 #[pyo3(
     signature = (
-        arm=None, *, q0=None, qdot0=None, duration=Real::Is(10.0), timestep=Real::Is(0.001), integrator="rk4",
-        gains=None, setpoint=None, samples=Whole::Is(1001), reference=false
+        arm=None, *, q0=None, qdot0=None, duration=Real::Is(10.0), timestep=Real::Is(0.001),
+        integrator=Name::Is("rk4".to_owned()), gains=None, setpoint=None, samples=Whole::Is(1001),
+        reference=Flag::Is(false)
     ),
     text_signature = "(arm=None, *, q0=None, qdot0=None, duration=10.0, timestep=0.001, integrator=\"rk4\", \
                       gains=None, setpoint=None, samples=1001, reference=False)"
@@ -116,21 +122,22 @@ fn read_state<const N: usize>(
 )]
 pub(crate) fn rollout<'py>(
     py: Python<'py>,
-    arm: Option<Held<'py, Arm>>,
+    arm: Option<Given<'py>>,
     q0: Option<Object<'py>>,
     qdot0: Option<Object<'py>>,
     duration: Real,
     timestep: Real,
-    integrator: &str,
+    integrator: Name,
     gains: Option<Object<'py>>,
     setpoint: Option<Object<'py>>,
     samples: Whole,
-    reference: bool,
+    reference: Flag,
 ) -> PyResult<Held<'py, PyDict>> {
     let (duration, timestep) = (duration.read("duration")?, timestep.read("timestep")?);
     let samples = samples.read("samples")?;
-    let method = fields::method("integrator", integrator)?;
-    for_either!(Chain, or_default(arm.as_ref()), arm => {
+    let reference = reference.read("reference")?;
+    let method = integrator.method("integrator")?;
+    for_either!(Chain, or_default(arm)?, arm => {
         run(py, Plan {
             control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_method(method).with_timestep(timestep),
             start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
@@ -203,17 +210,18 @@ fn listed_run<'py, const N: usize>(
 #[pyfunction]
 #[pyo3(
     signature = (
-        arm=None, *, settling_time=Real::Is(4.0), margin=Real::Is(1.25), timestep=Real::Is(0.001), integrator="rk4"
+        arm=None, *, settling_time=Real::Is(4.0), margin=Real::Is(1.25), timestep=Real::Is(0.001),
+        integrator=Name::Is("rk4".to_owned())
     ),
     text_signature = "(arm=None, *, settling_time=4.0, margin=1.25, timestep=0.001, integrator=\"rk4\")"
 )]
 pub(crate) fn suggest_gains<'py>(
     py: Python<'py>,
-    arm: Option<Held<'py, Arm>>,
+    arm: Option<Given<'py>>,
     settling_time: Real,
     margin: Real,
     timestep: Real,
-    integrator: &str,
+    integrator: Name,
 ) -> PyResult<Held<'py, PyDict>> {
     let wish = Wish {
         settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
@@ -225,9 +233,9 @@ pub(crate) fn suggest_gains<'py>(
             wish.margin
         )));
     }
-    let method = fields::method("integrator", integrator)?;
+    let method = integrator.method("integrator")?;
     let timestep = fields::number("timestep", timestep, Bound::Positive)?;
-    for_either!(Chain, or_default(arm.as_ref()), arm => {
+    for_either!(Chain, or_default(arm)?, arm => {
         let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
         let mut search = GainsSearch::new(&control, wish).map_err(refused)?;
         let found = until_done(py, || search.advance())?.map_err(refused)?;
@@ -254,7 +262,7 @@ pub(crate) fn suggest_gains<'py>(
 pub(crate) fn plan<'py>(
     py: Python<'py>,
     error: Real,
-    arm: Option<Held<'py, Arm>>,
+    arm: Option<Given<'py>>,
     duration: Option<Real>,
     q0: Option<Object<'py>>,
     qdot0: Option<Object<'py>>,
@@ -262,7 +270,7 @@ pub(crate) fn plan<'py>(
     setpoint: Option<Object<'py>>,
 ) -> PyResult<Held<'py, PyDict>> {
     let error = fields::number("error", error, Bound::Positive)?;
-    for_either!(Chain, or_default(arm.as_ref()), arm => {
+    for_either!(Chain, or_default(arm)?, arm => {
         let control = read_loop(arm, gains.as_ref(), setpoint.as_ref())?;
         let usual = if control.is_free() { 10.0 } else { 4.0 };
         let mut planning = Planning::new(Task {

@@ -144,10 +144,62 @@ def test_arrays_go_in_as_they_lie():
     batch.step(5, effort)
     other.step(5, effort.tolist())
     assert batch.position.tolist() == other.position.tolist()
-    # A batch's own arrays too, where they are not written meanwhile.
+    # A batch's own arrays too.
+    batch.step(2, batch.position)
+    other.step(2, other.position.copy())
+    assert batch.velocity.tolist() == other.velocity.tolist()
     other.set_state(batch.position, batch.velocity)
     batch.set_state(batch.position[::-1], batch.velocity[::-1])
     assert batch.position.tolist() == other.position[::-1].tolist()
+
+
+def packed(numbers):
+    """A field of a packed record: its doubles lie at odd places."""
+    records = np.zeros(len(numbers), [("name", "u1"), ("field", numbers.dtype, numbers.shape[1:])])
+    records["field"] = numbers
+    return records["field"]
+
+
+@pytest.mark.parametrize(
+    "laid",
+    [np.asfortranarray, lambda numbers: numbers.T.copy().T, packed, lambda numbers: numbers[::-1].copy()[::-1]],
+    ids=["fortran", "transposed", "packed", "backwards"],
+)
+def test_numbers_are_those_of_their_indices_however_they_lie(links, laid):
+    random = np.random.default_rng(3)
+    numbers = random.uniform(0.1, 1, (5, links))
+    batch, other = pendularm.Batch(5, links), pendularm.Batch(5, links)
+    for one, given in [(batch, laid), (other, np.copy)]:
+        one.set_integrator(timestep=given(0.001 * numbers[:, 0]))
+        one.set_params(given(numbers[:, 1]), given(numbers), given(numbers))
+        one.set_gains(given(numbers), given(numbers), given(numbers))
+        one.set_setpoint(given(numbers), given(numbers))
+        one.set_state(given(numbers), given(numbers))
+        one.enable()
+        one.step(20, given(numbers))
+    assert laid(numbers).tolist() == numbers.tolist()
+    assert batch.time.tolist() == other.time.tolist()
+    assert batch.effort.tolist() == other.effort.tolist()
+    assert batch.position.tolist() == other.position.tolist()
+    arm, single = pendularm.Arm(links), pendularm.Simulation(pendularm.Arm(links))
+    assert pendularm.end_effector(arm, laid(numbers)).tolist() == pendularm.end_effector(arm, numbers).tolist()
+    single.set_state(laid(numbers[:links, 0]))
+    assert single.position.tolist() == numbers[:links, 0].tolist()
+
+
+def test_a_mask_may_be_a_view_or_of_objects():
+    batch, mask = pendularm.Batch(3), np.array([True, False, True])
+    views = [np.stack([mask, ~mask], axis=1)[:, 0], np.repeat(mask, 2)[::2], mask[::-1], packed(mask)]
+    views.append(mask.astype(object))
+    for view in views:
+        chosen = view.tolist()
+        batch.set_state([0.5, 0.5])
+        batch.set_state([0.25, 0.25], arms=view)
+        assert (batch.position[:, 0] == 0.25).tolist() == chosen
+        batch.reset(view)
+        assert (batch.position[:, 0] == 0).tolist() == chosen
+    batch.reset((batch.position > 0)[:, 0])
+    assert not batch.position.any()
 
 
 @pytest.mark.parametrize(
@@ -166,7 +218,7 @@ def test_arrays_go_in_as_they_lie():
         (lambda batch: batch.step(1, [[1, 2]]), "effort must have the shape (2,) or (3, 2), got [1, 2]"),
         (lambda batch: batch.step(1, [np.nan, 0]), "effort[0] must be finite, got NaN"),
         (
-            lambda batch: batch.step(1, batch.position),
+            lambda batch: batch.step(1, batch.position.base),
             "this batch's own arrays are in use elsewhere: hand in copies of them",
         ),
         (lambda batch: batch.set_gains(ki=[[0, 0], [0, -1], [0, 0]]), "ki[1][1] must be finite and at least 0, got -1"),
@@ -178,6 +230,7 @@ def test_arrays_go_in_as_they_lie():
         ),
         (lambda batch: batch.set_integrator("leapfrog"), 'method must be one of euler, midpoint, verlet, rk4, got "leapfrog"'),
         (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
+        (lambda batch: batch.enable("yes"), "data must be True or False, got 'yes'"),
         (lambda batch: batch.reset([3]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.reset([True]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.set_state([0, "a"]), "position must be an array of numbers, got [0, 'a']"),
@@ -227,7 +280,7 @@ def test_what_is_refused_has_not_happened():
     batch.enable()
     batch.step(100)
     before = batch.energy.tolist()
-    pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position[:1]))
+    pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base[:1]))
     pushing.start()
     try:
         # From its first piece on; there are a dozen.
@@ -258,6 +311,93 @@ def test_calls_of_several_threads_wait_for_each_other():
         thread.join()
     alone.step(12_000)
     assert batch.position.tolist() == alone.position.tolist()
+
+
+def test_a_call_waits_for_the_whole_of_another():
+    batch, alone = pendularm.Batch(1, threads=1), pendularm.Batch(1, threads=1)
+    pushing = threading.Thread(target=batch.step, args=(1_500_000, [0.5, 0.0]))
+    pushing.start()
+    # From its first piece on; there are six.
+    while batch.time[0] == 0:
+        time.sleep(0.001)
+    assert batch.time[0] < 1500
+    batch.step(1000, [0.0, 0.25])
+    pushing.join()
+    alone.step(1_500_000, [0.5, 0.0])
+    alone.step(1000, [0.0, 0.25])
+    assert batch.time[0] == alone.time[0]
+    assert batch.position.tolist() == alone.position.tolist()
+
+
+def test_who_only_looks_keeps_nobody_from_stepping():
+    arm, batch, said = pendularm.Arm(), pendularm.Batch(2000, threads=1), []
+
+    def call(change):
+        try:
+            change()
+        except ValueError as refusal:
+            said.append(refusal)
+
+    changes = [lambda: batch.step(1000), lambda: [(batch.enable(True), batch.reset()) for _ in range(100)]]
+    threads = [threading.Thread(target=call, args=(change,)) for change in changes]
+    for thread in threads:
+        thread.start()
+    looks = 0
+    while any(thread.is_alive() for thread in threads):
+        pendularm.dynamics.kinetic_energy(arm, batch.position, batch.velocity)
+        looks += batch.energy.size
+    assert looks
+    assert not said
+
+
+WAITING = """
+import os, pendularm, signal, threading, time
+batch = pendularm.Batch(1, threads=1)
+# The handler runs in the middle of the main thread's own call, and waits for nothing.
+signal.signal(signal.SIGALRM, lambda *_: print(batch.energy.size, batch.reset(), flush=True))
+signal.setitimer(signal.ITIMER_REAL, 0.2)
+batch.step(2_000_000)
+assert 0 < batch.time[0] < 2000
+threading.Thread(target=batch.step, args=(10**12,), daemon=True).start()
+while batch.time[0] < 2000:
+    time.sleep(0.01)
+print("waiting", flush=True)
+try:
+    batch.reset()
+except KeyboardInterrupt:
+    print("heard", flush=True)
+    os._exit(0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers that send signals here")
+def test_who_waits_hears_signals():
+    with subprocess.Popen([sys.executable, "-c", WAITING], stdout=subprocess.PIPE, text=True) as run:
+        assert run.stdout is not None
+        assert run.stdout.readline() == "1 None\n"
+        assert run.stdout.readline() == "waiting\n"
+        time.sleep(0.2)
+        began = time.monotonic()
+        run.send_signal(signal.SIGINT)
+        assert run.stdout.readline() == "heard\n"
+        assert time.monotonic() - began < 5
+        assert run.wait(60) == 0
+
+
+@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted by what Linux lists")
+def test_threads_of_batches_that_have_gone_end():
+    def count():
+        return len(os.listdir("/proc/self/task"))
+
+    before = count()
+    for threads in range(2, 40):
+        pendularm.Batch(64, threads=threads).step()
+    # Of the last four numbers of threads.
+    most = before + sum(range(36, 40))
+    until = time.monotonic() + 30
+    while count() > most:
+        assert time.monotonic() < until
+        time.sleep(0.01)
 
 
 FORKED = """

@@ -97,4 +97,6 @@ def test_shapes_are_checked():
     with pytest.raises(ValueError, match=r"qd must have the shape \(2,\) or \(3, 2\), got \[2, 2\]"):
         dynamics.coriolis(arm, np.zeros((3, 2)), np.zeros((2, 2)))
     with pytest.raises(ValueError, match=r"q must have the shape \(2,\) or \(1, 2\), got \[\]"):
+        dynamics.gravity_load(arm, 1.0)
+    with pytest.raises(ValueError, match="q must be an array of numbers, got None"):
         dynamics.gravity_load(arm, None)

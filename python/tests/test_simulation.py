@@ -1,5 +1,7 @@
 """One arm is the live arm, bit for bit, and refuses what the services refuse."""
 
+import decimal
+import fractions
 import math
 import pickle
 import signal
@@ -158,6 +160,28 @@ def test_arms_are_values():
             "position must be an array of numbers, got array([1.+0.j, 2.+1.j])",
         ),
         (lambda arm: arm.set_state(["1", "2"]), "position must be an array of numbers, got ['1', '2']"),
+        (
+            lambda arm: arm.set_state(np.array(["1", "2"], object)),
+            "position must be an array of numbers, got array(['1', '2'], dtype=object)",
+        ),
+        (lambda arm: arm.set_state([None, 1.0]), "position must be an array of numbers, got [None, 1.0]"),
+        (
+            lambda arm: arm.set_state(np.ma.masked_array([1, 2], [True, False])),
+            "position must have no masked numbers, got masked_array(data=[--, 2],\n             mask=[ True, False],...",
+        ),
+        (
+            lambda arm: pendularm.Simulation(timestep=np.complex128(0.1 + 1j)),
+            f"timestep must be a number, got {np.complex128(0.1 + 1j)!r}",
+        ),
+        (lambda arm: arm.disturb([0, 0], np.array(1j)), "duration must be a number, got array(0.+1.j)"),
+        (lambda arm: pendularm.Simulation(5), "arm must be an Arm, got 5"),
+        (lambda arm: setattr(arm, "arm", None), "arm must be an Arm, got None"),
+        (lambda arm: pendularm.Simulation(method=5), "method must be one of euler, midpoint, verlet, rk4, got 5"),
+        (lambda arm: setattr(arm, "method", b"rk4"), "method must be one of euler, midpoint, verlet, rk4, got b'rk4'"),
+        (lambda arm: arm.enable("yes"), "data must be True or False, got 'yes'"),
+        (lambda arm: arm.enable(1), "data must be True or False, got 1"),
+        (lambda arm: pendularm.inverse_kinematics(None, 1, 1), "arm must be an Arm, got None"),
+        (lambda arm: pendularm.dynamics.gravity_load("arm", [0, 0]), "arm must be an Arm, got 'arm'"),
     ],
 )
 def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
@@ -167,6 +191,29 @@ def test_a_bad_value_is_refused_by_the_name_of_its_field(wrong, said):
         wrong(arm)
     assert str(refusal.value) == said
     assert (arm.position.tolist(), arm.gains["kd"].tolist(), arm.timestep, arm.method) == before
+
+
+def test_the_controller_is_turned_on_by_numpys_truth_too():
+    arm, batch = pendularm.Simulation(), pendularm.Batch(1)
+    for one in [arm, batch]:
+        one.set_setpoint([1, 1])
+        one.enable(np.True_)
+        one.step()
+        assert one.effort.any()
+        one.enable(np.False_)
+        one.step()
+        assert not one.effort.any()
+    assert not arm.enabled
+
+
+def test_numbers_may_be_any_that_python_has():
+    arm = pendularm.Simulation(timestep=np.float32(0.5))
+    for timestep in [1, True, np.int8(1), np.array(1.0), decimal.Decimal(1), fractions.Fraction(1)]:
+        arm.timestep = timestep
+        assert arm.timestep == 1
+    arm.set_state([decimal.Decimal(1), 10**3], np.ma.masked_array([1, 2]))
+    assert arm.position.tolist() == [1, 1000]
+    assert arm.velocity.tolist() == [1, 2]
 
 
 def test_gains_may_be_any_mapping():

@@ -107,6 +107,13 @@ def test_suggested_gains_are_the_services(runtime, links):
             "samples must be a whole number, at least 0 and less than 2^64, got -1",
         ),
         (lambda: pendularm.rollout(duration="1"), "duration must be a number, got '1'"),
+        (
+            lambda: pendularm.stability(integrator=None),
+            "integrator must be one of euler, midpoint, verlet, rk4, got None",
+        ),
+        (lambda: pendularm.rollout(reference=1), "reference must be True or False, got 1"),
+        (lambda: pendularm.plan(0.01, 5), "arm must be an Arm, got 5"),
+        (lambda: pendularm.suggest_gains(5), "arm must be an Arm, got 5"),
         (lambda: pendularm.plan("1"), "error must be a number, got '1'"),
         (lambda: pendularm.suggest_gains(margin="1"), "margin must be a number, got '1'"),
         (lambda: pendularm.stability(gains=[1]), "gains must be a mapping with kp, ki and kd, got [1]"),

@@ -24,6 +24,14 @@ def test_the_package_holds_its_own_types(tmp_path):
     assert run.returncode == 0, run.stdout + run.stderr
 
 
+def test_numpys_truth_is_one_by_its_type(tmp_path):
+    lines = "import numpy, pendularm; truth = numpy.bool_(True)"
+    lines += "; pendularm.Batch(1).enable(truth); pendularm.Simulation().enable(truth)"
+    lines += "; pendularm.rollout(reference=truth)"
+    run = mypy("mypy", "--strict", "--cache-dir", str(tmp_path), "-c", lines)
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
 def test_everything_public_says_what_it_is():
     for name in pendularm.__all__:
         thing = getattr(pendularm, name)

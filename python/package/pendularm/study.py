@@ -191,7 +191,7 @@ def rollout(
     gains: Mapping[str, ArrayLike] | None = None,
     setpoint: ArrayLike | None = None,
     samples: int = 1001,
-    reference: bool = False,
+    reference: bool | np.bool_ = False,
 ) -> Rollout:
     """Runs an arm offline with the live arm's own steps, as ``/study/rollout`` does.
 

@@ -7,7 +7,8 @@ use pendularm::math::integrator::Method;
 use pyo3::prelude::{PyAnyMethods, PyResult};
 
 use super::Batch;
-use crate::fields::{self, Bound, Numbers, Object, Rows, refused};
+use crate::arrays::{Numbers, Rows, laid_out};
+use crate::fields::{self, Bound, Object, refused};
 
 impl Batch {
     /// A row for each arm, or one for all, where something was handed in.
@@ -81,12 +82,19 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
         ))
     };
     let py = arms.py();
-    let array = py
-        .import("numpy")?
+    let numpy = py.import("numpy")?;
+    let mut array = numpy
         .call_method1("asarray", (arms,))
         .map_err(|_| expected())?;
+    if array.getattr("dtype")?.getattr("kind")?.eq("O")? {
+        // Truths among objects would be taken for the indices 0 and 1.
+        let listed = array.call_method0("tolist")?;
+        array = numpy
+            .call_method1("asarray", (listed,))
+            .map_err(|_| expected())?;
+    }
     if let Ok(mask) = array.cast::<PyArray1<bool>>() {
-        let mask = mask.to_vec()?;
+        let mask = laid_out(mask)?.to_vec()?;
         if mask.len() != count {
             return Err(expected());
         }

@@ -12,7 +12,7 @@ use pendularm::math::kinematics::forward;
 use pendularm::math::pid::Gains;
 use pendularm::math::simulation::{Simulation, batch};
 
-use crate::fields::Rows;
+use crate::arrays::Rows;
 
 /// Fewest lane-steps that are worth another thread: some tens of microseconds.
 const WORTH_A_THREAD: u64 = 3000;

@@ -1,7 +1,7 @@
 //! Many arms at once, with NumPy arrays in and out.
 //!
 //! The arrays that show the arms are made once and written in place; users hold views of them that they cannot write.
-//! What is handed in is read where it lies, if it is doubles side by side.
+//! What is handed in is read where it lies, if it is doubles side by side that can be written.
 //!
 //! **Invariant:** every row of every array shows its lane as it is, whenever no call is under way.
 
@@ -18,15 +18,16 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
-use pyo3::prelude::{Py, PyAny, PyErr, PyResult, Python, pyclass, pymethods};
+use pyo3::prelude::{Py, PyAny, PyResult, Python, pyclass, pymethods};
 
 use crate::arm::for_either;
-use crate::fields::{self, Bound, Held, Numbers, Object, Whole, refused};
-use crate::patience::hold;
+use crate::arrays::Numbers;
+use crate::fields::{self, Bound, Flag, Held, Object, Whole, refused};
+use crate::patience::{Turns, hold};
 use given::{chosen, read, read_methods, read_steps};
 use lanes::{Piece, Steps};
 use pool::pool;
-use windows::{Window, Windows};
+use windows::Windows;
 
 /// Lane-steps between two looks for signals: some tens of milliseconds of one core.
 const STEPS_PER_LOOK: u64 = 250_000;
@@ -49,9 +50,10 @@ enum Either {
 /// All begin as a fresh runtime does. `position`, `velocity`, `effort`, `time` and `diverged` are made once and
 /// overwritten by every call that changes the arms: copy what is to be kept. They cannot be written. An array that is
 /// handed in has one row per arm, (`n_arms`, links), or one for all, (links,); doubles side by side are read where
-/// they lie. `threads` share the work, as many as there are cores unless given; with 1 the caller does it alone. Calls
-/// on one batch from several threads wait for each other. It can be neither copied nor pickled, and a process that is
-/// forked while another thread steps it must not use it.
+/// they lie, if they can be written. `threads` share the work, as many as there are cores unless given; with 1 the
+/// caller does it alone. Calls that change one batch from several threads wait for each other; all that shows the arms
+/// may be read meanwhile, and shows how far each of them is. A batch can be neither copied nor pickled, and a process
+/// that is forked while another thread steps it must not use it.
 #[pyclass(frozen, module = "pendularm")]
 #[derive(Debug)]
 pub(crate) struct Batch {
@@ -59,6 +61,7 @@ pub(crate) struct Batch {
     arms: usize,
     threads: usize,
     windows: Windows,
+    turns: Turns,
 }
 
 #[pymethods]
@@ -78,18 +81,12 @@ impl Batch {
             2 => Either::Two(Mutex::new(lanes::fresh(n_arms))),
             _ => Either::Three(Mutex::new(lanes::fresh(n_arms))),
         };
-        let joints = || Window::onto(PyArray2::zeros(py, [n_arms, links], false));
         Ok(Self {
             own,
             arms: n_arms,
             threads: threads.unwrap_or_else(|| available_parallelism().map_or(1, usize::from)),
-            windows: Windows {
-                position: joints()?,
-                velocity: joints()?,
-                effort: joints()?,
-                time: Window::onto(PyArray1::zeros(py, [n_arms], false))?,
-                diverged: Window::onto(PyArray1::zeros(py, [n_arms], false))?,
-            },
+            windows: Windows::of(py, n_arms, links)?,
+            turns: Turns::default(),
         })
     }
 
@@ -127,6 +124,7 @@ impl Batch {
             length,
             is_shared: pool.is_some(),
         };
+        let _turn = self.turns.take(py)?;
         let taken = for_either!(Either, &self.own, lanes => {
             stepping::take(py, lanes, &self.windows, pool.as_deref(), first)
         });
@@ -141,6 +139,7 @@ impl Batch {
     #[pyo3(signature = (arms=None))]
     fn reset(&self, py: Python<'_>, arms: Option<&Object<'_>>) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
             let lanes = lanes.as_mut_slice();
@@ -166,16 +165,14 @@ impl Batch {
         arms: Option<&Object<'_>>,
     ) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
-        // Owned, since they may be this batch's own arrays, which are written below.
-        let owned = |given: Numbers<'_>| {
-            Ok::<_, PyErr>(
-                given
-                    .rows(chosen.len(), self.links(), Some(Bound::Finite))?
-                    .into_owned(),
-            )
-        };
-        let position = owned(Numbers::read("position", position)?)?;
-        let velocity = read("velocity", velocity)?.map(owned).transpose()?;
+        let position = Numbers::read("position", position)?;
+        let position = position.rows(chosen.len(), self.links(), Some(Bound::Finite))?;
+        let velocity = read("velocity", velocity)?;
+        let velocity = velocity
+            .as_ref()
+            .map(|given| given.rows(chosen.len(), self.links(), Some(Bound::Finite)))
+            .transpose()?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
             let lanes = lanes.as_mut_slice();
@@ -205,6 +202,7 @@ impl Batch {
         let positions = positions.rows(self.arms, self.links(), Some(Bound::Finite))?;
         let velocities = read("velocities", velocities)?;
         let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 one.set_setpoint(Setpoint {
@@ -229,6 +227,7 @@ impl Batch {
         let kp = self.rows(kp.as_ref(), Bound::NotNegative)?;
         let ki = self.rows(ki.as_ref(), Bound::NotNegative)?;
         let kd = self.rows(kd.as_ref(), Bound::NotNegative)?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 let present = *one.pid().gains();
@@ -260,6 +259,7 @@ impl Batch {
         let gravity = self.column(gravity.as_ref(), Bound::NotNegative)?;
         let masses = self.rows(masses.as_ref(), Bound::Positive)?;
         let lengths = self.rows(lengths.as_ref(), Bound::Positive)?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 let present = one.arm();
@@ -287,6 +287,7 @@ impl Batch {
             .transpose()?;
         let timestep = read("timestep", timestep)?;
         let timestep = self.column(timestep.as_ref(), Bound::Positive)?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             for (row, one) in hold(py, lanes).iter_mut().enumerate() {
                 match methods.as_deref() {
@@ -303,8 +304,10 @@ impl Batch {
     }
 
     /// Turns the controllers on or off. From off to on an integral starts at zero.
-    #[pyo3(signature = (data=true))]
-    fn enable(&self, py: Python<'_>, data: bool) -> PyResult<()> {
+    #[pyo3(signature = (data=Flag::Is(true)), text_signature = "($self, data=True)")]
+    fn enable(&self, py: Python<'_>, data: Flag) -> PyResult<()> {
+        let data = data.read("data")?;
+        let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
             let mut lanes = hold(py, lanes);
             let lanes = lanes.as_mut_slice();

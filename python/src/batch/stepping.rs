@@ -1,6 +1,7 @@
 //! The steps of a batch, with looks for signals.
 //!
-//! **Invariant:** no lock is held when a signal's handler runs: it may want to look at the arms.
+//! **Invariant:** a signal's handler that looks at the arms, or changes them, waits for nothing: it runs between two
+//! pieces.
 
 use std::sync::Mutex;
 

@@ -2,7 +2,7 @@
 //!
 //! **Invariant:** they are made once, and whoever is given one cannot write it.
 
-use numpy::{Element, PyArray, PyArrayMethods, PyReadwriteArray};
+use numpy::{Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray};
 use pyo3::prelude::{Py, PyAny, PyAnyMethods, PyDictMethods, PyResult, Python};
 use pyo3::types::PyDict;
 
@@ -47,6 +47,18 @@ pub(super) struct Windows {
 }
 
 impl Windows {
+    /// Arrays of zeros.
+    pub(super) fn of(py: Python<'_>, arms: usize, links: usize) -> PyResult<Self> {
+        let joints = || Window::onto(PyArray2::zeros(py, [arms, links], false));
+        Ok(Self {
+            position: joints()?,
+            velocity: joints()?,
+            effort: joints()?,
+            time: Window::onto(PyArray1::zeros(py, [arms], false))?,
+            diverged: Window::onto(PyArray1::zeros(py, [arms], false))?,
+        })
+    }
+
     /// Has them written, with the interpreter's lock released. Where they are in use elsewhere, `write` is not called.
     pub(super) fn write(
         &self,

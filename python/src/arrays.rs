@@ -1,0 +1,199 @@
+//! Arrays of numbers that Python hands in, and their rows.
+//!
+//! **Invariant:** numbers are read in the order that their indices have, however they lie in memory.
+
+use std::borrow::Cow;
+
+use numpy::ndarray::Dimension;
+use numpy::{
+    Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
+    PyUntypedArrayMethods,
+};
+use pyo3::intern;
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult};
+use pyo3::types::PyDict;
+
+use crate::fields::{Bound, Held, Object, Real, held, refused, shown};
+
+/// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side, row by
+/// row.
+pub(crate) struct Numbers<'py> {
+    field: String,
+    array: PyReadonlyArrayDyn<'py, f64>,
+}
+
+impl<'py> Numbers<'py> {
+    pub(crate) fn read(field: &str, value: &Object<'py>) -> PyResult<Self> {
+        if is_masked(value)? {
+            return Err(refused(format_args!(
+                "{field} must have no masked numbers, got {}",
+                shown(value)
+            )));
+        }
+        let array = match value.cast::<PyArrayDyn<f64>>() {
+            Ok(array) => array.clone(),
+            Err(_) => converted(value).map_err(|_| {
+                refused(format_args!(
+                    "{field} must be an array of numbers, got {}",
+                    shown(value)
+                ))
+            })?,
+        };
+        let array = laid_out(&array)?.try_readonly().map_err(|_| {
+            refused(format_args!(
+                "{field} is being written by a batch: hand in a copy of it"
+            ))
+        })?;
+        Ok(Self {
+            field: field.to_owned(),
+            array,
+        })
+    }
+
+    pub(crate) fn shape(&self) -> &[usize] {
+        self.array.shape()
+    }
+
+    /// The numbers, row by row.
+    pub(crate) fn values(&self) -> PyResult<&[f64]> {
+        Ok(self.array.as_slice()?)
+    }
+
+    /// The numbers as one row of `width` for each of `arms`, or one row for all of them.
+    pub(crate) fn rows(
+        &self,
+        arms: usize,
+        width: usize,
+        bound: Option<Bound>,
+    ) -> PyResult<Rows<'_>> {
+        let field = &self.field;
+        let shape = self.shape();
+        if shape != [width] && shape != [arms, width] {
+            return Err(refused(format_args!(
+                "{field} must have the shape ({width},) or ({arms}, {width}), got {shape:?}"
+            )));
+        }
+        let is_one = shape.len() == 1;
+        let values = self.values()?;
+        if let Some(bound) = bound {
+            held(field, values, bound, |at| match is_one {
+                true => format!("[{at}]"),
+                false => format!("[{}][{}]", at / width, at % width),
+            })?;
+        }
+        Ok(Rows {
+            values: Cow::Borrowed(values),
+            width,
+            is_one,
+        })
+    }
+
+    /// The numbers as one for each of `arms`, or one for all of them.
+    pub(crate) fn column(&self, arms: usize, bound: Bound) -> PyResult<Rows<'_>> {
+        let field = &self.field;
+        let shape = self.shape();
+        if !shape.is_empty() && shape != [arms] {
+            return Err(refused(format_args!(
+                "{field} must be a number or have the shape ({arms},), got {shape:?}"
+            )));
+        }
+        let values = self.values()?;
+        held(field, values, bound, |arm| {
+            if shape.is_empty() {
+                String::new()
+            } else {
+                format!("[{arm}]")
+            }
+        })?;
+        Ok(Rows {
+            values: Cow::Borrowed(values),
+            width: 1,
+            is_one: shape.is_empty(),
+        })
+    }
+}
+
+/// The array itself where it may be read as one slice, its rows one after the other, and a copy of it elsewhere.
+///
+/// A slice of an array whose columns lie side by side would have its numbers in another order, and a field of a packed
+/// record has a stride that is no whole number of doubles. An array that cannot be written may be one that shows a
+/// batch's arms, which other threads step meanwhile: they are not to be kept from it.
+pub(crate) fn laid_out<'py, T: Element, D: Dimension>(
+    array: &Held<'py, PyArray<T, D>>,
+) -> PyResult<Held<'py, PyArray<T, D>>> {
+    if array.is_c_contiguous() && array.is_aligned() && is_writeable(array)? {
+        return Ok(array.clone());
+    }
+    Ok(array.call_method1("copy", ("C",))?.cast_into()?)
+}
+
+fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
+    let py = array.py();
+    let flags = array.getattr(intern!(py, "flags"))?;
+    flags.getattr(intern!(py, "writeable"))?.is_truthy()
+}
+
+/// Whether this is a masked array some of whose numbers are not to be looked at.
+fn is_masked(value: &Object<'_>) -> PyResult<bool> {
+    if !value.is_instance_of::<PyUntypedArray>() || value.is_exact_instance_of::<PyUntypedArray>() {
+        return Ok(false);
+    }
+    let masked = value.py().import("numpy.ma")?;
+    masked.call_method1("is_masked", (value,))?.is_truthy()
+}
+
+/// Converts whatever NumPy can make doubles of; complex numbers, text and `None` are none.
+fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
+    let py = value.py();
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method1("asarray", (value,))?;
+    let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+    let array = if kind == "O" {
+        // NumPy would read texts, and make a NaN of None.
+        for one in array.getattr("flat")?.try_iter()? {
+            let Ok(one) = one?.extract::<Real>();
+            one.read("each")?;
+        }
+        numpy.call_method1("asarray", (array, "float64"))?
+    } else {
+        let how = PyDict::new(py);
+        how.set_item("casting", "same_kind")?;
+        array.call_method("astype", ("float64",), Some(&how))?
+    };
+    Ok(array.cast_into()?)
+}
+
+/// One row for each arm, or one for all of them.
+#[derive(Debug)]
+pub(crate) struct Rows<'a> {
+    values: Cow<'a, [f64]>,
+    width: usize,
+    is_one: bool,
+}
+
+impl Rows<'_> {
+    /// The same, where a single row goes with every row of others.
+    pub(crate) fn of_one_for_all(self) -> Self {
+        Self {
+            is_one: self.values.len() == self.width,
+            ..self
+        }
+    }
+
+    /// The row of an arm. `N` is the width that was asked for.
+    pub(crate) fn row<const N: usize>(&self, arm: usize) -> [f64; N] {
+        let start = if self.is_one { 0 } else { arm * N };
+        let row = self
+            .values
+            .get(start..start + N)
+            .and_then(|row| row.try_into().ok());
+        debug_assert!(row.is_some(), "the shape has been checked");
+        row.unwrap_or([f64::NAN; N])
+    }
+
+    /// The number of an arm, of a column.
+    pub(crate) fn number(&self, arm: usize) -> f64 {
+        let [number] = self.row(arm);
+        number
+    }
+}
