@@ -315,15 +315,15 @@ def test_calls_of_several_threads_wait_for_each_other():
 
 def test_a_call_waits_for_the_whole_of_another():
     batch, alone = pendularm.Batch(1, threads=1), pendularm.Batch(1, threads=1)
-    pushing = threading.Thread(target=batch.step, args=(1_500_000, [0.5, 0.0]))
+    pushing = threading.Thread(target=batch.step, args=(5_000_000, [0.5, 0.0]))
     pushing.start()
-    # From its first piece on; there are six.
+    # From its first piece on; there are twenty.
     while batch.time[0] == 0:
         time.sleep(0.001)
-    assert batch.time[0] < 1500
+    assert batch.time[0] < 5000
     batch.step(1000, [0.0, 0.25])
     pushing.join()
-    alone.step(1_500_000, [0.5, 0.0])
+    alone.step(5_000_000, [0.5, 0.0])
     alone.step(1000, [0.0, 0.25])
     assert batch.time[0] == alone.time[0]
     assert batch.position.tolist() == alone.position.tolist()
@@ -355,11 +355,12 @@ import os, pendularm, signal, threading, time
 batch = pendularm.Batch(1, threads=1)
 # The handler runs in the middle of the main thread's own call, and waits for nothing.
 signal.signal(signal.SIGALRM, lambda *_: print(batch.energy.size, batch.reset(), flush=True))
-signal.setitimer(signal.ITIMER_REAL, 0.2)
-batch.step(2_000_000)
-assert 0 < batch.time[0] < 2000
+signal.setitimer(signal.ITIMER_REAL, 0.05)
+batch.step(10_000_000)
+assert 0 < batch.time[0] < 10_000
+before = batch.time[0]
 threading.Thread(target=batch.step, args=(10**12,), daemon=True).start()
-while batch.time[0] < 2000:
+while batch.time[0] == before:
     time.sleep(0.01)
 print("waiting", flush=True)
 try:
