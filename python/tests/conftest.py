@@ -1,6 +1,7 @@
 """A live runtime beside the tests, and a client for it of Python's own."""
 
 import json
+import signal
 import socket
 import subprocess
 import sys
@@ -14,6 +15,9 @@ import pytest
 
 # Far longer than anything takes; who waits so long has failed.
 PATIENCE = 60.0
+
+# A script that a shell starts in the background ignores SIGINT, and so would all that the tests start.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 class Runtime:
