@@ -71,6 +71,24 @@ fn frames_leave_in_the_order_in_which_they_were_produced() {
     assert!(bench.take_all().is_empty());
 }
 
+/// A topic may have the action's name.
+#[test]
+fn feedback_is_past_all_throttles_and_drops_nothing_if_it_cannot_fit() {
+    let mut bench = Bench::new();
+    bench.throttle("/a", 1000, 1);
+    bench.push("/a", "1");
+    bench.push("/a", "held back");
+    bench.outbox.push_feedback("2".into());
+    bench.outbox.push_feedback("3".into());
+    bench
+        .outbox
+        .push_feedback(vec![b'x'; MAX_TOPIC_BYTES + 1].into());
+    assert_eq!(bench.outbox.dropped(), 1);
+    assert_eq!(bench.take_all(), ["1", "2", "3"]);
+    bench.advance(1000);
+    assert_eq!(bench.take_all(), ["held back"]);
+}
+
 #[test]
 fn a_batch_is_limited_in_frames_and_bytes_but_never_empty() {
     let mut bench = Bench::new();

@@ -80,9 +80,7 @@ impl Outbox {
     /// the oldest go.
     pub fn push(&mut self, topic: &Arc<str>, frame: Bytes, now: Instant) {
         self.release(now);
-        // The newest messages of a series that is too long may still fit.
-        if frame.len() > MAX_TOPIC_BYTES && first_message(&frame) == frame.len() {
-            self.dropped += 1;
+        if !self.may_fit(&frame) {
             return;
         }
         if self.throttles.concerns(topic) {
@@ -97,9 +95,20 @@ impl Outbox {
     /// Adds feedback of a goal, which may be lost as a message may: no throttle is for it, also not one of a topic
     /// that has the action's name.
     pub fn push_feedback(&mut self, frame: Bytes) {
+        if !self.may_fit(&frame) {
+            return;
+        }
         let number = self.number();
         self.enqueue(number, frame);
         self.keep_bounded();
+    }
+
+    /// Whether there is room for it once all else has gone; if not, it counts as dropped. The newest messages of a
+    /// series that is too long may still fit.
+    fn may_fit(&mut self, frame: &Bytes) -> bool {
+        let fits = frame.len() <= MAX_TOPIC_BYTES || first_message(frame) < frame.len();
+        self.dropped += u64::from(!fits);
+        fits
     }
 
     fn keep_bounded(&mut self) {
