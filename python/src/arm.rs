@@ -4,11 +4,11 @@
 
 use numpy::{PyArray1, ToPyArray};
 use pendularm::math::arm::Arm as Rods;
-use pendularm::math::pid::Gains;
-use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pyfunction, pymethods};
+use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::PyDict;
 
-use crate::fields::{self, Bound, Handed, Held, Object, Real, Whole, joints_or, refused};
+use crate::arrays::joints_or;
+use crate::fields::{self, Bound, Handed, Held, Meant, Object, Real, Whole, refused};
 
 /// Rods of 2 or 3 links.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,6 +119,8 @@ fn read<const N: usize>(
 /// An arm that is handed in.
 pub(crate) type Given<'py> = Handed<Held<'py, Arm>>;
 
+impl<'py> Meant<'_, 'py> for Held<'py, Arm> {}
+
 impl Given<'_> {
     /// Its rods.
     pub(crate) fn chain(self) -> PyResult<Chain> {
@@ -132,23 +134,4 @@ impl Given<'_> {
 /// The rods of the arm that is handed in, or the default ones.
 pub(crate) fn or_default(arm: Option<Given<'_>>) -> PyResult<Chain> {
     arm.map_or_else(|| Ok(Chain::Two(Rods::default())), Given::chain)
-}
-
-/// The gains of a fresh runtime: `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each.
-#[pyfunction]
-#[pyo3(signature = (links=Whole::Is(2)), text_signature = "(links=2)")]
-pub(crate) fn default_gains(py: Python<'_>, links: Whole) -> PyResult<Held<'_, PyDict>> {
-    fn listed<const N: usize>(gains: Gains<N>) -> [(&'static str, Vec<f64>); 3] {
-        [("kp", gains.kp), ("ki", gains.ki), ("kd", gains.kd)]
-            .map(|(name, gain)| (name, gain.to_vec()))
-    }
-    let gains = match fields::links(links)? {
-        2 => listed(Gains::<2>::default()),
-        _ => listed(Gains::<3>::default()),
-    };
-    let found = PyDict::new(py);
-    for (name, values) in gains {
-        found.set_item(name, values.to_pyarray(py))?;
-    }
-    Ok(found)
 }

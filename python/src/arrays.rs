@@ -163,6 +163,34 @@ fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     Ok(array.cast_into()?)
 }
 
+/// One number per joint.
+pub(crate) fn joints<const N: usize>(
+    field: &str,
+    value: &Object<'_>,
+    bound: Bound,
+) -> PyResult<[f64; N]> {
+    let numbers = Numbers::read(field, value)?;
+    if *numbers.shape() != [N] {
+        return Err(refused(format_args!(
+            "{field} must be an array of {N} numbers, got {}",
+            shown(value)
+        )));
+    }
+    let values = numbers.values()?;
+    held(field, values, bound, |joint| format!("[{joint}]"))?;
+    <[f64; N]>::try_from(values).map_err(refused)
+}
+
+/// As [`joints`], or `missing` where nothing is handed in.
+pub(crate) fn joints_or<const N: usize>(
+    field: &str,
+    value: Option<&Object<'_>>,
+    bound: Bound,
+    missing: [f64; N],
+) -> PyResult<[f64; N]> {
+    value.map_or(Ok(missing), |value| joints(field, value, bound))
+}
+
 /// One row for each arm, or one for all of them.
 #[derive(Debug)]
 pub(crate) struct Rows<'a> {

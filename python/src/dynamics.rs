@@ -8,8 +8,8 @@ use pyo3::IntoPyObject;
 use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Chain, Given, for_either};
-use crate::arrays::{Numbers, Rows};
-use crate::fields::{Bound, Held, Object, Real, joints_or, refused};
+use crate::arrays::{Numbers, Rows, joints_or};
+use crate::fields::{Bound, Held, Object, Real, refused};
 
 /// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,14 +6,10 @@ use std::convert::Infallible;
 use std::fmt::Display;
 
 use pendularm::math::integrator::{Method, UnknownMethod};
-use pendularm::math::pid::Gains;
+use pyo3::Borrowed;
 use pyo3::exceptions::PyValueError;
-use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyDictMethods, PyErr, PyResult};
-use pyo3::types::{PyDict, PyFloat};
-use pyo3::{Borrowed, PyTypeInfo};
-
-use crate::arm::Arm;
-use crate::arrays::Numbers;
+use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
+use pyo3::types::PyFloat;
 
 /// The numbers that a field may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,34 +80,6 @@ pub(crate) fn held(
     }
 }
 
-/// One number per joint.
-pub(crate) fn joints<const N: usize>(
-    field: &str,
-    value: &Object<'_>,
-    bound: Bound,
-) -> PyResult<[f64; N]> {
-    let numbers = Numbers::read(field, value)?;
-    if *numbers.shape() != [N] {
-        return Err(refused(format_args!(
-            "{field} must be an array of {N} numbers, got {}",
-            shown(value)
-        )));
-    }
-    let values = numbers.values()?;
-    held(field, values, bound, |joint| format!("[{joint}]"))?;
-    <[f64; N]>::try_from(values).map_err(refused)
-}
-
-/// As [`joints`], or `missing` where nothing is handed in.
-pub(crate) fn joints_or<const N: usize>(
-    field: &str,
-    value: Option<&Object<'_>>,
-    bound: Bound,
-    missing: [f64; N],
-) -> PyResult<[f64; N]> {
-    value.map_or(Ok(missing), |value| joints(field, value, bound))
-}
-
 /// A value handed in for one of this type; it is judged where its field's name is known.
 #[derive(Debug)]
 pub(crate) enum Handed<T> {
@@ -165,7 +133,6 @@ impl Meant<'_, '_> for f64 {
 impl Meant<'_, '_> for u64 {}
 impl Meant<'_, '_> for bool {}
 impl Meant<'_, '_> for String {}
-impl<'py> Meant<'_, 'py> for Held<'py, Arm> {}
 
 impl Real {
     /// The number, whichever it is.
@@ -252,43 +219,4 @@ pub(crate) fn links(value: Whole) -> PyResult<usize> {
 pub(crate) fn method(field: &str, name: &str) -> PyResult<Method> {
     name.parse()
         .map_err(|why| refused(format_args!("{field} {why}, got {name:?}")))
-}
-
-/// Gains by their names, `{"kp": …, "ki": …, "kd": …}`; one that is left out is that of `missing`.
-pub(crate) fn gains<const N: usize>(
-    value: Option<&Object<'_>>,
-    missing: Gains<N>,
-) -> PyResult<Gains<N>> {
-    let Some(value) = value else {
-        return Ok(missing);
-    };
-    let gains = PyDict::type_object(value.py())
-        .call1((value,))
-        .ok()
-        .and_then(|gains| gains.cast_into::<PyDict>().ok())
-        .ok_or_else(|| {
-            refused(format_args!(
-                "gains must be a mapping with kp, ki and kd, got {}",
-                shown(value)
-            ))
-        })?;
-    for name in gains.keys() {
-        if !["kp", "ki", "kd"].contains(&name.to_string().as_str()) {
-            return Err(refused(format_args!(
-                "gains has kp, ki and kd, got {}",
-                shown(&name)
-            )));
-        }
-    }
-    let part = |name: &str, missing: [f64; N]| match gains.get_item(name)? {
-        Some(value) if !value.is_none() => {
-            joints(&format!("gains.{name}"), &value, Bound::NotNegative)
-        }
-        _ => Ok(missing),
-    };
-    Ok(Gains {
-        kp: part("kp", missing.kp)?,
-        ki: part("ki", missing.ki)?,
-        kd: part("kd", missing.kd)?,
-    })
 }

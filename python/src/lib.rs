@@ -12,6 +12,7 @@ mod arrays;
 mod batch;
 mod dynamics;
 mod fields;
+mod gains;
 mod patience;
 mod simulation;
 mod study;
@@ -20,7 +21,7 @@ mod study;
 #[pyo3::pymodule(name = "_native")]
 mod native {
     #[pymodule_export]
-    use crate::arm::{Arm, default_gains};
+    use crate::arm::Arm;
     #[pymodule_export]
     use crate::batch::Batch;
     #[pymodule_export]
@@ -28,6 +29,8 @@ mod native {
         coriolis, end_effector, forward_dynamics, gravity_load, inverse_dynamics,
         inverse_kinematics, kinetic_energy, mass_matrix, potential_energy,
     };
+    #[pymodule_export]
+    use crate::gains::default_gains;
     #[pymodule_export]
     use crate::simulation::{Divergence, Simulation};
     #[pymodule_export]

@@ -15,9 +15,9 @@ use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::PyDict;
 
 use crate::arm::{Arm, Chain, Given, for_either, or_default};
-use crate::fields::{
-    self, Bound, Flag, Held, Name, Object, Real, Whole, joints, joints_or, refused,
-};
+use crate::arrays::{joints, joints_or};
+use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
+use crate::gains;
 use crate::patience::{hold, until_done};
 
 /// Steps between two looks at the clock: some hundred microseconds.
@@ -72,7 +72,7 @@ fn begin<const N: usize>(
 where
     Gains<N>: Default,
 {
-    let mut one = Loop::new(arm, fields::gains(gains, Gains::default())?);
+    let mut one = Loop::new(arm, gains::read(gains, Gains::default())?);
     one.set_method(method);
     one.set_timestep(timestep);
     Ok(Mutex::new(one))

@@ -17,7 +17,9 @@ use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
 
 use crate::arm::{Chain, Given, for_either, or_default};
-use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, joints_or, refused};
+use crate::arrays::joints_or;
+use crate::fields::{self, Bound, Flag, Held, Name, Object, Real, Whole, refused};
+use crate::gains;
 use crate::patience::until_done;
 
 /// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
@@ -43,7 +45,7 @@ pub(crate) fn stability<'py>(
 ) -> PyResult<Held<'py, PyDict>> {
     let method = integrator.method("integrator")?;
     for_either!(Chain, or_default(arm)?, arm => {
-        let gains = fields::gains(gains.as_ref(), Gains::default())?;
+        let gains = gains::read(gains.as_ref(), Gains::default())?;
         let setpoint = Setpoint::at(joints_or("setpoint", setpoint.as_ref(), Bound::Finite, [0.0; _])?);
         let control = ControlLoop::new(arm, gains, setpoint).with_method(method);
         let start = read_state(("q", q.as_ref()), ("qd", qd.as_ref()))?;
@@ -296,7 +298,7 @@ fn read_loop<const N: usize>(
             fields::shown(setpoint)
         )));
     }
-    let gains = fields::gains(gains, no_control())?;
+    let gains = gains::read(gains, no_control())?;
     let setpoint = Setpoint::at(joints_or("setpoint", setpoint, Bound::Finite, [0.0; N])?);
     Ok(ControlLoop::new(arm, gains, setpoint))
 }

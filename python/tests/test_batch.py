@@ -393,7 +393,7 @@ def test_threads_of_batches_that_have_gone_end():
     before = count()
     for threads in range(2, 40):
         pendularm.Batch(64, threads=threads).step()
-    # Of the last four numbers of threads.
+    # The threads of the last four batches may still be there.
     most = before + sum(range(36, 40))
     until = time.monotonic() + 30
     while count() > most:

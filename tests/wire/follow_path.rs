@@ -278,6 +278,11 @@ fn a_goal_that_is_none_is_refused_by_its_field() {
     );
 }
 
+fn has_no_feedback(said: &[Value]) {
+    let is_feedback = |frame: &Value| frame["op"] == "action_feedback";
+    assert!(!said.iter().any(is_feedback), "{said:?}");
+}
+
 /// The node looks at the arm every 5 ms: so soon after the answer it would still speak of the way.
 #[test]
 fn a_paused_arm_is_on_no_way_that_there_were_feedback_of() {
@@ -293,11 +298,7 @@ fn a_paused_arm_is_on_no_way_that_there_were_feedback_of() {
         while began.elapsed() < Duration::from_millis(12) {
             client.ask("/rosapi/get_time", json!({}));
         }
-        let said = &client.kept;
-        assert!(
-            said.iter().all(|frame| frame["op"] != "action_feedback"),
-            "{said:?}"
-        );
+        has_no_feedback(&client.kept);
         client.ask("/arm_sim/pause", json!({"data": false}));
     }
 }
@@ -333,10 +334,7 @@ fn the_result_of_a_path_is_the_last_that_comes_of_it() {
     client.send(&goal("short", &through(&[point([0.1, 0.1], 0.3)])));
     client.receive_where("the result", |frame| frame["op"] == "action_result");
     let said = client.receive_for(Duration::from_millis(500));
-    assert!(
-        said.iter().all(|frame| frame["op"] != "action_feedback"),
-        "{said:?}"
-    );
+    has_no_feedback(&said);
 }
 
 /// Stepped in between, and paused again.
@@ -349,10 +347,7 @@ fn an_arm_that_is_paused_anew_is_on_no_way_either() {
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.send(&goal("long", &through(&[point([0.3, 0.3], 1e3)])));
     let said = client.receive_for(Duration::from_millis(300));
-    assert!(
-        said.iter().all(|frame| frame["op"] != "action_feedback"),
-        "{said:?}"
-    );
+    has_no_feedback(&said);
 }
 
 #[test]

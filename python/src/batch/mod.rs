@@ -1,7 +1,7 @@
 //! Many arms at once, with NumPy arrays in and out.
 //!
 //! The arrays that show the arms are made once and written in place; users hold views of them that they cannot write.
-//! What is handed in is read where it lies, if it is doubles side by side that can be written.
+//! An array of doubles that is handed in is read where it lies, if they lie side by side and can be written.
 //!
 //! **Invariant:** every row of every array shows its lane as it is, whenever no call is under way.
 

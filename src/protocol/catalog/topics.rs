@@ -140,27 +140,15 @@ pub(super) const TRANSFORMS: [Field; 1] = [required(
     "",
 )];
 
-/// Topics of the arm's state, in both spellings. News of a change on `/diagnostics` come before the answer to it, and
-/// stay.
-pub(super) const ARM_STATE: &[&str] = &[
-    Topic::JointStates.name(),
-    Topic::JointStates.short_name(),
-    Topic::Clock.name(),
-    Topic::Clock.short_name(),
-    Topic::Tf.name(),
-    Topic::Tf.short_name(),
-];
+/// The names of topics, in both spellings.
+macro_rules! spellings {
+    ($($topic:ident),*) => { &[$(Topic::$topic.name(), Topic::$topic.short_name()),*] };
+}
+
+/// Topics of the arm's state. News of a change on `/diagnostics` come before the answer to it, and stay.
+pub(super) const ARM_STATE: &[&str] = spellings![JointStates, Clock, Tf];
 /// The same, and feedback of a goal: after a pause and a reset none is due.
-pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = &[
-    Topic::JointStates.name(),
-    Topic::JointStates.short_name(),
-    Topic::Clock.name(),
-    Topic::Clock.short_name(),
-    Topic::Tf.name(),
-    Topic::Tf.short_name(),
-    Topic::IkFeedback.name(),
-    Topic::IkFeedback.short_name(),
-];
+pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = spellings![JointStates, Clock, Tf, IkFeedback];
 
 impl Topic {
     /// The topic's name on the wire.

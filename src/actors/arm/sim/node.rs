@@ -56,7 +56,7 @@ pub struct ArmSim<const N: usize> {
     pub(super) simulation: Simulation<N>,
     pub(super) pacer: Pacer,
     pub(super) paused: bool,
-    /// Simulation time at the latest change of that, or at the reset since \[s\].
+    /// Simulation time at the latest pause, or at the reset since \[s\].
     pub(super) paused_at: f64,
     /// A wake-up after a [`BREATHER`] is on its way.
     pub(super) catching_up: bool,

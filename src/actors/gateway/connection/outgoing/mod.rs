@@ -83,26 +83,23 @@ impl Outgoing {
 
     /// Adds a topic message, or a series of them, that is ready to be sent.
     pub(super) fn push(&self, topic: &Arc<str>, frame: Bytes) {
-        let mut outbox = self.outbox.borrow_mut();
-        let before = outbox.dropped();
-        let now = self.now(&outbox);
-        outbox.push(topic, frame, now.into_std());
-        let dropped = outbox.dropped() - before;
-        if outbox.is_throttled() {
+        self.counting_dropped(|outbox| outbox.push(topic, frame, self.now(outbox).into_std()));
+        if self.outbox.borrow().is_throttled() {
             // It may be held back, and the writer has to know until when.
             self.wake_writer();
         }
-        drop(outbox);
-        self.charge.count_dropped(dropped);
     }
 
     /// Adds feedback of a goal.
     pub(super) fn push_feedback(&self, frame: Bytes) {
+        self.counting_dropped(|outbox| outbox.push_feedback(frame));
+    }
+
+    fn counting_dropped(&self, push: impl FnOnce(&mut Outbox)) {
         let mut outbox = self.outbox.borrow_mut();
         let before = outbox.dropped();
-        outbox.push_feedback(frame);
-        let dropped = outbox.dropped() - before;
-        self.charge.count_dropped(dropped);
+        push(&mut outbox);
+        self.charge.count_dropped(outbox.dropped() - before);
     }
 
     /// Adds a response or a status. Discards held-back and unencoded messages on `superseded` topics: they are older.

@@ -1,0 +1,70 @@
+//! The servo's gains, handed in and out.
+//!
+//! **Invariant:** a gain that is left out is one that the caller of [`read`] knows.
+
+use numpy::ToPyArray;
+use pendularm::math::pid::Gains;
+use pyo3::PyTypeInfo;
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
+use pyo3::types::PyDict;
+
+use crate::arrays::joints;
+use crate::fields::{self, Bound, Held, Object, Whole, refused, shown};
+
+/// The gains of a fresh runtime: `kp` [N m/rad], `ki` [N m/(rad s)] and `kd` [N m s/rad], (links,) each.
+#[pyfunction]
+#[pyo3(signature = (links=Whole::Is(2)), text_signature = "(links=2)")]
+pub(crate) fn default_gains(py: Python<'_>, links: Whole) -> PyResult<Held<'_, PyDict>> {
+    fn listed<const N: usize>(gains: Gains<N>) -> [(&'static str, Vec<f64>); 3] {
+        [("kp", gains.kp), ("ki", gains.ki), ("kd", gains.kd)]
+            .map(|(name, gain)| (name, gain.to_vec()))
+    }
+    let gains = match fields::links(links)? {
+        2 => listed(Gains::<2>::default()),
+        _ => listed(Gains::<3>::default()),
+    };
+    let found = PyDict::new(py);
+    for (name, values) in gains {
+        found.set_item(name, values.to_pyarray(py))?;
+    }
+    Ok(found)
+}
+
+/// Gains by their names, `{"kp": …, "ki": …, "kd": …}`; one that is left out is that of `missing`.
+pub(crate) fn read<const N: usize>(
+    value: Option<&Object<'_>>,
+    missing: Gains<N>,
+) -> PyResult<Gains<N>> {
+    let Some(value) = value else {
+        return Ok(missing);
+    };
+    let gains = PyDict::type_object(value.py())
+        .call1((value,))
+        .ok()
+        .and_then(|gains| gains.cast_into::<PyDict>().ok())
+        .ok_or_else(|| {
+            refused(format_args!(
+                "gains must be a mapping with kp, ki and kd, got {}",
+                shown(value)
+            ))
+        })?;
+    for name in gains.keys() {
+        if !["kp", "ki", "kd"].contains(&name.to_string().as_str()) {
+            return Err(refused(format_args!(
+                "gains has kp, ki and kd, got {}",
+                shown(&name)
+            )));
+        }
+    }
+    let part = |name: &str, missing: [f64; N]| match gains.get_item(name)? {
+        Some(value) if !value.is_none() => {
+            joints(&format!("gains.{name}"), &value, Bound::NotNegative)
+        }
+        _ => Ok(missing),
+    };
+    Ok(Gains {
+        kp: part("kp", missing.kp)?,
+        ki: part("ki", missing.ki)?,
+        kd: part("kd", missing.kd)?,
+    })
+}
