@@ -44,16 +44,16 @@ CARGO_NET_OFFLINE=true "${cut[@]}" make build
 say "starting the program on a free port"
 ARM_SIM_BIND=127.0.0.1:0 ARM_SIM_LINKS=3 ./target/release/pendularm >"$work/out" 2>"$work/err" &
 server=$!
-for _ in $(seq 100); do
+for _ in $(seq 600); do
     grep -q '^listening on 127\.0\.0\.1:[1-9]' "$work/out" && break
     kill -0 "$server" 2>/dev/null || break
     sleep 0.1
 done
-grep '^listening on 127\.0\.0\.1:[1-9]' "$work/out" || fail "no listening line within 10 s: $(cat "$work/out" "$work/err")"
+grep '^listening on 127\.0\.0\.1:[1-9]' "$work/out" || fail "no listening line within 60 s: $(cat "$work/out" "$work/err")"
 port=$(sed -n 's/^listening on .*://p' "$work/out")
 exec 3<>"/dev/tcp/127.0.0.1/$port"
 echo '{"op":"call_service","service":"/arm_sim/set_params","id":1}' >&3
-IFS= read -r -t 10 reply <&3 || fail "no response within 10 s: $(cat "$work/err")"
+IFS= read -r -t 60 reply <&3 || fail "no response within 60 s: $(cat "$work/err")"
 echo "$reply"
 [[ $reply == *'"lengths":['*,*,*']'*'"result":true'* ]] || fail "not the parameters of a 3-link arm"
 kill -TERM "$server"

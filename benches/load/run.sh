@@ -31,7 +31,7 @@ program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
 # Waits until something listens on port $1; $2 is who it should be.
 await() {
     local tries
-    for tries in $(seq 100); do
+    for tries in $(seq 600); do
         ! (exec 3<>"/dev/tcp/127.0.0.1/$1") 2>/dev/null || return 0
         sleep 0.1
     done
@@ -57,14 +57,16 @@ persistence false
 sys_interval 0
 log_type error
 CONF
-chmod 755 "$scratch" # as root it becomes the user of that name, who has to read this
+# As root it becomes the user of that name, who has to read this, whatever the umask is.
+chmod 755 "$scratch"
+chmod 644 "$scratch/mosquitto.conf"
 mosquitto -c "$scratch/mosquitto.conf" >"$scratch/mosquitto.log" 2>&1 &
 mosquitto=$!
 pids+=("$mosquitto")
 "$program" --bind 127.0.0.1:0 --log warn >"$scratch/listening" 2>"$scratch/pendularm.log" &
 pendularm=$!
 pids+=("$pendularm")
-for _ in $(seq 100); do
+for _ in $(seq 600); do
     [ ! -s "$scratch/listening" ] || break
     sleep 0.1
 done

@@ -89,7 +89,7 @@ impl Program {
         })
     }
 
-    /// Starts another server, which listens at `address` within some seconds.
+    /// Starts another server, which listens at `address` within a minute.
     pub fn at(mut command: Command, address: SocketAddr) -> Result<Self, String> {
         let child = command
             .spawn()
@@ -99,7 +99,7 @@ impl Program {
             address,
             log: Arc::default(),
         };
-        for _ in 0..500 {
+        for _ in 0..6_000 {
             if TcpStream::connect(address).is_ok() {
                 return Ok(program);
             }

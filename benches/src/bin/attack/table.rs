@@ -57,6 +57,14 @@ impl fmt::Display for Bars {
     }
 }
 
+/// Whether every bar held; where some did not, whether times alone were missed.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    Held,
+    Late,
+    Missed,
+}
+
 /// The outcome of an attack.
 pub struct Row {
     pub name: String,
@@ -100,25 +108,30 @@ pub fn print_head() {
 }
 
 impl Row {
-    /// Prints it; whether every bar held.
-    pub fn print(&self, bars: &Bars) -> bool {
+    /// Prints it, and judges it.
+    pub fn print(&self, bars: &Bars) -> Verdict {
         let health = &self.health;
         let (delays, visits) = (&health.delays, &health.visits);
         let at = |part: f64| {
             delays.get(((delays.len() as f64 * part) as usize).min(delays.len().wrapping_sub(1)))
         };
         let [p50, p99, most] = [0.5, 0.99, 1.0].map(|part| at(part).copied().unwrap_or(f64::NAN));
-        let mut held = health.faults.is_empty();
+        let (mut is_sound, mut is_prompt) = (health.faults.is_empty(), true);
+        let star = |text: String, holds: bool| format!("{text}{}", if holds { " " } else { "*" });
         let mut mark = |text: String, holds: bool| {
-            held &= holds;
-            format!("{text}{}", if holds { " " } else { "*" })
+            is_sound &= holds;
+            star(text, holds)
+        };
+        let mut mark_time = |text: String, holds: bool| {
+            is_prompt &= holds;
+            star(text, holds)
         };
         let answered = mark(
             format!("{}/{}", delays.len(), health.asked),
             delays.len() == health.asked,
         );
-        let p99 = mark(format!("{p99:.1}"), p99 <= bars.p99);
-        let gap = mark(
+        let p99 = mark_time(format!("{p99:.1}"), p99 <= bars.p99);
+        let gap = mark_time(
             format!("{:.0}", health.longest_gap),
             health.longest_gap <= bars.gap,
         );
@@ -126,10 +139,8 @@ impl Row {
         let served = mark(format!("{}/{}", visits.served, visits.made), welcome);
         let peak = mark(format!("{:.0}", self.peak), self.peak <= bars.peak);
         let ended = match &self.ended {
-            Ok((time, status)) => mark(
-                time.as_millis().to_string(),
-                *time <= bars.end && *status == Some(0),
-            ),
+            Ok((time, Some(0))) => mark_time(time.as_millis().to_string(), *time <= bars.end),
+            Ok((time, _)) => mark(time.as_millis().to_string(), false),
             Err(_) => mark("never".to_owned(), false),
         };
         let (connections, sent) = (
@@ -154,7 +165,11 @@ impl Row {
         if let Err(why) = &self.ended {
             println!("     {why}");
         }
-        held
+        match (is_sound, is_prompt) {
+            (true, true) => Verdict::Held,
+            (true, false) => Verdict::Late,
+            (false, _) => Verdict::Missed,
+        }
     }
 }
 
