@@ -155,7 +155,7 @@ class Page:
         if "errorText" in result:
             raise BrowserError(f"{url}: {result['errorText']}")
         if "loaderId" in result:
-            self._loaded.get(timeout=30)
+            self._loaded.get(timeout=ANSWER_SECONDS)
 
     def close(self):
         self.browser.send("Target.closeTarget", {"targetId": self.target})
@@ -168,7 +168,7 @@ class Page:
             raise BrowserError(details.get("exception", {}).get("description") or details["text"])
         return answer["result"].get("value")
 
-    def until(self, expression, seconds=10, why=""):
+    def until(self, expression, seconds=60, why=""):
         """Waits until the expression is true, and gives its value."""
         end = time.monotonic() + seconds
         while not (value := self.run(expression)):

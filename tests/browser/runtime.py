@@ -12,6 +12,8 @@ import subprocess
 import threading
 
 BINARY = os.environ.get("PENDULARM", "target/debug/pendularm")
+# Far longer than anything takes [s]; who waits so long has failed.
+PATIENCE = 30
 
 
 class Runtime:
@@ -26,12 +28,12 @@ class Runtime:
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         line = self.process.stdout.readline()
         if not line.startswith("listening on "):
-            raise RuntimeError(f"{command}: said {line!r}, status {self.process.wait(5)}")
+            raise RuntimeError(f"{command}: said {line!r}, status {self.process.wait(PATIENCE)}")
         self.port = int(line.rsplit(":", 1)[1])
 
     def stop(self):
         self.process.send_signal(signal.SIGTERM)
-        self.process.wait(5)
+        self.process.wait(PATIENCE)
         self.process.stdout.close()
 
     def restart(self, links=None):
@@ -52,7 +54,7 @@ class Runtime:
 
     def call(self, service, **args):
         """The response to a call over raw TCP."""
-        with socket.create_connection(("127.0.0.1", self.port), 5) as tcp, tcp.makefile("rw") as lines:
+        with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as tcp, tcp.makefile("rw") as lines:
             lines.write(json.dumps({"op": "call_service", "service": service, "args": args}) + "\n")
             lines.flush()
             while (frame := json.loads(lines.readline()))["op"] != "service_response":
@@ -66,7 +68,7 @@ class Runtime:
 
     def next(self, topic):
         """The next message on a topic."""
-        with socket.create_connection(("127.0.0.1", self.port), 5) as tcp, tcp.makefile("rw") as lines:
+        with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as tcp, tcp.makefile("rw") as lines:
             lines.write(json.dumps({"op": "subscribe", "topic": topic}) + "\n")
             lines.flush()
             while (frame := json.loads(lines.readline()))["op"] != "publish":
@@ -91,7 +93,7 @@ class Provider:
     """A client that provides services, each a function from arguments to values; use it with `with`."""
 
     def __init__(self, port, services):
-        self.tcp = socket.create_connection(("127.0.0.1", port), 5)
+        self.tcp = socket.create_connection(("127.0.0.1", port), PATIENCE)
         self.tcp.settimeout(None)
         # For reading only: writing through the same object would drop the lines that it has read ahead.
         self.lines = self.tcp.makefile("r")

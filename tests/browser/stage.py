@@ -88,7 +88,7 @@ class PageTest(unittest.TestCase):
         self.runtime.call("/arm_sim/pause", data=True)
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
 
-    def wait(self, done, why, seconds=15):
+    def wait(self, done, why, seconds=60):
         """Waits for something of the runtime."""
         end = time.monotonic() + seconds
         while not done():

@@ -80,7 +80,8 @@ class Token(PageTest):
         self.assertEqual(page.run("location.search + location.hash"), "?theme=x#links=2")
         self.assertEqual(page.run("document.cookie"), "")
         self.page = page
-        page.run("location.reload()")
+        page.run("window.old = 1; location.reload()")
+        page.until("window.old === undefined", why="the page anew")
         self.connected()
 
     def test_a_page_opened_without_it_is_turned_away(self):

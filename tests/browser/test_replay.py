@@ -1,11 +1,11 @@
 """A record in the arm's place: the page shows the arm as it was, says that it is a replay, and moves through it."""
 
+import math
 import pathlib
 import subprocess
 import tempfile
-import time
 
-from runtime import BINARY, Runtime
+from runtime import BINARY, PATIENCE, Runtime
 from stage import PageTest
 
 
@@ -17,7 +17,7 @@ class Player(Runtime):
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
         line = self.process.stdout.readline()
         if not line.startswith("listening on "):
-            raise RuntimeError(f"{command}: said {line!r}, status {self.process.wait(5)}")
+            raise RuntimeError(f"{command}: said {line!r}, status {self.process.wait(PATIENCE)}")
         self.port = int(line.rsplit(":", 1)[1])
 
 
@@ -30,10 +30,15 @@ class Replaying(PageTest):
             live.call("/arm_sim/set_params", gravity=4)
             live.call("/pid_controller/enable", data=True)
             live.call("/ik_action/send_goal", x=0.5, y=1.2)
-            time.sleep(4)
+            self.wait(lambda: self.is_done(live), "four seconds on record, and the arm at rest at its goal")
         self.runtime = Player(record)
         self.addCleanup(self.runtime.__exit__)
         self.page = self.open(**self.view)
+
+    def is_done(self, live):
+        state = live.next("/joint_states")
+        is_at_rest = max(map(abs, state["velocity"])) < 1e-2
+        return state["header"]["stamp"]["sec"] >= 4 and is_at_rest and math.dist(live.tip(), (0.5, 1.2)) < 0.02
 
     def seek(self, part):
         self.page.run(
@@ -46,7 +51,7 @@ class Replaying(PageTest):
         self.page.click("#pause")
         self.page.until("document.querySelector('#run-state').textContent === 'paused'")
         self.seek(1)
-        self.page.until("document.querySelector('#player-time').textContent.match(/^4\\.\\d of 4\\.\\d s$/)", why="its end")
+        self.page.until("document.querySelector('#player-time').textContent.match(/^(\\d+\\.\\d) of \\1 s$/)", why="its end")
         self.page.until("own('store.js').then(({ state }) => Math.hypot(Math.cos(state.position[0]) + Math.cos(state.position[0] + state.position[1]) - 0.5,"
                         " Math.sin(state.position[0]) + Math.sin(state.position[0] + state.position[1]) - 1.2) < 0.05)", why="at the goal, as it was")
         self.keep("replay")
