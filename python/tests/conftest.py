@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import sysconfig
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -76,6 +77,45 @@ def runtime(links: int) -> Iterator[Runtime]:
     one = Runtime("--links", str(links))
     yield one
     one.end()
+
+
+@pytest.fixture
+def start_child() -> Iterator[Callable[[str], "subprocess.Popen[str]"]]:
+    """Starts a script in an interpreter of its own. It ends with the test at the latest, and after some time in any
+    case, so that nobody waits for its next line for ever."""
+    started = []
+
+    def start(script: str) -> "subprocess.Popen[str]":
+        run = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
+        limit = threading.Timer(2 * PATIENCE, run.kill)
+        limit.start()
+        started.append((run, limit))
+        return run
+
+    yield start
+    for run, limit in started:
+        limit.cancel()
+        run.kill()
+        run.wait(PATIENCE)
+        assert run.stdout is not None
+        run.stdout.close()
+
+
+@pytest.fixture
+def play_notebook() -> Callable[..., None]:
+    """Runs all cells of a notebook. It talks to its kernel over files: a port that is chosen may be somebody else's
+    when the kernel takes it."""
+
+    def play(book: object, **options: object) -> None:
+        import nbclient
+        from traitlets.config import Config
+
+        # The name of a socket's file may be no longer than a hundred characters or so.
+        with tempfile.TemporaryDirectory() as folder:
+            config = Config({"KernelManager": {"transport": "ipc", "ip": f"{folder}/kernel"}})
+            nbclient.NotebookClient(book, timeout=300, config=config, **options).execute()
+
+    return play
 
 
 @pytest.fixture

@@ -249,19 +249,24 @@ class Interrupted(Exception):
     pass
 
 
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers that send signals here")
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="there is no such signal here")
 def test_an_interrupted_call_leaves_no_effort_on(links):
     def interrupt(*_):
         raise Interrupted
 
     batch = pendularm.Batch(3, links, threads=1)
+
+    def interrupt_amid():
+        while batch.time[0] == 0:
+            time.sleep(0.001)
+        signal.raise_signal(signal.SIGALRM)
+
     before = signal.signal(signal.SIGALRM, interrupt)
     try:
-        signal.setitimer(signal.ITIMER_REAL, 0.2)
+        threading.Thread(target=interrupt_amid, daemon=True).start()
         with pytest.raises(Interrupted):
             batch.step([10**12, 0, 10**12], np.ones(links))
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
     assert batch.time[0] > 0
     assert (batch.effort[0] == 1).all()
@@ -275,26 +280,37 @@ def test_an_interrupted_call_leaves_no_effort_on(links):
 
 
 def test_what_is_refused_has_not_happened():
-    batch, other = pendularm.Batch(2), pendularm.Batch(1, threads=1)
-    batch.set_setpoint([1.0, 1.0])
-    batch.enable()
-    batch.step(100)
-    before = batch.energy.tolist()
-    pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base[:1]))
-    pushing.start()
-    try:
-        # From its first piece on; there are a dozen.
-        while other.time[0] == 0:
-            time.sleep(0.001)
-        for change in [batch.reset, lambda: batch.set_state([0.1, 0.1]), lambda: batch.enable(False)]:
-            with pytest.raises(ValueError, match="own arrays are in use elsewhere"):
-                change()
-            assert batch.energy.tolist() == before
-        assert pushing.is_alive()
-    finally:
-        pushing.join()
-    batch.step()
-    assert batch.effort.any()
+    for _ in range(5):
+        batch, other = pendularm.Batch(2), pendularm.Batch(1, threads=1)
+        batch.set_setpoint([1.0, 1.0])
+        batch.enable()
+        batch.step(100)
+        before = batch.energy.tolist()
+        pushing = threading.Thread(target=other.step, args=(3_000_000, batch.position.base[:1]))
+        pushing.start()
+        try:
+            # From its first piece on; there are a dozen.
+            while other.time[0] == 0:
+                time.sleep(0.001)
+            refused = 0
+            for change in [batch.reset, lambda: batch.set_state([0.1, 0.1]), lambda: batch.enable(False)]:
+                try:
+                    change()
+                except ValueError as refusal:
+                    assert "own arrays are in use elsewhere" in str(refusal)
+                    assert batch.energy.tolist() == before
+                    refused += 1
+                else:
+                    assert not pushing.is_alive()
+                    break
+        finally:
+            pushing.join()
+        if refused == 3:
+            batch.step()
+            assert batch.effort.any()
+            return
+        # On a machine that is busy elsewhere the push may be over before all is tried: then once more.
+    raise AssertionError("it was too late each time")
 
 
 def test_the_interpreters_lock_is_released_while_it_steps(turns_of_another_thread):
@@ -314,12 +330,17 @@ def test_calls_of_several_threads_wait_for_each_other():
 
 
 def test_a_call_waits_for_the_whole_of_another():
-    batch, alone = pendularm.Batch(1, threads=1), pendularm.Batch(1, threads=1)
-    pushing = threading.Thread(target=batch.step, args=(5_000_000, [0.5, 0.0]))
-    pushing.start()
-    # From its first piece on; there are twenty.
-    while batch.time[0] == 0:
-        time.sleep(0.001)
+    # On a machine that is busy elsewhere the other may be over before this one is called: then once more.
+    for _ in range(5):
+        batch, alone = pendularm.Batch(1, threads=1), pendularm.Batch(1, threads=1)
+        pushing = threading.Thread(target=batch.step, args=(5_000_000, [0.5, 0.0]))
+        pushing.start()
+        # From its first piece on; there are twenty.
+        while batch.time[0] == 0:
+            time.sleep(0.001)
+        if batch.time[0] < 5000:
+            break
+        pushing.join()
     assert batch.time[0] < 5000
     batch.step(1000, [0.0, 0.25])
     pushing.join()
@@ -355,15 +376,19 @@ import os, pendularm, signal, threading, time
 batch = pendularm.Batch(1, threads=1)
 # The handler runs in the middle of the main thread's own call, and waits for nothing.
 signal.signal(signal.SIGALRM, lambda *_: print(batch.energy.size, batch.reset(), flush=True))
-signal.setitimer(signal.ITIMER_REAL, 0.05)
+def interrupt():
+    while batch.time[0] == 0:
+        time.sleep(0.001)
+    signal.raise_signal(signal.SIGALRM)
+threading.Thread(target=interrupt).start()
 batch.step(10_000_000)
 assert 0 < batch.time[0] < 10_000
 before = batch.time[0]
 threading.Thread(target=batch.step, args=(10**12,), daemon=True).start()
 while batch.time[0] == before:
     time.sleep(0.01)
-print("waiting", flush=True)
 try:
+    print("waiting", flush=True)
     batch.reset()
 except KeyboardInterrupt:
     print("heard", flush=True)
@@ -371,18 +396,15 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="there are no timers that send signals here")
-def test_who_waits_hears_signals():
-    with subprocess.Popen([sys.executable, "-c", WAITING], stdout=subprocess.PIPE, text=True) as run:
-        assert run.stdout is not None
-        assert run.stdout.readline() == "1 None\n"
-        assert run.stdout.readline() == "waiting\n"
-        time.sleep(0.2)
-        began = time.monotonic()
-        run.send_signal(signal.SIGINT)
-        assert run.stdout.readline() == "heard\n"
-        assert time.monotonic() - began < 5
-        assert run.wait(60) == 0
+@pytest.mark.skipif(not hasattr(signal, "SIGALRM"), reason="there is no such signal here")
+def test_who_waits_hears_signals(start_child):
+    run = start_child(WAITING)
+    assert run.stdout.readline() == "1 None\n"
+    assert run.stdout.readline() == "waiting\n"
+    time.sleep(0.2)
+    run.send_signal(signal.SIGINT)
+    assert run.stdout.readline() == "heard\n"
+    assert run.wait(60) == 0
 
 
 @pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted by what Linux lists")

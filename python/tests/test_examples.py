@@ -13,13 +13,11 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 # Jupyter's own warnings are Jupyter's.
 @pytest.mark.filterwarnings("ignore")
-def test_the_lesson_shows_what_it_says(tmp_path):
-    import nbclient
+def test_the_lesson_shows_what_it_says(tmp_path, play_notebook):
     import nbformat
 
     notebook = nbformat.read(EXAMPLES / "lesson.ipynb", as_version=4)
-    client = nbclient.NotebookClient(notebook, timeout=300, resources={"metadata": {"path": str(tmp_path)}})
-    client.execute()
+    play_notebook(notebook, resources={"metadata": {"path": str(tmp_path)}})
     outputs = [output for cell in notebook.cells for output in cell.get("outputs", [])]
     figures = [output for output in outputs if "image/png" in output.get("data", {})]
     assert len(figures) == 2
