@@ -21,6 +21,9 @@ PATIENCE = 60
 # So many places in which a record is cut; a prime, so that they lie anywhere in a chunk.
 CUTS = 23
 
+# A record that was ended ends as it begins.
+MAGIC = b"\x89MCAP0\r\n"
+
 OWN = {"/recorder/inputs", "/recorder/states", "/recorder/calls"}
 
 
@@ -61,16 +64,31 @@ def record(path, end):
         program.kill()
 
 
-def kill_when_it_is_written(program):
+def wait_until_it_is_written(path):
     deadline = time.monotonic() + PATIENCE
-    while not {"/joint_states", *OWN} <= set(front_to_back(killed)):
+    while len(heard := front_to_back(path)) < 150 or not {"/joint_states", "/diagnostics", *OWN} <= set(heard):
         assert time.monotonic() < deadline, "nothing is written before the end"
         time.sleep(0.2)
+
+
+def end_when_it_is_written(program):
+    wait_until_it_is_written(whole)
+    program.send_signal(signal.SIGTERM)
+
+
+def kill_when_it_is_written(program):
+    wait_until_it_is_written(killed)
     program.kill()
 
 
 whole, killed = Path(sys.argv[2]), Path(sys.argv[3])
-record(whole, lambda program: program.send_signal(signal.SIGTERM))
+# The program ends within a second of SIGTERM in any case; where the disk stands still for that long, the record has no
+# summary: then once more.
+for _ in range(3):
+    whole.unlink(missing_ok=True)
+    record(whole, end_when_it_is_written)
+    if whole.read_bytes().endswith(MAGIC):
+        break
 record(killed, kill_when_it_is_written)
 
 
