@@ -6,6 +6,7 @@ program is. To make them takes root, `ip`, `unshare` and `nsenter`; where one is
 Without `--bench` it checks what must hold anywhere; with it, it measures for longer and prints tables.
 """
 
+import contextlib
 import json
 import math
 import os
@@ -106,8 +107,12 @@ class Watchers:
 
 def processor_time(program):
     """Nanoseconds that its threads have run, as the scheduler counts them."""
-    tasks = Path(f"/proc/{program.process.pid}/task").iterdir()
-    return sum(int((task / "schedstat").read_text().split()[0]) for task in tasks)
+    ran = 0
+    for task in Path(f"/proc/{program.process.pid}/task").iterdir():
+        # A thread may have ended since it was listed.
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            ran += int((task / "schedstat").read_text().split()[0])
+    return ran
 
 
 def spread(values):
@@ -149,16 +154,31 @@ class Scene:
         for one in self.watchers:
             one.wait_until_each_has(1)
 
+    def messages_and_bytes(self):
+        """What the first watcher has heard and what went over the link, as good as at one moment."""
+
+        def get():
+            before = self.watchers[0].read()["watchers"][0]["count"]
+            sent = self.near.sent()
+            after = self.watchers[0].read()["watchers"][0]["count"]
+            # Two looks take about a twentieth of a second, unless the machine is busy elsewhere.
+            return (before, sent) if after - before < 10 else None
+
+        return wait_for("a moment's figures", get)
+
     def measure(self):
         """One row of figures."""
         programs = {**self.programs, "near router": self.near_router, "far router": self.far_router}
         # The first of them last: its messages are counted from here on, as is what goes over the link.
         for one in reversed(self.watchers):
             one.begin()
-        began, sent = time.monotonic(), self.near.sent()
+        began = time.monotonic()
+        heard_before, sent_before = self.messages_and_bytes()
         ran = {name: processor_time(program) for name, program in programs.items()}
         first = self.watchers[0].wait_until_each_has(MESSAGES)
-        took, sent = time.monotonic() - began, self.near.sent() - sent
+        took = time.monotonic() - began
+        heard_then, sent_then = self.messages_and_bytes()
+        sent, messages = sent_then - sent_before, heard_then - heard_before
         ran = {name: processor_time(program) - ran[name] for name, program in programs.items()}
         heard = [one for watchers in self.watchers for one in watchers.read()["watchers"]]
         rows = first["rows"]
@@ -166,8 +186,8 @@ class Scene:
             "watchers": len(heard),
             "rate": len(rows) / took,
             "missing": sum(one["missing"] for one in heard),
-            "bytes": sent / took,
-            "bytes a message": sent / len(rows),
+            "bytes": sent / messages * len(rows) / took,
+            "bytes a message": sent / messages,
             "hop": spread((came - gone) * 1e-6 for _, gone, came in rows),
             "processor": {name: 100e-9 * of / took for name, of in ran.items()},
         }

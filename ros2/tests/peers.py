@@ -4,6 +4,7 @@ The router is eclipse-zenoh, the other ROS 2 nodes are zenoh-ros2-sdk, hashes an
 (Jazzy). NODE is a program with a node of the crate ros2-client, if one was built.
 """
 
+import contextlib
 import json
 import logging
 import os
@@ -25,12 +26,17 @@ ARM, BRIDGE, *NODE = sys.argv[1:]
 DOMAIN = 7
 JAZZY = get_typestore(Stores.ROS2_JAZZY)
 LATCHED = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+kept_ports = []
 
 
 def free_port():
-    with socket.socket() as one:
-        one.bind(("127.0.0.1", 0))
-        return one.getsockname()[1]
+    """A port that stays free for who is told of it: a socket of ours has it, does not listen, and lets those have it too
+    who ask for it by its number."""
+    one = socket.socket()
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    one.bind(("127.0.0.1", 0))
+    kept_ports.append(one)
+    return one.getsockname()[1]
 
 
 def start_arm(port, *more):
@@ -164,7 +170,8 @@ def test_joint_states_are_decoded_and_numbered(peer, session):
         assert state.name == ["joint1", "joint2"], state
         assert [len(state.position), len(state.velocity), len(state.effort)] == [2, 2, 2], state
     stamps = [state.header.stamp.sec + state.header.stamp.nanosec * 1e-9 for state in heard]
-    assert stamps == sorted(set(stamps)), stamps
+    # A tick that comes late is followed at once by the next, perhaps before the arm has taken a step.
+    assert stamps == sorted(stamps) and len(set(stamps)) >= 100, stamps
     wait_for("120 attachments", lambda: len(attachments) >= 120)
     watcher.undeclare()
     numbers = [one.sequence_id for one in attachments]
@@ -358,21 +365,22 @@ def test_a_goal_is_sent_as_an_action(peer, session):
     states = peer.subscribe(f"{place}status", "action_msgs/msg/GoalStatusArray", qos=LATCHED)
     of = send.session_mgr.store.types
 
-    def goal(number, x, y):
+    def goal(number, x, y, success_hold=0.0):
         name = of[UUID](uuid=numpy.full(16, number, dtype=numpy.uint8))
         goal_type = next(one for kind, one in of.items() if kind.endswith("MoveToGoal"))
-        sent = send.call(goal_id=name, goal=goal_type(x=x, y=y, phi=0.0, epsilon=0.0, success_hold=0.0))
+        sent = send.call(goal_id=name, goal=goal_type(x=x, y=y, phi=0.0, epsilon=0.0, success_hold=success_hold))
         return name, sent.accepted
 
     name, accepted = goal(1, 1.0, 1.0)
     assert accepted
     ended = wait.call(goal_id=name)
     assert ended.status == 4 and ended.result.final_distance < 0.02, ended
-    mine = [one for one in heard if list(one.goal_id.uuid) == [1] * 16]
-    assert mine and all(len(one.feedback.positions) == 2 for one in mine), heard
+    mine = wait_for("feedback", lambda: [one for one in heard if list(one.goal_id.uuid) == [1] * 16])
+    assert all(len(one.feedback.positions) == 2 for one in mine), heard
     _, accepted = goal(2, 5.0, 5.0)
     assert not accepted, "five metres are out of reach"
-    name, accepted = goal(3, -1.0, 0.5)
+    # It does not end by itself, however late it is cancelled.
+    name, accepted = goal(3, -1.0, 0.5, success_hold=1e6)
     assert accepted
     everything = of["action_msgs/msg/GoalInfo"](goal_id=name, stamp=of[TIME](sec=0, nanosec=0))
     cancelled = cancel.call(goal_info=everything)
@@ -543,7 +551,11 @@ def test_the_bridge_listens_nowhere(bridge):
     folder = Path(f"/proc/{bridge.process.pid}")
     if not folder.exists():
         return
-    open_files = {os.readlink(one) for one in (folder / "fd").iterdir()}
+    open_files = set()
+    for one in (folder / "fd").iterdir():
+        # It may have been closed since it was listed.
+        with contextlib.suppress(FileNotFoundError):
+            open_files.add(os.readlink(one))
     states = []
     for table in ["tcp", "tcp6", "udp", "udp6"]:
         rows = [line.split() for line in (folder / "net" / table).read_text().splitlines()[1:]]
