@@ -80,12 +80,12 @@ def runtime(links: int) -> Iterator[Runtime]:
 
 
 @pytest.fixture
-def start_child() -> Iterator[Callable[[str], "subprocess.Popen[str]"]]:
+def start_child() -> Iterator[Callable[[str], subprocess.Popen[str]]]:
     """Starts a script in an interpreter of its own. It ends with the test at the latest, and after some time in any
     case, so that nobody waits for its next line for ever."""
     started = []
 
-    def start(script: str) -> "subprocess.Popen[str]":
+    def start(script: str) -> subprocess.Popen[str]:
         run = subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True)
         limit = threading.Timer(2 * PATIENCE, run.kill)
         limit.start()
