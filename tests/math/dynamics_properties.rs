@@ -8,6 +8,7 @@ use pendularm::math::dynamics::{
 use proptest::array::uniform;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
+use std::fmt::Debug;
 use std::hint::black_box;
 
 /// Half the distance from 1 to the next number: the relative error of one rounding.
@@ -45,12 +46,17 @@ fn motion<const N: usize>() -> impl Strategy<Value = Motion<N>> {
     )
 }
 
-fn for_any<S: Strategy>(strategy: S, check: impl Fn(S::Value) -> Result<(), TestCaseError>) {
+type Check<'a, T> = &'a dyn Fn(T) -> Result<(), TestCaseError>;
+
+/// The runner is large: it is compiled for each type of value, not for each check.
+fn for_any<T: Debug>(strategy: impl Strategy<Value = T> + 'static, check: Check<'_, T>) {
     let config = ProptestConfig {
         source_file: Some(file!()),
         ..ProptestConfig::default()
     };
-    TestRunner::new(config).run(&strategy, check).unwrap();
+    TestRunner::new(config)
+        .run(&strategy.boxed(), check)
+        .unwrap();
 }
 
 /// Every element within `relative` of the largest magnitude that went into it.
@@ -113,7 +119,7 @@ fn slope(f: impl Fn(f64) -> f64, step: f64) -> f64 {
 #[test]
 fn the_terms_are_those_of_the_lagrangian() {
     fn check<const N: usize>() {
-        for_any(motion::<N>(), |Motion { arm, q, qd, .. }| {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, .. }| {
             let kinetic = |q: &[f64; N], qd: &[f64; N]| quadrature(&arm, q, qd).0;
             // ∂T/∂q̇_i, exact but for rounding: T is quadratic in q̇.
             let momentum = |q: &[f64; N], i: usize| {
@@ -155,27 +161,24 @@ fn the_terms_are_those_of_the_lagrangian() {
 #[test]
 fn inverse_dynamics_are_the_sum_of_the_three_terms() {
     fn check<const N: usize>() {
-        for_any(
-            motion::<N>(),
-            |Motion {
-                 arm,
-                 q,
-                 qd,
-                 tau: qdd,
-             }| {
-                let (m, c, g) = (
-                    mass_matrix(&arm, &q),
-                    coriolis(&arm, &q, &qd),
-                    gravity_load(&arm, &q),
-                );
-                let sum: [f64; N] = std::array::from_fn(|i| {
-                    (0..N).map(|j| m[i][j] * qdd[j]).sum::<f64>() + c[i] + g[i]
-                });
-                let scale = largest(m.as_flattened()) * largest(&qdd) + largest(&c) + largest(&g);
-                // Some 2 n² terms are summed in another order.
-                close(&inverse_dynamics(&arm, &q, &qd, &qdd), &sum, scale, 1e-13)
-            },
-        );
+        for_any(motion::<N>(), &|Motion {
+                                     arm,
+                                     q,
+                                     qd,
+                                     tau: qdd,
+                                 }| {
+            let (m, c, g) = (
+                mass_matrix(&arm, &q),
+                coriolis(&arm, &q, &qd),
+                gravity_load(&arm, &q),
+            );
+            let sum: [f64; N] = std::array::from_fn(|i| {
+                (0..N).map(|j| m[i][j] * qdd[j]).sum::<f64>() + c[i] + g[i]
+            });
+            let scale = largest(m.as_flattened()) * largest(&qdd) + largest(&c) + largest(&g);
+            // Some 2 n² terms are summed in another order.
+            close(&inverse_dynamics(&arm, &q, &qd, &qdd), &sum, scale, 1e-13)
+        });
     }
     for_one_to_six_links!(check);
 }
@@ -183,7 +186,7 @@ fn inverse_dynamics_are_the_sum_of_the_three_terms() {
 #[test]
 fn inverse_dynamics_give_back_the_effort_of_forward_dynamics() {
     fn check<const N: usize>() {
-        for_any(motion::<N>(), |Motion { arm, q, qd, tau }| {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, tau }| {
             let qdd = forward_dynamics(&arm, &q, &qd, &tau);
             let back = inverse_dynamics(&arm, &q, &qd, &qdd);
             // Two and a half digits of `qdd` may be gone (see above), which the largest inertia brings into the effort.
@@ -197,7 +200,7 @@ fn inverse_dynamics_give_back_the_effort_of_forward_dynamics() {
 #[test]
 fn the_mass_matrix_is_symmetric_and_positive_definite() {
     fn check<const N: usize>() {
-        for_any(motion::<N>(), |Motion { arm, q, .. }| {
+        for_any(motion::<N>(), &|Motion { arm, q, .. }| {
             let m = mass_matrix(&arm, &q);
             // Cholesky: all pivots positive, of a matrix that equals its transpose bit for bit.
             let mut l = [[0.0_f64; N]; N];
@@ -218,7 +221,7 @@ fn the_mass_matrix_is_symmetric_and_positive_definite() {
 #[test]
 fn the_energy_grows_by_the_power_of_the_efforts() {
     fn check<const N: usize>() {
-        for_any(motion::<N>(), |Motion { arm, q, qd, tau }| {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, tau }| {
             let qdd = forward_dynamics(&arm, &q, &qd, &tau);
             // Along any path that starts with these rates and accelerations, dE/dt = τ · q̇.
             let after = |h: f64| State {
@@ -247,24 +250,25 @@ fn the_energy_grows_by_the_power_of_the_efforts() {
 #[test]
 fn a_wound_joint_moves_like_an_unwound_one() {
     fn check<const N: usize>() {
-        for_any(
-            (motion::<N>(), 0..N, -1e8..1e8_f64),
-            |(motion, joint, angle)| {
-                let Motion {
-                    arm,
-                    mut q,
-                    qd,
-                    tau,
-                } = motion;
-                q[joint] = angle;
-                let wound = forward_dynamics(&arm, &q, &qd, &tau);
-                q[joint] = f64::atan2(angle.sin(), angle.cos());
-                let unwound = forward_dynamics(&arm, &q, &qd, &tau);
-                // The rest of the scale is how strongly accelerations depend on an angle: up to the conditioning of the arm.
-                let scale = largest(&wound) + largest(&qd).powi(2) + arm.gravity() + largest(&tau);
-                close(&wound, &unwound, scale, 1e-10)
-            },
-        );
+        for_any((motion::<N>(), 0..N, -1e8..1e8_f64), &|(
+            motion,
+            joint,
+            angle,
+        )| {
+            let Motion {
+                arm,
+                mut q,
+                qd,
+                tau,
+            } = motion;
+            q[joint] = angle;
+            let wound = forward_dynamics(&arm, &q, &qd, &tau);
+            q[joint] = f64::atan2(angle.sin(), angle.cos());
+            let unwound = forward_dynamics(&arm, &q, &qd, &tau);
+            // The rest of the scale is how strongly accelerations depend on an angle: up to the conditioning of the arm.
+            let scale = largest(&wound) + largest(&qd).powi(2) + arm.gravity() + largest(&tau);
+            close(&wound, &unwound, scale, 1e-10)
+        });
     }
     for_one_to_six_links!(check);
 }
@@ -273,7 +277,7 @@ fn a_wound_joint_moves_like_an_unwound_one() {
 #[test]
 fn without_gravity_the_first_angle_changes_no_bit() {
     fn check<const N: usize>() {
-        for_any((motion::<N>(), -1e9..1e9_f64), |(motion, first)| {
+        for_any((motion::<N>(), -1e9..1e9_f64), &|(motion, first)| {
             let Motion {
                 arm,
                 mut q,
@@ -294,7 +298,7 @@ fn without_gravity_the_first_angle_changes_no_bit() {
 #[test]
 fn leaving_out_the_first_angle_changes_no_bit() {
     fn check<const N: usize>() {
-        for_any(motion::<N>(), |Motion { arm, q, qd, tau }| {
+        for_any(motion::<N>(), &|Motion { arm, q, qd, tau }| {
             let arm = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap();
             let whole = forward_dynamics(&arm, &q, &qd, &tau);
             let less = weightless_dynamics(&arm, &q, &qd, &tau);
@@ -308,7 +312,7 @@ fn leaving_out_the_first_angle_changes_no_bit() {
 #[test]
 fn without_gravity_and_effort_a_resting_arm_stays_at_rest() {
     fn check<const N: usize>() {
-        for_any(motion::<N>(), |Motion { arm, q, .. }| {
+        for_any(motion::<N>(), &|Motion { arm, q, .. }| {
             let arm = Arm::new(*arm.lengths(), *arm.masses(), 0.0).unwrap();
             let qdd = forward_dynamics(&arm, &q, &[0.0; N], &[0.0; N]);
             prop_assert!(qdd.iter().all(|a| *a == 0.0), "{qdd:?}");
@@ -336,7 +340,7 @@ fn extreme_but_valid_input_never_panics() {
         let positive = || uniform::<_, N>((-307.0..308.0).prop_map(|e: f64| 10_f64.powf(e)));
         let any = || uniform::<_, N>(proptest::num::f64::ANY);
         let input = (positive(), positive(), 0.0..1e300, any(), any(), any());
-        for_any(input, |(lengths, masses, gravity, q, qd, tau)| {
+        for_any(input, &|(lengths, masses, gravity, q, qd, tau)| {
             let arm = Arm::new(lengths, masses, gravity).unwrap();
             let state = State {
                 position: q,
