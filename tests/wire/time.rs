@@ -208,8 +208,8 @@ fn a_new_timestep_starts_its_step_afresh() {
 }
 
 /// At a timestep of 1e-8 s no machine keeps up. Were each call to bring 5 ms of steps of its own, these 5120 would take
-/// more than 25 s; while only wake-ups step, they take a second or two. Several callers, so that a wake-up has more than
-/// one call to answer where processors are busy and each goes to and fro slowly.
+/// more than 25 s; while only wake-ups step, they take a second or two. Several callers, so that a wake-up has more
+/// than one call to answer where processors are busy and each goes to and fro slowly.
 #[test]
 fn calls_to_an_arm_that_cannot_keep_up_do_not_each_cost_a_wake_up() {
     let runtime = Runtime::start();
