@@ -1,7 +1,8 @@
 //! The cost that one execution may have: processor time and memory, by the bytes of its input.
 //!
-//! Time is looked at on the wall first. Where that was too long, the execution is done again and its thread's own time counts:
-//! a busy machine makes nothing fail.
+//! Time is looked at on the wall first. Where that was too long, the execution is done again and its thread's own time
+//! counts. That is longer, too, where others empty the caches and share the core: the least of a few counts, so that a
+//! busy machine makes nothing fail and what is too dear by itself always does.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -36,6 +37,9 @@ pub const DOING: Allowance = Allowance {
     memory_per_byte: 0,
 };
 
+/// How often an execution that took too long is done again at most.
+const REPETITIONS: usize = 5;
+
 /// Runs an execution on an input of so many bytes, within what it may cost.
 pub fn hold(bytes: usize, allowance: Allowance, execution: impl Fn()) {
     let factor = u32::try_from(bytes).unwrap_or(u32::MAX);
@@ -53,10 +57,16 @@ pub fn hold(bytes: usize, allowance: Allowance, execution: impl Fn()) {
     if began.elapsed() <= time {
         return;
     }
-    let began = processor_time();
-    execution();
-    let took = processor_time().saturating_sub(began);
-    assert!(took <= time, "{took:?} for {bytes} bytes of input");
+    let mut least = Duration::MAX;
+    for _ in 0..REPETITIONS {
+        let began = processor_time();
+        execution();
+        least = least.min(processor_time().saturating_sub(began));
+        if least <= time {
+            return;
+        }
+    }
+    panic!("{least:?} for {bytes} bytes of input");
 }
 
 /// How long this thread has run.

@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 pub use pendularm_client::blocking::{Client, PATIENCE};
@@ -38,6 +38,24 @@ fn without_variables(mut command: Command) -> Command {
         command.env_remove(variable);
     }
     command
+}
+
+/// The exit status of what must end by itself, and how long that took. A machine that stands still wakes nobody: a look
+/// that comes late counts for ten times what it should have taken at most.
+pub fn end(child: &mut Child) -> (ExitStatus, Duration) {
+    const PAUSE: Duration = Duration::from_millis(5);
+    let began = Instant::now();
+    let (mut last, mut took) = (began, Duration::ZERO);
+    loop {
+        let status = child.try_wait().expect("the child can be asked");
+        took += last.elapsed().min(10 * PAUSE);
+        if let Some(status) = status {
+            return (status, took);
+        }
+        assert!(began.elapsed() < PATIENCE, "it does not end");
+        last = Instant::now();
+        std::thread::sleep(PAUSE);
+    }
 }
 
 /// The program, running; ended with the value.
@@ -125,8 +143,13 @@ impl Runtime {
         assert_eq!(parameters["gravity"], 9.81);
     }
 
+    /// As [`end`], for the program.
+    pub fn end(&mut self) -> (ExitStatus, Duration) {
+        end(&mut self.child)
+    }
+
     /// The exit status, if the program ends within `limit`.
-    pub fn wait(&mut self, limit: Duration) -> Option<std::process::ExitStatus> {
+    pub fn wait(&mut self, limit: Duration) -> Option<ExitStatus> {
         let deadline = Instant::now() + limit;
         loop {
             if let Some(status) = self.child.try_wait().expect("the child can be asked") {

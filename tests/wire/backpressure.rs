@@ -88,17 +88,21 @@ fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
             count.store(n + 1, Ordering::Relaxed);
         }
     });
-    // It comes to a stand, and nobody else notices.
+    // It comes to a stand once as much waits as may, and nobody else notices. A machine may stand still earlier.
     let mut other = runtime.connect();
     let (mut before, mut since) = (0, Instant::now());
-    while since.elapsed() < Duration::from_millis(500) {
+    let deadline = since + PATIENCE;
+    while before < 32 || since.elapsed() < Duration::from_millis(500) {
+        assert!(
+            Instant::now() < deadline,
+            "{before} calls of a MiB are under the limit, or it never stands"
+        );
         other.settle();
         let now = sent.load(Ordering::Relaxed);
         if now != before {
             (before, since) = (now, Instant::now());
         }
     }
-    assert!(before >= 32, "{before} calls of a MiB are under the limit");
     assert!(
         before < CALLS,
         "everything was read although nothing was taken"
@@ -210,7 +214,7 @@ fn a_flood_of_trajectories_delays_nobody() {
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
     let began = Instant::now();
-    for _ in 0..100 {
+    for _ in 0..20 {
         client.settle();
         client.kept.clear();
     }

@@ -1,10 +1,10 @@
 //! `/clock` and `/diagnostics` from outside.
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::arm::{stamp, time};
-use crate::common::{Client, Runtime};
+use crate::common::{Client, PATIENCE, Runtime};
 use pendularm::actors::resources::budget::MODEST;
 use serde_json::{Value, json};
 
@@ -69,18 +69,15 @@ fn the_clock_is_the_time_in_the_joint_states_at_the_same_rate() {
     assert_eq!(clock, json!({"clock": state["header"]["stamp"]}));
     client.ask("/arm_sim/pause", json!({"data": false}));
     client.kept.clear();
-    let seen = client.receive_for(Duration::from_secs(1));
-    let times: Vec<f64> = seen
-        .iter()
-        .filter(|frame| frame["topic"] == "/clock")
-        .map(|frame| time(&frame["msg"]["clock"]))
+    let times: Vec<f64> = (0..30)
+        .map(|_| time(&client.message("/clock")["clock"]))
         .collect();
-    let states: Vec<f64> = seen
+    // The clock is the only other topic.
+    let states: Vec<f64> = client
+        .kept
         .iter()
-        .filter(|frame| frame["topic"] == "/joint_states")
         .map(|frame| stamp(&frame["msg"]))
         .collect();
-    assert!(times.len() > 20, "{} in a second", times.len());
     assert!(times.len().abs_diff(states.len()) <= 1);
     assert!(
         times
@@ -93,6 +90,7 @@ fn the_clock_is_the_time_in_the_joint_states_at_the_same_rate() {
 fn diagnostics_have_the_documented_statuses_and_keys_once_a_second() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
+    let began = Instant::now();
     client.subscribe("/diagnostics");
     let first = client.message("/diagnostics");
     assert_eq!(first["header"]["frame_id"], "world");
@@ -122,8 +120,15 @@ fn diagnostics_have_the_documented_statuses_and_keys_once_a_second() {
     assert_eq!(number(gateway, "clients_cut_off"), 0.0);
     let held = number(gateway, "bytes_held");
     assert!(held > 0.0 && held < MODEST as f64, "{held}");
-    let more = client.receive_for(Duration::from_millis(3500));
-    assert!((2..=4).contains(&more.len()), "{} in 3.5 s", more.len());
+    client.subscribe("/joint_states");
+    client.message("/diagnostics");
+    client.kept.clear();
+    client.message("/diagnostics");
+    client.message("/diagnostics");
+    // A busy machine skips ticks, and makes none up: every sixtieth has a message, however long they take.
+    assert_eq!(client.kept.len(), 2 * 60, "states in two periods");
+    let took = began.elapsed();
+    assert!(took >= Duration::from_millis(1900), "two in {took:?}");
 }
 
 #[test]
@@ -132,14 +137,19 @@ fn rates_are_those_of_wall_time() {
     let mut client = runtime.connect();
     client.subscribe("/diagnostics");
     arm_status(&mut client);
-    // A busy machine may lose some; an idle one gives 1 and 1000.
-    for _ in 0..2 {
+    // An idle machine gives 1 and 1000. One that stands still loses any part of a second, of which the arm makes up
+    // 250 ms: a message may say less of a right arm, never much more, and two soon say enough.
+    let deadline = Instant::now() + PATIENCE;
+    let mut enough = 0;
+    while enough < 2 {
         let arm = arm_status(&mut client);
         let (factor, rate) = (
             number(&arm, "real_time_factor"),
             number(&arm, "steps_per_second"),
         );
-        assert!((0.5..1.3).contains(&factor), "{arm}");
+        assert!((0.0..1.3).contains(&factor), "{arm}");
+        enough += usize::from(factor >= 0.5);
+        assert!(Instant::now() < deadline, "it is slow: {arm}");
         assert!(
             (rate - 1000.0 * factor).abs() < 1.0,
             "steps of a millisecond: {arm}"
@@ -165,14 +175,13 @@ fn every_change_of_state_is_told_at_once_and_nothing_else_is() {
         client.kept.clear();
         client.ask("/arm_sim/pause", json!({"data": data}));
         client.ask("/arm_sim/pause", json!({"data": data}));
-        let told: Vec<&Value> = client
-            .kept
-            .iter()
-            .filter(|frame| frame["topic"] == "/diagnostics")
-            .collect();
-        // Before the response; the message of the second may fall in between.
-        assert!((1..=2).contains(&told.len()), "{told:?}");
-        assert_eq!(text(status(&told[0]["msg"], "arm_sim"), "state"), state);
+        // Before the response. The messages of the seconds come too: one at most from after the change.
+        let told = client.kept.iter().filter(|frame| {
+            frame["topic"] == "/diagnostics"
+                && text(status(&frame["msg"], "arm_sim"), "state") == state
+        });
+        let told: Vec<&Value> = told.collect();
+        assert!((1..=2).contains(&told.len()), "{:?}", client.kept);
     }
 }
 

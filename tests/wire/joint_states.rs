@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::arm::{in_one_of_three_tries, numbers, stamp, state_where};
-use crate::common::Runtime;
+use crate::common::{PATIENCE, Runtime};
 use serde_json::{Value, json};
 
 #[test]
@@ -31,8 +31,8 @@ fn the_header_carries_simulation_time_and_the_world() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
-    client.ask("/arm_sim/reset", json!({}));
     let began = Instant::now();
+    client.ask("/arm_sim/reset", json!({}));
     let mut last = 0.0;
     for _ in 0..60 {
         let state = client.message("/joint_states");
@@ -48,17 +48,18 @@ fn the_header_carries_simulation_time_and_the_world() {
     assert!(last <= began.elapsed().as_secs_f64() + 0.5, "{last}");
 }
 
-/// Sixty a second by design. A busy machine may skip ticks, never make them up: no more than there are in the time, and in
-/// one of three tries no fewer than half.
+/// Sixty a second by design. A busy machine may skip ticks, never make them up: no more than there are in the time, and
+/// in one of three tries no fewer than half.
 fn assert_sixty_a_second(paused: bool) {
     in_one_of_three_tries("60 Hz", || {
         let runtime = Runtime::start();
         let mut clients = [runtime.connect(), runtime.connect()];
+        // What is counted may have come from the first subscription on.
+        let began = Instant::now();
         for client in &mut clients {
             client.ask("/arm_sim/pause", json!({"data": paused}));
             client.subscribe("/joint_states");
         }
-        let began = Instant::now();
         let seen = clients[0].receive_for(Duration::from_secs(2));
         clients[1].settle();
         let most = (began.elapsed().as_secs_f64() * 60.0) as usize + 3;
@@ -111,15 +112,17 @@ fn a_large_timestep_shows_the_same_state_until_the_next_step() {
     client.ask("/arm_sim/set_params", json!({"gravity": 0}));
     client.ask("/arm_sim/set_integrator", json!({"timestep": 0.25}));
     client.ask("/arm_sim/reset", json!({}));
-    let mut stamps = Vec::new();
-    state_where(&mut client, "a second", |state| stamp(state) >= 1.0);
-    for frame in client.receive_for(Duration::from_secs(1)) {
-        stamps.push(stamp(&frame["msg"]));
+    let mut stamps = vec![stamp(&state_where(&mut client, "a second", |state| {
+        stamp(state) >= 1.0
+    }))];
+    let deadline = Instant::now() + PATIENCE;
+    while stamps.len() < 3 {
+        assert!(Instant::now() < deadline, "no step is done: {stamps:?}");
+        stamps.push(stamp(&client.message("/joint_states")));
+        stamps.dedup();
     }
     assert!(
         stamps.iter().all(|stamp| (stamp * 4.0).fract() == 0.0),
         "{stamps:?}"
     );
-    stamps.dedup();
-    assert!((2..=6).contains(&stamps.len()), "{stamps:?}");
 }

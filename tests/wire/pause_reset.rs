@@ -136,7 +136,7 @@ fn a_reset_gives_the_starting_pose_at_rest() {
             assert_eq!(values, json!({"position": zeros, "velocity": zeros}));
         }
         let after = client.message("/joint_states");
-        assert!(stamp(&after) < 0.25, "{after}");
+        assert!(stamp(&after) < 0.3, "{after}");
     }
 }
 
@@ -164,10 +164,11 @@ fn no_state_from_before_a_reset_follows_its_response() {
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
     for round in 0..20 {
-        state_where(&mut client, "a moving arm", |state| stamp(state) > 0.1);
+        // An arm that was late makes up 250 ms at most: half a second is from before the reset.
+        state_where(&mut client, "a moving arm", |state| stamp(state) > 0.5);
         client.ask(RESET, json!({}));
         let after = stamp(&client.message("/joint_states"));
-        assert!(after < 0.1, "round {round}: {after} s after a reset");
+        assert!(after < 0.5, "round {round}: {after} s after a reset");
     }
 }
 

@@ -1,6 +1,6 @@
 //! `/study/*`, the limit in `/diagnostics` and `/arm_sim/error_estimate`, from outside.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
 use pendularm::math::arm::Arm;
@@ -330,16 +330,20 @@ fn diagnostics_carry_the_limit_and_warn_while_the_timestep_exceeds_it() {
 fn the_error_estimate_has_the_documented_fields_ten_times_a_second() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
+    let began = Instant::now();
+    client.subscribe("/joint_states");
     client.subscribe("/arm_sim/error_estimate");
     client.message("/arm_sim/error_estimate");
-    let frames = client.receive_for(Duration::from_millis(1500));
-    assert!(
-        (8..=18).contains(&frames.len()),
-        "{} in 1.5 s",
-        frames.len()
-    );
+    client.kept.clear();
+    for _ in 0..14 {
+        client.message("/arm_sim/error_estimate");
+    }
+    let message = client.message("/arm_sim/error_estimate");
+    // A busy machine skips ticks, and makes none up: every sixth has an estimate, however long they take.
+    assert_eq!(client.kept.len(), 15 * 6, "states beside 15 estimates");
+    let took = began.elapsed();
+    assert!(took >= Duration::from_millis(1200), "15 in {took:?}");
     let limit = limit_held(&ControlLoop::free(Arm::<2>::default()));
-    let message = &frames.last().unwrap()["msg"];
     let mut keys: Vec<&String> = message.as_object().unwrap().keys().collect();
     keys.sort();
     assert_eq!(

@@ -160,8 +160,8 @@ pub fn disorder(states: &[Seen], deeds: &Deeds) -> Vec<String> {
 pub struct Rate {
     /// Wall time that was measured \[s\].
     pub measured: f64,
-    /// Simulation time over wall time.
-    pub ratio: f64,
+    /// Simulation time over wall time; `None` where there was no run that is long enough.
+    pub ratio: Option<f64>,
     /// The runs, and the ratio of the one that is farthest off.
     pub runs: usize,
     /// The largest such ratio.
@@ -210,7 +210,7 @@ pub fn rate(states: &[Seen]) -> Rate {
     }
     Rate {
         measured,
-        ratio: simulated / measured,
+        ratio: (runs > 0).then(|| simulated / measured),
         runs,
         worst,
         stalls,
