@@ -54,7 +54,7 @@ fn assert_sixty_a_second(paused: bool) {
     in_one_of_three_tries("60 Hz", || {
         let runtime = Runtime::start();
         let mut clients = [runtime.connect(), runtime.connect()];
-        // What is counted may have come from the first subscription on.
+        // Messages that are counted may have come from the first subscription on.
         let began = Instant::now();
         for client in &mut clients {
             client.ask("/arm_sim/pause", json!({"data": paused}));
