@@ -155,6 +155,13 @@ def test_what_the_batch_refuses_has_the_callers_name(name):
         one.step(np.array([0, np.nan], np.float32))
 
 
+@pytest.mark.parametrize("steps", [0, -1, 2.0, "2", np.float64(3)])
+def test_an_episode_has_a_whole_number_of_steps(steps):
+    with pytest.raises(ValueError, match=r"^max_episode_steps must be a whole number, at least 1, got "):
+        pendularm.envs.PendularmVectorEnv(2, max_episode_steps=steps)
+    pendularm.envs.PendularmVectorEnv(2, max_episode_steps=np.int64(1))
+
+
 def test_a_step_needs_a_reset():
     with pytest.raises(gymnasium.error.ResetNeeded):
         gymnasium.make_vec("Pendularm-v0", 2).step(np.zeros((2, 2), np.float32))

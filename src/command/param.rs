@@ -72,7 +72,10 @@ pub(super) fn get(asked: &Asked) -> Result<(), CommandError> {
     let values = call(asked, Rosapi::GetParam, &json!({"name": full_name(asked)}))?;
     // JSON within JSON.
     match serde_json::from_str::<String>(&values.value) {
-        Ok(text) if !asked.has("json") => print(&format!("{text}\n")),
+        Ok(text) if !asked.has("json") => {
+            let lines: Vec<String> = text.split('\n').map(plain).collect();
+            print(&(lines.join("\n") + "\n"))
+        }
         _ => {
             let value = RawValue::from_string(values.value);
             asked.show(&value.map_err(|error| CommandError::Lost(error.to_string()))?)

@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use crate::common::{self, PATIENCE};
 
-/// A server that answers questions for types and topics, and does `then` at the first other frame.
+/// A server that answers questions for types, topics and parameters, and does `then` at the first other frame.
 fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap().to_string();
@@ -23,7 +23,8 @@ fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
             if !service.starts_with("/rosapi/") {
                 return then(&mut stream);
             }
-            let values = json!({"type": "std_msgs/msg/String"});
+            let value = json!("one\u{1b}[2J\nother").to_string();
+            let values = json!({"type": "std_msgs/msg/String", "successful": true, "reason": "", "value": value});
             let answer = json!({"op": "service_response", "id": said["id"], "values": values, "result": true});
             stream.write_all(format!("{answer}\n").as_bytes()).unwrap();
         }
@@ -108,6 +109,13 @@ fn each_message_has_the_whole_time_to_come() {
     ));
     assert_eq!((status, complaint.as_str()), (Some(0), ""));
     assert_eq!(out, "1\n---\n".repeat(5));
+}
+
+#[test]
+fn the_text_of_a_parameter_acts_on_no_terminal() {
+    let command = ["param", "get", "/arm_sim", "robot_description"];
+    let (status, out, _) = end(start(&command, &server(|_| {})));
+    assert_eq!((status, out.as_str()), (Some(0), "one\\u{1b}[2J\nother\n"));
 }
 
 /// Publishes this text on the topic, once.

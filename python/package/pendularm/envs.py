@@ -8,6 +8,7 @@ They truncate themselves, and reset an arm in the call after its end, whose acti
 pickled, and a process that is forked while another thread steps it must not use it.
 """
 
+import operator
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -198,8 +199,12 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         _check_render_mode(render_mode)
         if max_episode_steps is None:
             max_episode_steps = self.task_of.most_steps
-        if max_episode_steps < 1:
-            raise ValueError(f"max_episode_steps must be at least 1, got {max_episode_steps}")
+        try:
+            is_number = operator.index(max_episode_steps) >= 1
+        except TypeError:
+            is_number = False
+        if not is_number:
+            raise ValueError(f"max_episode_steps must be a whole number, at least 1, got {max_episode_steps!r}")
         try:
             self._task = self.task_of(num_envs, links, threads)
         except ValueError as refusal:
