@@ -16,7 +16,7 @@ mod registers;
 
 pub use arithmetic::Arithmetic;
 #[cfg(feature = "batch")]
-pub(super) use register::Wide;
+pub(super) use register::{Wide, apart};
 #[cfg(feature = "batch")]
 pub use registers::Registers;
 

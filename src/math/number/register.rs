@@ -49,6 +49,12 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         Self([S::f64s::splat(simd, value); K])
     }
 
+    /// The machine's, of which these are registers.
+    #[inline(always)]
+    pub(in crate::math) fn token(self) -> S {
+        self.0[0].token()
+    }
+
     /// The first numbers of `column`, one in each lane; there are enough.
     #[inline(always)]
     pub(in crate::math) fn load(simd: S, column: &[f64]) -> Self {
@@ -87,6 +93,12 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         }
         sum.simd_eq(0.0).all_true()
     }
+}
+
+/// Does something with the machine's registers, in a function of its own.
+#[inline(never)]
+pub(in crate::math) fn apart<S: Simd, R>(simd: S, work: impl FnOnce() -> R) -> R {
+    simd.vectorize(work)
 }
 
 /// A register of two, as plain `x86-64` has them.
@@ -159,7 +171,7 @@ impl<S: Simd, const K: usize> Mul<f64> for Wide<S, K> {
 impl<S: Simd, const K: usize> Arithmetic for Wide<S, K> {
     #[inline(always)]
     fn like(self, value: f64) -> Self {
-        Self::splat(self.0[0].token(), value)
+        Self::splat(self.token(), value)
     }
 }
 
@@ -169,7 +181,7 @@ impl<S: Simd, const K: usize> Number for Wide<S, K> {
 
     #[inline(always)]
     fn less_exact(mut self, factor: Self, other: f64) -> Self {
-        let minus = S::f64s::splat(self.0[0].token(), -other);
+        let minus = S::f64s::splat(self.token(), -other);
         each_register!(i => {
             self.0[i] = factor.0[i].mul_add(minus, self.0[i]);
         });

@@ -9,11 +9,13 @@
 
 use std::array::from_fn;
 
+use fearless_simd::Simd;
+
 use super::seat::Seat;
 use crate::math::arm::{Rod, State};
 use crate::math::dynamics::recursion;
 use crate::math::integrator::Method;
-use crate::math::number::{Number, entries};
+use crate::math::number::{Arithmetic, Number, Wide, apart, entries};
 use crate::math::pid::{Control, Gains, Setpoint, law};
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::stepped;
@@ -191,14 +193,16 @@ impl<T: Number, const N: usize> Lanes<T, N> {
         set(&mut self.gravity, arm.gravity);
         set(&mut self.timestep, arm.timestep);
     }
+}
 
+impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
     /// Where the next step leads to.
     #[inline(always)]
     pub(super) fn next<const WEIGHS: bool>(
         &self,
         method: Method,
         controlled: bool,
-    ) -> Moving<T, N> {
+    ) -> Moving<Wide<S, K>, N> {
         let Moving {
             state,
             carry,
@@ -215,21 +219,41 @@ impl<T: Number, const N: usize> Lanes<T, N> {
             }
         };
         let effort = entries!(zero, i => effort[i] + self.push[i]);
-        let (state, carry) = stepped(
-            #[inline(always)]
-            |_, q: &[T; N], v: &[T; N]| {
-                recursion::<T, N, WEIGHS>(&self.rods, &self.gravity, q, v, &effort)
-            },
-            method,
-            state,
-            carry,
-            self.timestep,
-        );
+        // As of one arm: all methods but Euler's share one copy of the dynamics, not eight.
+        let (state, carry) = if method == Method::Euler {
+            stepped(
+                #[inline(always)]
+                |_, q, v| self.accelerations::<WEIGHS>(q, v, &effort),
+                Method::Euler,
+                state,
+                carry,
+                self.timestep,
+            )
+        } else {
+            let shared = |_, q: &_, v: &_| {
+                apart(
+                    self.timestep.token(),
+                    #[inline(always)]
+                    || self.accelerations::<WEIGHS>(q, v, &effort),
+                )
+            };
+            stepped(shared, method, state, carry, self.timestep)
+        };
         Moving {
             state,
             carry,
             effort,
             integral,
         }
+    }
+
+    #[inline(always)]
+    fn accelerations<const WEIGHS: bool>(
+        &self,
+        q: &[Wide<S, K>; N],
+        v: &[Wide<S, K>; N],
+        effort: &[Wide<S, K>; N],
+    ) -> [Wide<S, K>; N] {
+        recursion::<_, N, WEIGHS>(&self.rods, &self.gravity, q, v, effort)
     }
 }
