@@ -49,7 +49,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         Self([S::f64s::splat(simd, value); K])
     }
 
-    /// The machine's, of which these are registers.
+    /// The proof that the machine has such registers.
     #[inline(always)]
     pub(in crate::math) fn token(self) -> S {
         self.0[0].token()
@@ -95,7 +95,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
     }
 }
 
-/// Does something with the machine's registers, in a function of its own.
+/// Does something with the machine's registers, in a function of its own: compiled once for all who call it.
 #[inline(never)]
 pub(in crate::math) fn apart<S: Simd, R>(simd: S, work: impl FnOnce() -> R) -> R {
     simd.vectorize(work)
