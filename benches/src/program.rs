@@ -7,7 +7,9 @@ use std::io::{BufRead, BufReader};
 use std::net::{SocketAddr, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use pendularm_client::ending;
 
 /// Lines of the log that are kept; the rest are counted.
 const MAX_LINES: usize = 50;
@@ -120,19 +122,16 @@ impl Program {
 
     /// Asks it to end, and says how long that took and with which exit status.
     pub fn end(mut self) -> Result<(Duration, Option<i32>), String> {
-        let began = Instant::now();
         let pid = self.pid().to_string();
         Command::new("kill")
             .args(["-TERM", &pid])
             .status()
             .map_err(|error| format!("kill: {error}"))?;
-        while began.elapsed() < Duration::from_secs(10) {
-            if let Ok(Some(status)) = self.child.try_wait() {
-                return Ok((began.elapsed(), status.code()));
-            }
-            std::thread::sleep(Duration::from_millis(2));
+        match ending::wait(&mut self.child, Duration::from_secs(10)) {
+            Ok(Some((status, took))) => Ok((took, status.code())),
+            Ok(None) => Err("it is still there 10 s after SIGTERM".to_owned()),
+            Err(error) => Err(format!("the program's end: {error}")),
         }
-        Err("it is still there 10 s after SIGTERM".to_owned())
     }
 }
 

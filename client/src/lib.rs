@@ -8,12 +8,14 @@
 //! | [`codec`] | bytes to messages and back, by line or by WebSocket; no I/O, so that every program here reads frames with it |
 //! | [`websocket`] | frames as a client writes them, also in pieces and against the rules |
 //! | [`blocking`] | a client on a TCP socket |
+//! | [`ending`] | the end of a program that was started |
 //! | [`pipe`] | a client on an asynchronous stream (feature `tokio`) |
 //!
 //! **Invariant:** every wait has a limit, and says what it waited for.
 
 pub mod blocking;
 pub mod codec;
+pub mod ending;
 #[cfg(feature = "tokio")]
 pub mod pipe;
 pub mod websocket;

@@ -3,7 +3,9 @@
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use pendularm_client::ending;
 
 pub use pendularm_client::blocking::{Client, PATIENCE};
 use serde_json::json;
@@ -40,22 +42,14 @@ fn without_variables(mut command: Command) -> Command {
     command
 }
 
-/// The exit status of what must end by itself, and how long that took. A machine that stands still wakes nobody: a look
-/// that comes late counts for ten times what it should have taken at most.
+/// The exit status of what must end by itself, and how long that took.
+#[track_caller]
 pub fn end(child: &mut Child) -> (ExitStatus, Duration) {
-    const PAUSE: Duration = Duration::from_millis(5);
-    let began = Instant::now();
-    let (mut last, mut took) = (began, Duration::ZERO);
-    loop {
-        let status = child.try_wait().expect("the child can be asked");
-        took += last.elapsed().min(10 * PAUSE);
-        if let Some(status) = status {
-            return (status, took);
-        }
-        assert!(began.elapsed() < PATIENCE, "it does not end");
-        last = Instant::now();
-        std::thread::sleep(PAUSE);
+    let ended = ending::wait(child, PATIENCE).expect("the child can be asked");
+    if ended.is_none() {
+        let _ = child.kill();
     }
+    ended.expect("it ends")
 }
 
 /// The program, running; ended with the value.
@@ -146,20 +140,6 @@ impl Runtime {
     /// As [`end`], for the program.
     pub fn end(&mut self) -> (ExitStatus, Duration) {
         end(&mut self.child)
-    }
-
-    /// The exit status, if the program ends within `limit`.
-    pub fn wait(&mut self, limit: Duration) -> Option<ExitStatus> {
-        let deadline = Instant::now() + limit;
-        loop {
-            if let Some(status) = self.child.try_wait().expect("the child can be asked") {
-                return Some(status);
-            }
-            if Instant::now() > deadline {
-                return None;
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
     }
 }
 

@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Stdio};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde_json::{Value, json};
 
@@ -55,14 +55,7 @@ fn end(mut child: Child) -> (Option<i32>, String, String) {
     }
     let out = all(child.stdout.take().unwrap());
     let complaint = all(child.stderr.take().unwrap());
-    let deadline = Instant::now() + PATIENCE;
-    while child.try_wait().unwrap().is_none() && Instant::now() < deadline {
-        thread::sleep(Duration::from_millis(5));
-    }
-    let is_going = child.try_wait().unwrap().is_none();
-    let _ = child.kill();
-    assert!(!is_going, "it goes on and on");
-    let status = child.wait().unwrap().code();
+    let status = common::end(&mut child).0.code();
     (status, out.join().unwrap(), complaint.join().unwrap())
 }
 

@@ -3,7 +3,7 @@
 use std::io::{BufRead, BufReader, Read};
 use std::net::TcpListener;
 use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::common::{self, Client, Runtime};
 use serde_json::{Value, json};
@@ -22,14 +22,7 @@ fn program(arguments: &[&str], variables: &[(&str, &str)]) -> Command {
 /// Runs it to its end, which must come by itself.
 fn outcome(arguments: &[&str], variables: &[(&str, &str)]) -> Output {
     let mut child = program(arguments, variables).spawn().unwrap();
-    let deadline = Instant::now() + crate::common::PATIENCE;
-    while child.try_wait().unwrap().is_none() {
-        if Instant::now() > deadline {
-            child.kill().unwrap();
-            panic!("it did not end: {arguments:?} {variables:?}");
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    common::end(&mut child);
     child.wait_with_output().unwrap()
 }
 

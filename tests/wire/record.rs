@@ -56,7 +56,7 @@ fn end(mut runtime: Runtime) {
     let pid = runtime.pid().to_string();
     let killed = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
     assert!(killed.success());
-    let status = runtime.wait(PATIENCE).expect("it ends");
+    let status = runtime.end().0;
     assert!(status.success());
 }
 
@@ -103,7 +103,7 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
     let pid = runtime.pid().to_string();
     let killed = Command::new("kill").args(["-KILL", &pid]).status().unwrap();
     assert!(killed.success());
-    runtime.wait(PATIENCE).expect("it is dead");
+    runtime.end();
 
     assert!(holds_call(&file, "{\"gravity\":4.25}"));
     let (status, said) = run(&["replay", text(&file)]);

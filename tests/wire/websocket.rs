@@ -353,7 +353,7 @@ fn the_runtimes_end_closes_with_1001_and_in_time() {
         .status();
     assert!(killed.unwrap().success());
     assert_eq!(socket.close_code(), Some(1001));
-    let status = runtime.wait(PATIENCE).expect("it ends");
+    let status = runtime.end().0;
     assert_eq!(status.code(), Some(0));
 }
 

@@ -39,6 +39,9 @@ pub struct Seen {
     pub ran: f64,
 }
 
+/// When something came, and how long that took \[s\].
+pub type Timed = (Instant, f64);
+
 /// Everything that the healthy threads saw.
 #[derive(Default)]
 pub struct Record {
@@ -47,9 +50,9 @@ pub struct Record {
     /// When the messages of the bare process were read.
     pub bare: Vec<Instant>,
     /// When the sleeper woke, and how much too late \[s\].
-    pub woken: Vec<(Instant, f64)>,
+    pub woken: Vec<Timed>,
     /// When each call of the healthy caller was answered, and how long that took \[s\].
-    pub calls: Vec<(Instant, f64)>,
+    pub calls: Vec<Timed>,
     /// The faults that were found.
     pub faults: Vec<String>,
 }
@@ -59,8 +62,8 @@ pub struct Watch {
     stop: Arc<AtomicBool>,
     states: JoinHandle<(Vec<Seen>, Vec<String>)>,
     bare: JoinHandle<Vec<Instant>>,
-    woken: JoinHandle<Vec<(Instant, f64)>>,
-    calls: JoinHandle<(Vec<(Instant, f64)>, Vec<String>)>,
+    woken: JoinHandle<Vec<Timed>>,
+    calls: JoinHandle<(Vec<Timed>, Vec<String>)>,
 }
 
 impl Watch {
@@ -184,7 +187,7 @@ fn watch_bare(stream: TcpStream, stop: &AtomicBool) -> Vec<Instant> {
     seen
 }
 
-fn sleep_in_steps(stop: &AtomicBool) -> Vec<(Instant, f64)> {
+fn sleep_in_steps(stop: &AtomicBool) -> Vec<Timed> {
     let mut woken = Vec::new();
     let mut due = Instant::now();
     while !stop.load(Ordering::Relaxed) {
@@ -198,7 +201,7 @@ fn sleep_in_steps(stop: &AtomicBool) -> Vec<(Instant, f64)> {
     woken
 }
 
-fn call_now_and_then(stream: TcpStream, stop: &AtomicBool) -> (Vec<(Instant, f64)>, Vec<String>) {
+fn call_now_and_then(stream: TcpStream, stop: &AtomicBool) -> (Vec<Timed>, Vec<String>) {
     let mut reader = BufReader::new(&stream);
     let mut writer = &stream;
     let (mut calls, mut line) = (Vec::new(), Vec::new());

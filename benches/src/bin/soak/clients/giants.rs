@@ -104,7 +104,8 @@ pub async fn deep(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fault>
     ));
     client.flush().await?;
     let message = next_message(&mut client, &topic).await?;
-    if message["content"].to_string() != content {
+    let arrived = message["content"].to_string();
+    if arrived != content {
         return Err(client.fault("a deep message is not as it was published"));
     }
     push_question(&mut client, &mut rng);
