@@ -68,6 +68,8 @@ function compute() {
 function show() {
   for (const [method, label] of labels) setText(label, limitText(limits[method] ?? NaN));
   const known = METHODS.every(([method]) => method in limits);
-  setText(byId("why-text"), known ? whyText(state, limits) : "");
-  byId("why").hidden = !known || byId("why-text").textContent === "";
+  const why = known ? whyText(state, limits) : "";
+  setText(byId("why-text"), why);
+  // It stays while limits are computed anew, so that a click on its way meets it.
+  if (known || !loopInForce(state)) byId("why").hidden = why === "";
 }

@@ -76,18 +76,25 @@ class Right(Lesson):
         self.page.fill(f"#kd-fields {NUMBER}", "60")
         self.wait(lambda: shown() == {method: served(method) for method in methods}, "other gains")
 
-    def test_one_button_says_why_the_gains_bear_that(self):
-        def opened():
-            # The button goes while limits are computed anew, and a click of that moment meets nothing.
-            self.page.until("document.querySelector('#why').checkVisibility()")
-            self.page.click("#why")
-            return self.page.run("document.querySelector('#why-text').checkVisibility()")
-
+    def test_the_button_of_the_reason_stays_while_limits_are_computed_anew(self):
         self.page.click("#servo")
-        self.wait(opened, "the reason")
-        text = self.page.until("document.querySelector('#why-text').textContent")
+        text = self.page.until("document.querySelector('#why').checkVisibility() && document.querySelector('#why-text').textContent")
+        self.page.run("""(window.hidings = 0, new MutationObserver(() => window.hidings++)
+            .observe(document.querySelector('#why'), { attributeFilter: ['hidden'] }))""")
+        self.runtime.call("/pid_controller/set_gains", kp=[30, 30], kd=[3, 3])
+        other = f"(document.querySelector('#why-text').textContent || {json.dumps(text)}) !== {json.dumps(text)}"
+        self.page.until(other)
+        self.assertEqual(self.page.run("window.hidings"), 0)
+
+    def test_one_button_says_why_the_gains_bear_that(self):
+        self.page.click("#servo")
+        self.page.until("document.querySelector('#why').checkVisibility()")
+        self.page.click("#why")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the servo")
         limit = 1000 * self.values("/study/stability")["timestep_limit_held"]
-        self.assertTrue(text.startswith(f"Why {float(format(limit, '.3g')):g} ms: "), text)
+        begins = f"Why {float(format(limit, '.3g')):g} ms: "
+        shown = "document.querySelector('#why-text')"
+        text = self.page.until(f"{shown}.checkVisibility() && {shown}.textContent.startsWith({json.dumps(begins)}) && {shown}.textContent")
         self.assertIn("overshoots", text)
         self.keep("why")
 
