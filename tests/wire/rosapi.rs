@@ -321,7 +321,7 @@ fn setting_a_parameter_is_checked_as_its_service_checks_it() {
         ("gravity", "1}", "value"),
         ("gravity", "", "value"),
         ("masses", "[1]", "masses"),
-        ("integrator", "\"rk5\"", "method"),
+        ("integrator", "\"rk5\"", "integrator must be one of"),
         ("robot_description", "\"<robot/>\"", "robot_description"),
     ] {
         let answer = set(name, value);

@@ -146,6 +146,13 @@ impl Rejections {
         self.0.push(rejection);
     }
 
+    /// Gives a field the name by which the sender knows it.
+    pub fn rename(&mut self, field: &str, name: &str) {
+        for rejection in self.0.iter_mut().filter(|one| one.field == field) {
+            name.clone_into(&mut rejection.field);
+        }
+    }
+
     /// Adds those of `later` behind these.
     pub fn append(&mut self, mut later: Self) {
         self.0.append(&mut later.0);

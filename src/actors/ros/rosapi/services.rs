@@ -325,7 +325,11 @@ pub(in crate::actors::ros) fn read_change<const N: usize>(
     Ok(match service {
         Service::SetParams => ParamChange::Params(SetParams::request(fields)),
         Service::SetGains => ParamChange::Gains(SetGains::request(fields)),
-        _ => ParamChange::Integrator(SetIntegrator::request(fields)),
+        _ => {
+            let mut change = SetIntegrator::request(fields);
+            change.rejected.rename(field, parameter.name());
+            ParamChange::Integrator(change)
+        }
     })
 }
 
