@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::system::in_virtual_time;
 use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
 use actix::prelude::*;
-use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
+use pendularm::actors::gateway::limits::{LINGER, RESPONSES_TIME, STALL_LIMIT};
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
 use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
 use pendularm::actors::resources::gauges::Gauges;
@@ -71,7 +71,7 @@ fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
         settle().await;
         let began = Instant::now();
         client.rest().await;
-        assert!(began.elapsed() <= RESPONSES_OWED, "{:?}", began.elapsed());
+        assert!(began.elapsed() <= RESPONSES_TIME, "{:?}", began.elapsed());
         settle().await;
         assert_eq!(gateway.gauges.connections(), 1);
         assert!(computations.take().is_gone(), "it need not go on");
@@ -93,14 +93,14 @@ fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
         settle().await;
         // While its computations end, one after the other, it is owed them.
         for _ in 0..3 {
-            sleep(RESPONSES_OWED - Duration::from_secs(1)).await;
+            sleep(RESPONSES_TIME - Duration::from_secs(1)).await;
             computations.answer();
             settle().await;
         }
         assert_eq!(gateway.gauges.connections(), 1);
         let began = Instant::now();
         assert_eq!(client.rest().await.len(), 3);
-        assert_elapsed(began, RESPONSES_OWED - Duration::from_millis(10));
+        assert_elapsed(began, RESPONSES_TIME - Duration::from_millis(10));
         settle().await;
         assert_eq!(gateway.gauges.connections(), 0);
         assert!(computations.take().is_gone(), "it need not go on");
@@ -322,7 +322,7 @@ fn who_comes_gets_the_place_of_the_oldest_client_that_has_stopped_sending() {
             assert_eq!(gateway.gauges.connections(), 4);
         }
         assert!(
-            began.elapsed() < RESPONSES_OWED / 10,
+            began.elapsed() < RESPONSES_TIME / 10,
             "somebody was waited for"
         );
         // All are at work now: nobody gives way.

@@ -44,7 +44,7 @@ pub const STALL_LIMIT: Duration = Duration::from_secs(20);
 pub const FRAME_TIME: Duration = Duration::from_secs(60);
 /// How long a client that has stopped sending is owed the responses that are not ready yet: longer than other clients
 /// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
-pub const RESPONSES_OWED: Duration = Duration::from_secs(15);
+pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
 /// Bytes offered in one write: after that much the other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 256 * 1024;
 /// Frames in one write.

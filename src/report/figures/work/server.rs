@@ -179,7 +179,7 @@ fn web(counts: &Counts) -> Vec<Cell> {
     };
     let (with, without) = ("program-size", "program-size-bare");
     vec![
-        Cell::new("Web code without its feature"),
+        Cell::new("Web, record, report and commands without their features"),
         Cell::new("cargo build --no-default-features --features runtime"),
         cell(with, "web-symbols-whole"),
         cell(without, "web-symbols-bare"),

@@ -14,7 +14,7 @@ use crate::actors::ConnectionId;
 use crate::actors::gateway::connection::shared::Shared;
 use crate::actors::gateway::connection::transport::{CHUNK, Inbound, discard};
 use crate::actors::gateway::connection::unfinished::Unfinished;
-use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN, RESPONSES_OWED};
+use crate::actors::gateway::limits::{FREE_FRAMES, LOOK_AGAIN, RESPONSES_TIME};
 use crate::actors::gateway::messages::{Disconnect, Ended, Finish, Retire};
 use crate::actors::gateway::turns;
 use crate::protocol::wire::fragments::{Fragments, MAX_AGE};
@@ -188,7 +188,7 @@ impl Reader {
                 self.shared.room.notified().await;
             }
         };
-        if timeout(RESPONSES_OWED, answered).await.is_err() {
+        if timeout(RESPONSES_TIME, answered).await.is_err() {
             self.shared.abandon_computations();
         }
     }
@@ -207,7 +207,7 @@ impl Reader {
     }
 
     /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`]. An error if the client
-    /// is gone; one that has ended its stream is taken for gone when nothing was for [`RESPONSES_OWED`].
+    /// is gone; one that has ended its stream is taken for gone when nothing was for [`RESPONSES_TIME`].
     async fn wait_for_room<I: Inbound>(
         &mut self,
         input: &mut I,
@@ -215,7 +215,7 @@ impl Reader {
     ) -> std::io::Result<()> {
         let shared = Rc::clone(&self.shared);
         if self.has_ended {
-            let room = timeout(RESPONSES_OWED, shared.room.notified()).await;
+            let room = timeout(RESPONSES_TIME, shared.room.notified()).await;
             return room.map_err(|_| std::io::ErrorKind::TimedOut.into());
         }
         tokio::select! {
