@@ -5,12 +5,10 @@ results.
 """
 
 import math
-import operator
 import os
-import re
 import sys
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -24,10 +22,9 @@ from numpy.typing import NDArray
 from ._code import fingerprint
 from ._native import Batch
 from ._pieces import Folder, Numbers, hand_out
+from ._settings import Floats, begin, column, flag, number, try_values, whole_number
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
-
-Floats = NDArray[np.float64]
 
 TIMESTEP = 0.001
 """[s], unless another is given."""
@@ -52,13 +49,6 @@ MOST_ROWS = 10_000_000
 
 MOST_ARMS = 1_000_000
 """Arms of a `Batch`, and so settings of a piece."""
-
-TRIED_AT_ONCE = 16_384
-"""Values of a setting that one `Batch` tries before the sweep begins."""
-
-PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
-STATES = ("setpoint", "q0", "qdot0")
-SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,14 +175,15 @@ def sweep(
     total = math.prod(len(choices) for choices in axes.values())
     if total > MOST_SETTINGS:
         raise ValueError(f"grid must have at most {MOST_SETTINGS} combinations, got {total}")
-    links, samples, duration = _whole("links", links), _whole("samples", samples), _number("duration", duration)
+    links, samples = whole_number("links", links), whole_number("samples", samples)
+    duration = number("duration", duration)
     if links not in (2, 3):
         raise ValueError(f"links must be 2 or 3, got {links}")
     if not 2 <= samples <= MOST_SAMPLES:
         raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
     if piece is None:
         piece = max(1, min(1024, MOST_ROWS // 10 // samples))
-    piece, most = _whole("piece", piece), min(MOST_ARMS, MOST_ROWS // samples)
+    piece, most = whole_number("piece", piece), min(MOST_ARMS, MOST_ROWS // samples)
     if not 1 <= piece <= most:
         raise ValueError(f"piece must be between 1 and {most} with {samples} samples, got {piece}")
     if not (np.isfinite(duration) and duration > 0):
@@ -200,18 +191,18 @@ def sweep(
     if metric not in METRICS if isinstance(metric, str) else not callable(metric):
         raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
     question = _Question(
-        axes={name: _column(name, values, links) for name, values in axes.items()},
-        fixed={name: _column(name, [value], links) for name, value in settings.items()},
+        axes={name: column(name, values, links) for name, values in axes.items()},
+        fixed={name: column(name, [value], links) for name, value in settings.items()},
         metric=metric,
         links=links,
         duration=duration,
         samples=samples,
-        servo=_flag("servo", servo),
+        servo=flag("servo", servo),
     )
     question.check()
     kept = None
     if folder is not None:
-        kept = Folder(Path(folder), question.told(), total, piece, metric if isinstance(metric, str) else None)
+        kept = Folder(Path(folder), question.kept(), total, piece, metric if isinstance(metric, str) else None)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     left = [start for start in starts if start not in done]
@@ -258,7 +249,7 @@ class _Question:
         """Tries every value once, so that a bad one is refused here and by its own name."""
         settings = {**self.axes, **self.fixed}
         for name, values in settings.items():
-            _try(name, values, self.links)
+            try_values(name, values, self.links)
         timesteps = settings.get("timestep", [TIMESTEP])
         longest = float(max(timesteps))
         # A quotient that falls short of 1 by rounding alone counts as that, as in a rollout.
@@ -268,7 +259,7 @@ class _Question:
         if steps > MOST_STEPS:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
-    def told(self) -> dict[str, Any]:
+    def kept(self) -> dict[str, Any]:
         """The question as the folder keeps it."""
         metric = self.metric
         if not isinstance(metric, str):
@@ -285,93 +276,6 @@ class _Question:
             "samples": self.samples,
             "servo": self.servo,
         }
-
-
-def _whole(name: str, value: Any) -> int:
-    try:
-        return operator.index(value)
-    except TypeError:
-        raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
-
-
-def _flag(name: str, value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, got {value!r:.60}")
-    return bool(value)
-
-
-def _number(name: str, value: Any) -> float:
-    try:
-        return float(_numbers(value))
-    except OverflowError:
-        raise ValueError(f"{name} must be finite, got a number that no double holds") from None
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
-
-
-def _numbers(value: Any) -> Floats:
-    """The value as doubles; text and complex numbers are none."""
-    array = np.asarray(value)
-    if array.dtype.kind == "O":
-        return array.astype(np.float64)
-    return array.astype(np.float64, casting="same_kind")
-
-
-def _column(name: str, values: Sequence[Any], links: int) -> Any:
-    """Values of a setting, a row for each."""
-    if name not in SETTINGS:
-        raise ValueError(f"there is no setting {name!r}; there are {', '.join(SETTINGS)}")
-    if name == "method":
-        return np.array([str(value) for value in values])
-    try:
-        if name in PER_JOINT:
-            column = np.array([np.broadcast_to(_numbers(value), (links,)) for value in values])
-        else:
-            column = np.array([float(_numbers(value)) for value in values])
-    except OverflowError:
-        raise ValueError(f"every {name} must be finite, got a number that no double holds") from None
-    except (TypeError, ValueError):
-        each = f" or an array of {links}" if name in PER_JOINT else ""
-        raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
-    # The other ones are refused by these names where they are tried.
-    if name in STATES and not np.isfinite(column).all():
-        row, joint = np.argwhere(~np.isfinite(column))[0]
-        raise ValueError(f"{name}[{row}][{joint}] must be finite, got {column[row, joint]}")
-    return column
-
-
-def _begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
-    """Arms with these settings, a row for each arm."""
-    batch = Batch(arms, links, threads=1)
-
-    def of(*names: str) -> dict[str, Any]:
-        return {name: settings[name] for name in names if name in settings}
-
-    batch.set_params(**of("gravity", "masses", "lengths"))
-    if "method" in settings:
-        batch.set_integrator(settings["method"].tolist())
-    batch.set_integrator(**of("timestep"))
-    batch.set_gains(**of("kp", "ki", "kd"))
-    if "setpoint" in settings:
-        batch.set_setpoint(settings["setpoint"])
-    still = np.zeros((arms, links))
-    batch.set_state(settings.get("q0", still), settings.get("qdot0", still))
-    return batch
-
-
-def _try(name: str, values: Any, links: int) -> None:
-    """Gives the values to arms, some at once, so that a bad one is refused by its name and place."""
-    for start in range(0, len(values), TRIED_AT_ONCE):
-        some = values[start : start + TRIED_AT_ONCE]
-        try:
-            _begin({name: some}, len(some), links)
-        except ValueError as refusal:
-            said = str(refusal)
-            # The batch counts from the first of these.
-            row = re.match(rf"{name}\[(\d+)\]", said)
-            if row:
-                said = f"{name}[{start + int(row[1])}]{said[row.end() :]}"
-            raise ValueError(said) from None
 
 
 def _advance(batch: Batch, steps: NDArray[np.int64], stopped: threading.Event | None) -> None:
@@ -392,7 +296,7 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     arms = stop - start
     settings = {name: values[place] for (name, values), place in zip(question.axes.items(), places, strict=True)}
     settings |= {name: np.repeat(values, arms, axis=0) for name, values in question.fixed.items()}
-    batch = _begin(settings, arms, question.links)
+    batch = begin(settings, arms, question.links)
     batch.enable(question.servo)
     timestep = settings.get("timestep", np.full(arms, TIMESTEP))
     shape = (question.samples, arms, question.links)

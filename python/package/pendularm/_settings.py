@@ -1,0 +1,107 @@
+"""The settings of a sweep: their names, their values as arrays, and arms that have them."""
+
+import operator
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ._native import Batch
+
+Floats = NDArray[np.float64]
+
+TRIED_AT_ONCE = 16_384
+"""Values of a setting that one `Batch` tries before the sweep begins."""
+
+PER_JOINT = ("lengths", "masses", "kp", "ki", "kd", "setpoint", "q0", "qdot0")
+STATES = ("setpoint", "q0", "qdot0")
+SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
+
+
+def whole_number(name: str, value: Any) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
+
+
+def flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {value!r:.60}")
+    return bool(value)
+
+
+def number(name: str, value: Any) -> float:
+    try:
+        return float(numbers(value))
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got a number that no double holds") from None
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
+
+
+def numbers(value: Any) -> Floats:
+    """The value as doubles; text and complex numbers are none."""
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        return array.astype(np.float64)
+    return array.astype(np.float64, casting="same_kind")
+
+
+def column(name: str, values: Sequence[Any], links: int) -> Any:
+    """Values of a setting, a row for each."""
+    if name not in SETTINGS:
+        raise ValueError(f"there is no setting {name!r}; there are {', '.join(SETTINGS)}")
+    if name == "method":
+        return np.array([str(value) for value in values])
+    try:
+        if name in PER_JOINT:
+            array = np.array([np.broadcast_to(numbers(value), (links,)) for value in values])
+        else:
+            array = np.array([float(numbers(value)) for value in values])
+    except OverflowError:
+        raise ValueError(f"every {name} must be finite, got a number that no double holds") from None
+    except (TypeError, ValueError):
+        each = f" or an array of {links}" if name in PER_JOINT else ""
+        raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
+    # The other ones are refused by these names where they are tried.
+    if name in STATES and not np.isfinite(array).all():
+        row, joint = np.argwhere(~np.isfinite(array))[0]
+        raise ValueError(f"{name}[{row}][{joint}] must be finite, got {array[row, joint]}")
+    return array
+
+
+def begin(settings: Mapping[str, Any], arms: int, links: int) -> Batch:
+    """Arms with these settings, a row for each arm."""
+    batch = Batch(arms, links, threads=1)
+
+    def of(*names: str) -> dict[str, Any]:
+        return {name: settings[name] for name in names if name in settings}
+
+    batch.set_params(**of("gravity", "masses", "lengths"))
+    if "method" in settings:
+        batch.set_integrator(settings["method"].tolist())
+    batch.set_integrator(**of("timestep"))
+    batch.set_gains(**of("kp", "ki", "kd"))
+    if "setpoint" in settings:
+        batch.set_setpoint(settings["setpoint"])
+    still = np.zeros((arms, links))
+    batch.set_state(settings.get("q0", still), settings.get("qdot0", still))
+    return batch
+
+
+def try_values(name: str, values: Any, links: int) -> None:
+    """Gives the values to arms, some at once, so that a bad one is refused by its name and place."""
+    for start in range(0, len(values), TRIED_AT_ONCE):
+        some = values[start : start + TRIED_AT_ONCE]
+        try:
+            begin({name: some}, len(some), links)
+        except ValueError as refusal:
+            said = str(refusal)
+            # The batch counts from the first of these.
+            row = re.match(rf"{name}\[(\d+)\]", said)
+            if row:
+                said = f"{name}[{start + int(row[1])}]{said[row.end() :]}"
+            raise ValueError(said) from None
