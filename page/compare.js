@@ -44,7 +44,7 @@ export function startCompare() {
   byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
   view = new CompareView();
   watch("links", () => { byId("compare-result").hidden = true; });
-  watch("connection", () => said.show(""));
+  watch("connection", (now) => { if (now === "open") said.show(""); });
   watch("lesson", (lesson) => { if (lesson?.runs) showLesson(lesson); });
 }
 

@@ -38,7 +38,7 @@ export function startLadder() {
   said = refusal(go);
   byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, el("label", { class: "option" }, el("span", {}, "servo"), servo), go), said.element);
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
-  watch("connection", () => said.show(""));
+  watch("connection", (now) => { if (now === "open") said.show(""); });
   setText(byId("ladder-text"), "Runs this arm from its present state with every method at eight timesteps, and compares each with a reference: what does accuracy cost?");
 }
 

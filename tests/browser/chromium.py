@@ -171,11 +171,20 @@ class Page:
     def until(self, expression, seconds=60, why=""):
         """Waits until the expression is true, and gives its value."""
         end = time.monotonic() + seconds
-        while not (value := self.run(expression)):
+        while not (value := self.run_unless_it_leaves(expression)):
             if time.monotonic() > end:
                 raise AssertionError(f"after {seconds} s still not: {why or expression}")
             time.sleep(0.05)
         return value
+
+    def run_unless_it_leaves(self, expression):
+        """The expression's value; none if the page goes elsewhere before it has answered."""
+        try:
+            return self.run(expression)
+        except BrowserError as error:
+            if "navigated" in str(error) or "context was destroyed" in str(error):
+                return None
+            raise
 
     def text(self, selector):
         return self.run(f"document.querySelector({json.dumps(selector)}).textContent")

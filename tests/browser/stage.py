@@ -70,10 +70,15 @@ class PageTest(unittest.TestCase):
 
     def image(self, selector):
         """A picture of the element as it is now."""
-        box = self.page.run(
-            f"(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}});"
-            " const b = e.getBoundingClientRect(); return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()")
-        return Image(self.page.screenshot(clip=[round(one) for one in box]))
+        look = (f"(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}});"
+                " const b = e.getBoundingClientRect(); return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()")
+        box, picture = self.page.run(look), None
+        # What comes above it meanwhile moves it out of the picture.
+        while picture is None or box != before:
+            before = box
+            picture = self.page.screenshot(clip=[round(one) for one in box])
+            box = self.page.run(look)
+        return Image(picture)
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""

@@ -48,7 +48,8 @@ impl Plan {
             .map(|words| words.split(',').map(str::to_owned).collect())
             .unwrap_or_default();
         if quick {
-            let patience = Duration::from_secs(5);
+            // A machine that stands still for seconds answers late; who is not answered at all waits for ever.
+            let patience = Duration::from_secs(20);
             return Self {
                 attacked: Duration::from_millis(900),
                 patience,

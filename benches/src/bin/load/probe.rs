@@ -15,7 +15,7 @@ use pendularm_benches::protocol::{Event, Protocol};
 /// Between two requests.
 const PERIOD: Duration = Duration::from_millis(20);
 /// A request that takes longer fails the run.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A thread that probes until it is told to stop.
 pub struct Probe<T> {
@@ -70,7 +70,7 @@ pub fn clock(address: SocketAddr) -> Probe<f64> {
         client.stream.write_all(&subscription).expect("sent");
         let mut heard = Vec::new();
         while !stop.load(Ordering::Relaxed) {
-            let message = client.listen(Duration::from_secs(1), |event| match event {
+            let message = client.listen(PATIENCE, |event| match event {
                 Event::Message(payload) => Some((stamp(payload) as f64, now() as f64)),
                 _ => None,
             });
