@@ -177,7 +177,7 @@ fn stolen() -> f64 {
         .lines()
         .next()
         .and_then(|all| all.split_whitespace().nth(8));
-    // Of a hundredth of a second, whatever the kernel's own are.
+    // A tick is a hundredth of a second here, whatever the kernel's own is.
     ticks
         .and_then(|ticks| ticks.parse::<f64>().ok())
         .unwrap_or_default()
