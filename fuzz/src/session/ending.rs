@@ -32,7 +32,7 @@ impl Session {
             player.client.finish();
         }
         // A client that leaves is owed the rest, and answers need not come.
-        let limit = STALL_LIMIT + RESPONSES_OWED + 2 * LINGER + Duration::from_secs(5);
+        let limit = STALL_LIMIT + RESPONSES_TIME + 2 * LINGER + Duration::from_secs(5);
         let mut waited = Duration::ZERO;
         while waited < limit && !self.has_emptied() {
             let step = self.patience(250, waited);

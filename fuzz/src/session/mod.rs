@@ -26,7 +26,7 @@ use std::time::Duration;
 
 use arbitrary::Arbitrary;
 use pendularm::actors::gateway::connection::admission::Admission;
-use pendularm::actors::gateway::limits::{LINGER, RESPONSES_OWED, STALL_LIMIT};
+use pendularm::actors::gateway::limits::{LINGER, RESPONSES_TIME, STALL_LIMIT};
 use pendularm::actors::resources::budget::Memory;
 use pendularm::protocol::catalog::{Rosapi, Service, Topic};
 use pendularm::web::serve::TAKE_TIME;
