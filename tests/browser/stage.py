@@ -72,13 +72,14 @@ class PageTest(unittest.TestCase):
         """A picture of the element as it is now."""
         look = (f"(() => {{ const e = document.querySelector('{selector}'); e.scrollIntoView({{block: 'center'}});"
                 " const b = e.getBoundingClientRect(); return [b.x + scrollX, b.y + scrollY, b.width, b.height]; })()")
-        box, picture = self.page.run(look), None
-        # What comes above it meanwhile moves it out of the picture.
-        while picture is None or box != before:
-            before = box
-            picture = self.page.screenshot(clip=[round(one) for one in box])
+        box = self.page.run(look)
+        for _ in range(50):
+            picture, before = self.page.screenshot(clip=[round(one) for one in box]), box
             box = self.page.run(look)
-        return Image(picture)
+            # An element that came above it meanwhile has moved it out of the picture.
+            if box == before:
+                return Image(picture)
+        self.fail(f"{selector} does not come to rest")
 
     def color(self, name):
         """A colour of the style sheet, in the theme that is on."""

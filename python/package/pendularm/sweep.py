@@ -202,7 +202,7 @@ def sweep(
     question.check()
     kept = None
     if folder is not None:
-        kept = Folder(Path(folder), question.kept(), total, piece, metric if isinstance(metric, str) else None)
+        kept = Folder(Path(folder), question.to_keep(), total, piece, metric if isinstance(metric, str) else None)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     left = [start for start in starts if start not in done]
@@ -259,7 +259,7 @@ class _Question:
         if steps > MOST_STEPS:
             raise ValueError(f"duration / timestep must be at most {MOST_STEPS} steps, got {steps:g}")
 
-    def kept(self) -> dict[str, Any]:
+    def to_keep(self) -> dict[str, Any]:
         """The question as the folder keeps it."""
         metric = self.metric
         if not isinstance(metric, str):

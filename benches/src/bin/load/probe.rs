@@ -14,7 +14,7 @@ use pendularm_benches::protocol::{Event, Protocol};
 
 /// Between two requests.
 const PERIOD: Duration = Duration::from_millis(20);
-/// A request that takes longer fails the run.
+/// A request, or the next message of the arm, that takes longer fails the run.
 const PATIENCE: Duration = Duration::from_secs(20);
 
 /// A thread that probes until it is told to stop.
