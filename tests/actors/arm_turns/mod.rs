@@ -1,0 +1,210 @@
+//! The arm's turns in virtual time: its tick comes however many messages wait, and clients who step it share it.
+//!
+//! **Invariant:** work is counted in messages and steps, never timed: the clock moves by a millisecond whenever the arm
+//! lets anybody else have a turn.
+
+mod progress;
+mod steps;
+mod ticks;
+
+use std::any::Any;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use crate::system::in_virtual_time;
+use actix::prelude::*;
+use pendularm::actors::arm::sim::{
+    ArmSim, MAX_STEPS, Pause, Reset, SetGains, SetIntegrator, SetParams, Step, Stepped,
+    TakeSnapshot,
+};
+use pendularm::actors::node::{Ask, Asker, Call, Done, Interest, Publish, Reply, Unserved};
+use pendularm::actors::resources::gauges::Gauges;
+use pendularm::math::arm::Arm;
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pendularm::math::simulation::Simulation;
+use pendularm::protocol::catalog::Topic;
+use pendularm::protocol::op::fields::Rejections;
+use tokio::time::advance;
+
+/// Turns of everybody else in one publishing tick: the clock moves by a millisecond in each.
+const TURNS_PER_TICK: usize = 17;
+/// Turns after which a test gives up.
+const MANY_TURNS: usize = 1_000_000;
+
+/// Everything that the arm says, in order.
+#[derive(Debug, Clone, PartialEq)]
+enum Said {
+    Tick,
+    Answer(u64, Answer),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Answer {
+    Stepped(Stepped),
+    NotStepped(Rejections),
+    Unserved(Unserved),
+    /// To another question.
+    Other,
+}
+
+type Log = Arc<Mutex<Vec<Said>>>;
+
+/// Stands in for the registry.
+struct Probe(Log);
+
+impl Actor for Probe {
+    type Context = Context<Self>;
+}
+
+impl Handler<Publish> for Probe {
+    type Result = ();
+
+    fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
+        if publish.topic == Topic::JointStates {
+            self.0.lock().unwrap().push(Said::Tick);
+        }
+    }
+}
+
+/// Stands in for a client.
+struct Client {
+    number: u64,
+    gone: Arc<AtomicBool>,
+    log: Log,
+}
+
+impl<T: 'static> Asker<T> for Client {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+        let answer = match answer {
+            Err(why) => Answer::Unserved(why),
+            Ok(answer) => {
+                let stepped = (&answer as &dyn Any).downcast_ref::<Result<Stepped, Rejections>>();
+                match stepped {
+                    Some(Ok(stepped)) => Answer::Stepped(*stepped),
+                    Some(Err(rejected)) => Answer::NotStepped(rejected.clone()),
+                    None => Answer::Other,
+                }
+            }
+        };
+        let said = Said::Answer(self.number, answer);
+        self.log.lock().unwrap().push(said);
+    }
+
+    fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+}
+
+/// An arm of three links whose `/joint_states` are heard.
+struct Bench {
+    arm: Addr<ArmSim<3>>,
+    said: Log,
+}
+
+impl Bench {
+    async fn new() -> Self {
+        let said = Log::default();
+        let publish = Probe(Arc::clone(&said)).start().recipient();
+        let gauges = Arc::new(Gauges::default());
+        let arm = ArmSim::new(Arm::default(), Gains::default(), publish, gauges).start();
+        let topic = Topic::JointStates;
+        let wanted = true;
+        arm.send(Interest { topic, wanted }).await.unwrap();
+        Self { arm, said }
+    }
+
+    /// One whose arm is paused at time 0.
+    async fn paused() -> Self {
+        let bench = Self::new().await;
+        bench.ask(0, pause(true));
+        bench.ask(0, Reset::default());
+        bench.until_answers(2).await;
+        bench.said.lock().unwrap().clear();
+        bench
+    }
+
+    fn ask<A: Ask>(&self, client: u64, ask: A) -> Arc<AtomicBool>
+    where
+        ArmSim<3>: Handler<Call<A>>,
+    {
+        let gone = Arc::new(AtomicBool::new(false));
+        let client = Client {
+            number: client,
+            gone: Arc::clone(&gone),
+            log: Arc::clone(&self.said),
+        };
+        let reply = Reply::new(client, None);
+        self.arm.do_send(Call { ask, reply });
+        gone
+    }
+
+    fn step(&self, client: u64, steps: u64) -> Arc<AtomicBool> {
+        let steps = Some(steps);
+        let rejected = Rejections::default();
+        self.ask(client, Step { steps, rejected })
+    }
+
+    /// Lets the arm have its turns, a millisecond each, until so many answers have come; gives the number of turns.
+    async fn until_answers(&self, count: usize) -> usize {
+        for turns in 0..MANY_TURNS {
+            if self.answered() >= count {
+                return turns;
+            }
+            advance(Duration::from_millis(1)).await;
+        }
+        panic!("{} answers instead of {count}", self.answered());
+    }
+
+    fn answered(&self) -> usize {
+        let said = self.said.lock().unwrap();
+        let answers = said.iter().filter(|one| **one != Said::Tick);
+        answers.count()
+    }
+
+    fn answers(&self) -> Vec<(u64, Answer)> {
+        let said = self.said.lock().unwrap();
+        let answers = said.iter().filter_map(|one| match one {
+            Said::Answer(client, answer) => Some((*client, answer.clone())),
+            Said::Tick => None,
+        });
+        answers.collect()
+    }
+
+    fn ticks(&self) -> usize {
+        let said = self.said.lock().unwrap();
+        said.iter().filter(|one| **one == Said::Tick).count()
+    }
+
+    /// Asserts that the ticks that belong to so many turns have come: one may be on its way at the end.
+    #[track_caller]
+    fn assert_ticks(&self, turns: usize, of: &str) {
+        let expected = turns / TURNS_PER_TICK;
+        assert!(expected >= 3, "{of}: only {turns} turns");
+        let ticks = self.ticks();
+        assert!(
+            ticks + 1 >= expected,
+            "{of}: {ticks} ticks in {turns} turns"
+        );
+    }
+
+    async fn snapshot(&self) -> Simulation<3> {
+        *self.arm.send(TakeSnapshot).await.unwrap().0
+    }
+}
+
+fn pause(paused: bool) -> Pause {
+    Pause {
+        paused: Some(paused),
+        ..Pause::default()
+    }
+}
+
+/// All of the steps that were asked for, or fewer.
+fn stepped(answer: &Answer) -> Stepped {
+    match answer {
+        Answer::Stepped(stepped) => *stepped,
+        other => panic!("{other:?}"),
+    }
+}

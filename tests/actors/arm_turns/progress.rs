@@ -1,0 +1,86 @@
+//! Progress of a goal while clients step the arm.
+
+use std::cell::{Cell, RefCell};
+use std::rc::Rc;
+use std::task::Poll;
+
+use super::*;
+use glam::DVec2;
+use pendularm::actors::arm::sim::{CommandGoal, GoalJudged, TrackGoal};
+use pendularm::math::goal::Criteria;
+
+/// Stands in for the owner of a goal: the goal's time at each progress, and whose turn it was.
+struct Owner {
+    turns: Rc<Cell<u64>>,
+    heard: Rc<RefCell<Vec<(f64, u64)>>>,
+}
+
+impl Actor for Owner {
+    type Context = Context<Self>;
+}
+
+impl Handler<GoalJudged<3>> for Owner {
+    type Result = ();
+
+    fn handle(&mut self, judged: GoalJudged<3>, _: &mut Context<Self>) {
+        let heard = (judged.elapsed, self.turns.get());
+        self.heard.borrow_mut().push(heard);
+    }
+}
+
+/// A step of a second is told by itself: ten thousand of them are not told at once, and each is.
+#[test]
+fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
+    in_virtual_time(async {
+        let bench = Bench::paused().await;
+        let (turns, heard) = (Rc::new(Cell::new(0)), Rc::default());
+        let others = Rc::clone(&turns);
+        // Somebody else who always has something to do.
+        actix_rt::spawn(std::future::poll_fn(move |cx| {
+            others.set(others.get() + 1);
+            cx.waker().wake_by_ref();
+            Poll::<()>::Pending
+        }));
+        let owner = Owner {
+            turns,
+            heard: Rc::clone(&heard),
+        };
+        let long = SetIntegrator {
+            timestep: Some(1.0),
+            ..SetIntegrator::default()
+        };
+        let weightless = SetParams {
+            gravity: Some(0.0),
+            ..SetParams::default()
+        };
+        bench.ask(0, long);
+        bench.ask(0, weightless);
+        let rest = [0.0; 3];
+        let owner = owner.start();
+        let goal = TrackGoal {
+            number: 1,
+            target: DVec2::new(0.0, 1.0),
+            criteria: Criteria::default(),
+            solution: rest,
+            owner: owner.clone().recipient(),
+        };
+        bench.arm.send(goal).await.unwrap();
+        let (number, positions) = (1, rest);
+        let command = CommandGoal { number, positions };
+        bench.arm.send(command).await.unwrap();
+        for client in 1..=5 {
+            bench.step(client, 1000);
+        }
+        while bench.answered() < 7 {
+            advance(Duration::from_millis(1)).await;
+        }
+        // The last are on their way.
+        advance(Duration::from_millis(1)).await;
+        let heard = heard.borrow();
+        assert_eq!(heard.len(), 5000);
+        assert!(heard.is_sorted());
+        let most = heard.chunk_by(|(_, one), (_, other)| one == other);
+        let most = most.map(<[_]>::len).max().unwrap();
+        assert_eq!(most, 1, "in a turn");
+    });
+}

@@ -1,0 +1,121 @@
+//! Messages that are not kept: the newest come, and each of the others is counted.
+
+use std::fmt::Write as _;
+
+use super::*;
+
+/// Hears messages, numbered from 0, up to the last: in order, each of the others counted as dropped. Gives how many
+/// came, and the number of the last one that was cut up.
+async fn hear_what_was_kept(gateway: &Gateway, peer: &mut Peer, messages: u64) -> (u64, u64) {
+    let (mut came, mut cut_up, mut last) = (0, 0, 0);
+    while last + 1 < messages {
+        let (message, number) = next_message(peer).await;
+        let n = message["msg"]["n"].as_u64().unwrap();
+        assert!(came == 0 || n > last, "{n} behind {last}");
+        last = n;
+        came += 1;
+        cut_up = cut_up.max(number);
+    }
+    let dropped = gateway.gauges.messages_dropped();
+    assert_eq!(came + dropped, messages, "each has come or is counted");
+    assert!(dropped > messages / 4, "{dropped} were too many to be kept");
+    (came, cut_up)
+}
+
+/// Fragments' ids count what has been cut up: no more than has come.
+#[test]
+fn nothing_is_cut_up_for_a_client_that_does_not_read() {
+    const MESSAGES: u64 = 100;
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
+        subscribe_in_pieces(&mut subscriber, 65_536).await;
+        publisher.advertise("/t").await;
+        for n in 0..MESSAGES {
+            let msg = json!({"n": n, "pad": "x".repeat(128 * 1024)});
+            publisher
+                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .await;
+        }
+        sleep(Duration::from_secs(60)).await;
+        let (came, cut_up) = hear_what_was_kept(&gateway, &mut subscriber, MESSAGES).await;
+        assert_eq!(cut_up, came, "each that was cut up has come");
+    });
+}
+
+/// Pieces of 64 bytes have more than as much around them: of 3 MB they are longer than any outbox takes.
+#[test]
+fn a_message_whose_pieces_no_outbox_takes_is_counted_for_each_who_would_have_had_them() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut publisher = gateway.connect(WIDE);
+        let mut subscribers = [gateway.connect(WIDE), gateway.connect(WIDE)];
+        for subscriber in &mut subscribers {
+            subscribe_in_pieces(subscriber, 64).await;
+        }
+        publisher.advertise("/t").await;
+        for (n, length) in [(0, 3_000_000), (1, 100_000)] {
+            let msg = json!({"n": n, "pad": "x".repeat(length)});
+            publisher
+                .send(json!({"op": "publish", "topic": "/t", "msg": msg}))
+                .await;
+        }
+        for subscriber in &mut subscribers {
+            assert_eq!(next_message(subscriber).await.0["msg"]["n"], 1);
+        }
+        assert_eq!(gateway.gauges.messages_dropped(), 2);
+    });
+}
+
+/// A series waits to be cut up as one piece, and goes as one; each message in it counts.
+#[test]
+fn each_message_of_a_series_that_had_to_go_is_counted() {
+    const MESSAGES: u64 = 2000;
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(1024));
+        subscribe_in_pieces(&mut subscriber, 4096).await;
+        publisher.advertise("/t").await;
+        let pad = "x".repeat(8 * 1024);
+        let mut lines = String::new();
+        for n in 0..MESSAGES {
+            let _ = writeln!(
+                lines,
+                "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{{\"n\":{n},\"pad\":\"{pad}\"}}}}"
+            );
+        }
+        publisher.send_text(&lines).await;
+        sleep(Duration::from_secs(60)).await;
+        hear_what_was_kept(&gateway, &mut subscriber, MESSAGES).await;
+    });
+}
+
+#[test]
+fn of_a_series_a_throttled_subscriber_hears_the_first_and_then_the_newest() {
+    const MESSAGES: u64 = 1200;
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut publisher, mut subscriber) = (gateway.connect(WIDE), gateway.connect(WIDE));
+        let throttled =
+            json!({"op": "subscribe", "topic": "/t", "throttle_rate": 1000, "queue_length": 3});
+        subscriber.send(throttled).await;
+        subscriber.receive().await;
+        publisher.advertise("/t").await;
+        for round in 0..2 {
+            let first = round * MESSAGES;
+            let mut lines = String::new();
+            for n in first..first + MESSAGES {
+                let _ = writeln!(
+                    lines,
+                    "{{\"op\":\"publish\",\"topic\":\"/t\",\"msg\":{{\"n\":{n}}}}}"
+                );
+            }
+            publisher.send_text(&lines).await;
+            let last = first + MESSAGES;
+            for n in [first, last - 3, last - 2, last - 1] {
+                assert_eq!(subscriber.receive().await["msg"]["n"], n);
+            }
+            assert!(subscriber.hears_nothing_for(Duration::from_secs(60)).await);
+        }
+    });
+}

@@ -1,0 +1,156 @@
+//! Runs on record: what arm and registry tell, and that it is enough to take every step again.
+
+mod contents;
+mod damage;
+mod replays;
+
+use std::sync::{Arc, Mutex};
+
+use pendularm::actors::arm::sim::Tell;
+use pendularm::actors::gateway::messages::SetTap;
+use pendularm::actors::recorder::listeners;
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pendularm::record::{
+    Content, Passage, RecordEnding, RecordEntry, Recording, ReplayVerdict, RunSettings, Scribe,
+    replay,
+};
+use serde_json::json;
+use tokio::time::{Instant, sleep};
+
+use crate::stage::{Client, Stage, ms};
+use crate::system::in_virtual_time;
+
+/// Entries as they come, in the order in which they are told.
+#[derive(Clone, Default)]
+pub struct Notes(Arc<Mutex<Noted>>);
+
+#[derive(Default)]
+struct Noted {
+    began: Option<Instant>,
+    entries: Vec<RecordEntry>,
+}
+
+impl Notes {
+    fn put(&self, content: Content) {
+        let mut noted = self.0.lock().unwrap();
+        let began = *noted.began.get_or_insert_with(Instant::now);
+        let log_time = began.elapsed().as_nanos() as u64;
+        noted.entries.push(RecordEntry { log_time, content });
+    }
+
+    pub fn entries(&self) -> Vec<RecordEntry> {
+        self.0.lock().unwrap().entries.clone()
+    }
+
+    /// Begins to note all that passes.
+    pub async fn take<const N: usize>(&self, stage: &Stage<N>)
+    where
+        Gains<N>: Default,
+    {
+        let (of_arm, of_registry) = (self.clone(), self.clone());
+        let listener = listeners::arm::<N>(move |content| {
+            of_arm.put(content);
+            true
+        });
+        stage.arm.send(Tell(Some(listener))).await.unwrap();
+        let tap = listeners::registry(move |content| {
+            if let Some(content) = content {
+                of_registry.put(content);
+            }
+        });
+        let set_tap = SetTap(Some(tap));
+        stage.registry.send(set_tap).await.unwrap();
+    }
+}
+
+pub fn file(entries: &[RecordEntry]) -> Vec<u8> {
+    let settings = RunSettings { links: 2, seed: 1 };
+    let mut scribe = Scribe::new(Vec::new(), &settings).unwrap();
+    for (number, entry) in entries.iter().enumerate() {
+        scribe.write(entry).unwrap();
+        if number % 20 == 19 {
+            scribe.flush().unwrap();
+        }
+    }
+    scribe.finish().unwrap()
+}
+
+pub fn passages(file: &[u8]) -> (Vec<Passage>, RecordEnding) {
+    let mut recording = Recording::new(file);
+    let mut passages = Vec::new();
+    while let Some(passage) = recording.next_passage().unwrap() {
+        passages.push(passage);
+    }
+    (passages, recording.ending().unwrap())
+}
+
+pub fn replayed(entries: &[RecordEntry]) -> ReplayVerdict {
+    replay(&*file(entries)).unwrap()
+}
+
+pub async fn stop<const N: usize>(stage: &Stage<N>)
+where
+    Gains<N>: Default,
+{
+    stage.arm.send(Tell::<N>(None)).await.unwrap();
+    stage.registry.send(SetTap(None)).await.unwrap();
+}
+
+/// Something that a client may do, out of everything that changes the arm's steps.
+async fn do_something<const N: usize>(client: &mut Client, rng: &mut fastrand::Rng) {
+    let mut numbers = |low: f64, high: f64| -> Vec<f64> {
+        (0..N).map(|_| low + (high - low) * rng.f64()).collect()
+    };
+    let (poses, weights) = (numbers(-2.0, 2.0), numbers(0.5, 2.0));
+    let (service, args) = match rng.u32(..12) {
+        0 => ("/pid_controller/enable", json!({"data": rng.bool()})),
+        1 => ("/pid_controller/set_gains", json!({"kp": weights})),
+        2 => (
+            "/arm_sim/set_params",
+            json!({"masses": weights, "gravity": 10.0 * rng.f64()}),
+        ),
+        3 => ("/arm_sim/set_params", json!({"lengths": weights})),
+        4 => {
+            let timestep = 0.0005 + 0.001 * rng.f64();
+            let method = rng.choice(Method::ALL).unwrap().name();
+            (
+                "/arm_sim/set_integrator",
+                json!({"method": method, "timestep": timestep}),
+            )
+        }
+        5 => (
+            "/arm_sim/disturb",
+            json!({"effort": poses, "duration": 0.2 * rng.f64() + 1e-9}),
+        ),
+        6 => ("/arm_sim/reset", json!({})),
+        7 => ("/arm_sim/pause", json!({"data": rng.bool()})),
+        8 => ("/arm_sim/step", json!({"steps": rng.u32(1..50)})),
+        9 => ("/ik_trial/start", json!({})),
+        10 => ("/pid_controller/set_gains", json!({})),
+        _ => return client.publish_trajectory(json!(poses)).await,
+    };
+    client.call(service, args).await;
+}
+
+async fn random_run<const N: usize>(seed: u64) -> Vec<RecordEntry>
+where
+    Gains<N>: Default,
+{
+    let stage = Stage::<N>::with_seed(seed).await;
+    let mut client = stage.connect();
+    let mut rng = fastrand::Rng::with_seed(seed);
+    // A record may begin in the middle of anything.
+    for _ in 0..rng.u32(..8) {
+        do_something::<N>(&mut client, &mut rng).await;
+        sleep(ms(rng.u64(..90))).await;
+    }
+    let notes = Notes::default();
+    notes.take(&stage).await;
+    for _ in 0..40 {
+        do_something::<N>(&mut client, &mut rng).await;
+        sleep(ms(rng.u64(..90))).await;
+    }
+    stop(&stage).await;
+    notes.entries()
+}

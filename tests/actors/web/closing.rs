@@ -1,0 +1,185 @@
+//! WebSockets that are closed: for an unfinished message, for what they hold, at the runtime's end.
+
+use super::*;
+use pendularm::actors::gateway::messages::FinishAll;
+use pendularm_client::Error;
+
+/// The head of a masked frame with the mask 0: so its payload goes as it is.
+fn frame_head(opcode: u8, length: usize) -> Vec<u8> {
+    let mut head = vec![opcode];
+    if let Ok(short @ 0..126) = u8::try_from(length) {
+        head.push(0x80 | short);
+    } else {
+        head.push(0x80 | 127);
+        head.extend_from_slice(&u64::try_from(length).unwrap().to_be_bytes());
+    }
+    head.extend_from_slice(&[0; 4]);
+    head
+}
+
+/// The close frame that the peer is sent: code and reason, behind whatever else comes.
+async fn close_reason(stream: &mut DuplexStream) -> (u16, String) {
+    let mut bytes = Vec::new();
+    stream
+        .read_to_end(&mut bytes)
+        .await
+        .expect("an orderly end");
+    let close = bytes
+        .iter()
+        .rposition(|byte| *byte == 0x88)
+        .expect("a close frame");
+    let code = u16::from_be_bytes([bytes[close + 2], bytes[close + 3]]);
+    (
+        code,
+        String::from_utf8_lossy(&bytes[close + 4..]).into_owned(),
+    )
+}
+
+/// Byte by byte within a frame; and in parts of a message, between which the peer answers every ping.
+#[test]
+fn a_message_that_does_not_end_is_given_up_after_a_minute() {
+    in_virtual_time(async {
+        for pongs in [false, true] {
+            let gateway = Gateway::bare().await;
+            let mut stream = open(&gateway, WIDE).await.into_stream();
+            let (opcode, length) = if pongs {
+                (0x01, 1000)
+            } else {
+                (0x81, 1_000_000)
+            };
+            let began = Instant::now();
+            stream.write_all(&frame_head(opcode, length)).await.unwrap();
+            stream.write_all(&[b' '; 1000]).await.unwrap();
+            for _ in 0..FRAME_TIME.as_secs() - 1 {
+                sleep(Duration::from_secs(1)).await;
+                let bytes = if pongs {
+                    frame_head(0x8a, 0)
+                } else {
+                    vec![b' ']
+                };
+                stream.write_all(&bytes).await.unwrap();
+            }
+            let (code, why) = close_reason(&mut stream).await;
+            assert_eq!(
+                (code, why.contains("within a minute")),
+                (1008, true),
+                "{why}"
+            );
+            // It is noticed with the next ping at the latest.
+            let time = began.elapsed();
+            assert!(
+                time >= FRAME_TIME && time <= FRAME_TIME + PING_INTERVAL,
+                "{time:?}"
+            );
+            drop(stream);
+            settle().await;
+            assert_eq!(gateway.gauges.connections(), 0);
+        }
+    });
+}
+
+/// Its first part has come with the last byte of the message before it.
+#[test]
+fn a_message_that_begins_behind_another_is_given_up_after_a_minute_too() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut stream = open(&gateway, WIDE).await.into_stream();
+        let whole = br#"{"op":"advertise","topic":"/t","type":"std_msgs/msg/String"}"#;
+        let bytes = [
+            frame_head(0x81, whole.len()),
+            whole.to_vec(),
+            frame_head(0x01, 1000),
+            vec![b' '; 1000],
+        ];
+        let began = Instant::now();
+        stream.write_all(&bytes.concat()).await.unwrap();
+        for _ in 0..FRAME_TIME.as_secs() - 1 {
+            sleep(Duration::from_secs(1)).await;
+            stream.write_all(&frame_head(0x8a, 0)).await.unwrap();
+        }
+        let (code, why) = close_reason(&mut stream).await;
+        assert_eq!(code, 1008, "{why}");
+        let time = began.elapsed();
+        assert!(time <= FRAME_TIME + PING_INTERVAL, "{time:?}");
+    });
+}
+
+#[test]
+fn a_peer_that_holds_most_is_closed_with_a_reason() {
+    in_virtual_time(async {
+        let memory = Memory::of(4 * 1024 * 1024);
+        let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
+        let mut modest = open(&gateway, WIDE).await;
+        let mut hog = open(&gateway, WIDE).await;
+        // Calls that nobody answers, under long ids; read as soon as they come.
+        let mut provider = open(&gateway, WIDE).await;
+        let advertise = json!({"op": "advertise_service", "service": "/s"});
+        send(&mut provider, advertise).await;
+        settle().await;
+        let id = "x".repeat(100_000);
+        for _ in 0..60 {
+            let call = json!({"op": "call_service", "service": "/s", "id": id, "timeout": 86_400});
+            let mut bytes = Vec::new();
+            append(
+                &mut bytes,
+                LAST | opcode::TEXT,
+                [0; 4],
+                call.to_string().as_bytes(),
+            );
+            // It may have been closed already.
+            let _ = hog.stream().write_all(&bytes).await;
+        }
+        let (code, why) = close_reason(&mut hog.into_stream()).await;
+        assert_eq!(code, 1013);
+        assert!(
+            why.starts_with("memory: this connection held the most"),
+            "{why}"
+        );
+        settle().await;
+        assert_eq!((memory.cut_off(), gateway.gauges.connections()), (1, 2));
+        let call = json!({"op": "call_service", "service": "/nobody", "id": 1});
+        send(&mut modest, call).await;
+        receive_text(&mut modest).await;
+        drop((modest, provider));
+        settle().await;
+        assert_eq!(memory.held(), 0);
+    });
+}
+
+#[test]
+fn at_the_runtimes_end_the_client_gets_what_it_is_owed_and_a_close_frame() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut socket = open(&gateway, WIDE).await;
+        let unknown = json!({"op": "call_service", "service": "/nobody", "id": 1});
+        send(&mut socket, unknown).await;
+        settle().await;
+        gateway.registry.send(FinishAll).await.unwrap();
+        receive_text(&mut socket).await;
+        let Event::Close(Some(code), _) = receive(&mut socket).await else {
+            panic!("no close frame");
+        };
+        assert_eq!(code, 1001);
+        socket.close(code, "").await;
+        let end = socket.next_event().await;
+        assert!(matches!(end, Err(Error::Ended)), "{end:?}");
+        drop(socket);
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+#[test]
+fn a_client_that_does_not_answer_the_close_frame_is_waited_for_no_longer_than_five_seconds() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let socket = open(&gateway, WIDE).await;
+        settle().await;
+        gateway.registry.send(FinishAll).await.unwrap();
+        sleep(Duration::from_secs(4)).await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        sleep(Duration::from_secs(2)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+        drop(socket);
+    });
+}

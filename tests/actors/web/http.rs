@@ -1,0 +1,174 @@
+//! Requests of HTTP: heads that do not come, and answers that are not taken.
+
+use super::*;
+use pendularm::actors::gateway::connection::admission::MAX_HEADS;
+use pendularm::web::access::Access;
+use pendularm::web::{MAX_FILES_TOTAL, MAX_REQUESTS, Site};
+
+const HEAD: &str = "GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n";
+/// From the first bytes to the end of the head, and to the token.
+const HEAD_TIME: Duration = Duration::from_secs(5);
+
+/// All that comes up to the end of the stream.
+async fn rest(stream: &mut DuplexStream) -> String {
+    let mut text = String::new();
+    stream
+        .read_to_string(&mut text)
+        .await
+        .expect("an orderly end");
+    text
+}
+
+#[test]
+fn a_head_that_does_not_come_is_given_up_after_five_seconds() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut stream = connect(&gateway, WIDE);
+        stream.write_all(HEAD.as_bytes()).await.unwrap();
+        let began = Instant::now();
+        // A header line every second is no head either.
+        let dripping = async {
+            for _ in 0..4 {
+                sleep(Duration::from_secs(1)).await;
+                stream.write_all(b"X: y\r\n").await.unwrap();
+            }
+            rest(&mut stream).await
+        };
+        let answer = dripping.await;
+        assert!(answer.starts_with("HTTP/1.1 408 "), "{answer}");
+        assert_elapsed(began, HEAD_TIME);
+        drop(stream);
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}
+
+#[test]
+fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut silent = connect(&gateway, WIDE);
+        let mut begun = connect(&gateway, WIDE);
+        begun.write_all(b"GE").await.unwrap();
+        let began = Instant::now();
+        let answer = rest(&mut begun).await;
+        assert!(answer.contains("\"level\":\"error\""), "{answer}");
+        assert_elapsed(began, HEAD_TIME);
+        // A stream that can only become JSON, or BSON, has more time: a frame's.
+        let mut open = connect(&gateway, WIDE);
+        open.write_all(b"{").await.unwrap();
+        let began = Instant::now();
+        let answer = rest(&mut open).await;
+        assert!(answer.contains("\"level\":\"error\""), "{answer}");
+        assert_elapsed(began, FRAME_TIME);
+        sleep(Duration::from_secs(24 * 3600)).await;
+        silent.write_all(b"{}\n").await.unwrap();
+        let mut byte = [0];
+        silent.read_exact(&mut byte).await.unwrap();
+        assert_eq!(byte, *b"{");
+    });
+}
+
+/// Two of the longest files are on their way to clients that don't take them: the older one gives way to a third, and
+/// the page is not concerned.
+#[test]
+fn files_of_a_report_that_are_being_sent_have_a_total() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let folder = std::env::temp_dir().join(format!("pendularm-files-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        // It has a length, and no content on the disk.
+        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
+        file.set_len(MAX_FILES_TOTAL / 2 - 100_000).unwrap();
+        let site = Site::new(Access::default(), folder.clone());
+        let admission = Arc::new(Admission {
+            token: None,
+            site,
+            ..Admission::default()
+        });
+        let request = HEAD.replace("GET /", "GET /report/a.csv") + "\r\n";
+        let mut deaf = Vec::new();
+        for _ in 0..2 {
+            let mut stream = connect_through(&gateway, &admission, 1024);
+            stream.write_all(request.as_bytes()).await.unwrap();
+            assert_eq!(stream.read_u8().await.unwrap(), b'H');
+            deaf.push(stream);
+        }
+        let mut page = connect_through(&gateway, &admission, WIDE);
+        page.write_all(format!("{HEAD}\r\n").as_bytes())
+            .await
+            .unwrap();
+        assert!(rest(&mut page).await.starts_with("HTTP/1.1 200 "));
+        let mut late = connect_through(&gateway, &admission, WIDE);
+        late.write_all(request.as_bytes()).await.unwrap();
+        let length = usize::try_from(MAX_FILES_TOTAL / 2 - 100_000).unwrap();
+        let answer = rest(&mut late).await;
+        assert!(answer.starts_with("HTTP/1.1 200 "));
+        assert!(answer.len() > length, "it came whole");
+        let mut newer = deaf.pop().unwrap();
+        assert!(
+            rest(&mut deaf[0]).await.len() < length,
+            "the oldest gave way"
+        );
+        assert!(rest(&mut newer).await.len() > length, "and no other");
+        std::fs::remove_dir_all(&folder).unwrap();
+    });
+}
+
+/// Clients that take no byte of their answers keep nobody from one, nor do those that don't get to the end of their
+/// heads.
+#[test]
+fn of_too_many_requests_at_once_the_oldest_makes_room() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let admission = Arc::default();
+        let request = format!("{HEAD}\r\n");
+        let mut begun = Vec::new();
+        for _ in 0..=MAX_HEADS {
+            let mut stream = connect_through(&gateway, &admission, WIDE);
+            stream.write_all(HEAD.as_bytes()).await.unwrap();
+            begun.push(stream);
+        }
+        let told = rest(&mut begun.remove(0)).await;
+        assert!(told.starts_with("HTTP/1.1 408 "), "{told}");
+        // The page is longer than the pipe.
+        let mut deaf = Vec::new();
+        for _ in 0..MAX_REQUESTS {
+            let mut stream = connect_through(&gateway, &admission, 512);
+            stream.write_all(request.as_bytes()).await.unwrap();
+            deaf.push(stream);
+        }
+        settle().await;
+        let mut stream = connect_through(&gateway, &admission, WIDE);
+        stream.write_all(request.as_bytes()).await.unwrap();
+        let page = rest(&mut stream).await;
+        assert!(page.starts_with("HTTP/1.1 200 "), "{page}");
+        drop(stream);
+        // One of them has made room, the oldest; the others get all of it as soon as they read.
+        for (number, mut stream) in deaf.into_iter().enumerate() {
+            let whole = rest(&mut stream).await == page;
+            assert_eq!(whole, number > 0, "{number}");
+        }
+        for mut stream in begun {
+            stream.write_all(b"\r\n").await.unwrap();
+            assert_eq!(rest(&mut stream).await, page);
+        }
+    });
+}
+
+#[test]
+fn a_browser_that_takes_no_byte_of_its_answer_is_given_up() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        // The answer is longer than the pipe.
+        let mut stream = connect(&gateway, 64);
+        stream
+            .write_all(format!("{HEAD}\r\n").as_bytes())
+            .await
+            .unwrap();
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        sleep(Duration::from_secs(11)).await;
+        assert_eq!(gateway.gauges.connections(), 0);
+    });
+}

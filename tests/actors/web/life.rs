@@ -1,0 +1,116 @@
+//! Signs of life: pings, pongs and whatever else a peer sends.
+
+use super::*;
+use crate::virtual_time::Held;
+use tokio::time::timeout;
+
+#[test]
+fn a_peer_that_answers_pings_stays_and_is_pinged_every_fifteen_seconds() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut socket = open(&gateway, WIDE).await;
+        let began = Instant::now();
+        for ping in 1..=240 {
+            let message = socket.next_event().await.unwrap();
+            assert!(matches!(message, Event::Ping(_)), "{message:?}");
+            assert_elapsed(began, ping * PING_INTERVAL);
+        }
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+#[test]
+fn a_peer_without_a_sign_of_life_is_closed_thirty_seconds_after_it_was_asked() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let socket = open(&gateway, WIDE).await;
+        settle().await;
+        sleep(PING_INTERVAL + PONG_TIME - Duration::from_secs(1)).await;
+        assert_eq!(gateway.gauges.connections(), 1);
+        // The close frame is not answered either; it is waited for, and no longer than that.
+        sleep(Duration::from_secs(1) + Duration::from_secs(5)).await;
+        settle().await;
+        assert_eq!(gateway.gauges.connections(), 0);
+        drop(socket);
+    });
+}
+
+/// Over a slow line a message can take longer than a pong may: its bytes are as good a sign of life.
+#[test]
+fn a_peer_in_the_middle_of_a_long_message_is_alive() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let socket = open(&gateway, WIDE).await;
+        let mut stream = socket.into_stream();
+        let frame = json!({"op": "subscribe", "topic": "/chat/over/a/slow/line"}).to_string();
+        let length = u8::try_from(frame.len()).unwrap();
+        let began = Instant::now();
+        let mut bytes = vec![0x81, 0x80 | length, 0, 0, 0, 0];
+        bytes.extend_from_slice(frame.as_bytes());
+        for byte in bytes {
+            stream.write_all(&[byte]).await.unwrap();
+            sleep(Duration::from_secs(1)).await;
+        }
+        assert!(
+            began.elapsed() > PING_INTERVAL + PONG_TIME,
+            "else it proves nothing"
+        );
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+/// A node that answers after ten minutes: meanwhile the connection reads nothing, so it sees no pong.
+#[test]
+fn while_the_client_is_not_read_it_need_not_show_life() {
+    in_virtual_time(async {
+        let held = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&held).attach(&mut nodes, &[Service::Pause], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let mut socket = open(&gateway, WIDE).await;
+        send(
+            &mut socket,
+            json!({"op": "call_service", "service": "/arm_sim/pause", "id": 1}),
+        )
+        .await;
+        sleep(Duration::from_secs(600)).await;
+        assert_eq!(held.count(), 1);
+        held.answer();
+        let answer = receive_text(&mut socket).await;
+        assert!(answer.contains("\"id\":1"));
+        // From here on it is asked again, and answers.
+        let quiet = timeout(Duration::from_secs(600), receive(&mut socket)).await;
+        assert!(quiet.is_err());
+        assert_eq!(gateway.gauges.connections(), 1);
+    });
+}
+
+/// With its queue full no frame of it is performed, but its close is seen all the same.
+#[test]
+fn a_peer_that_closes_while_its_queue_is_full_is_gone_at_once() {
+    in_virtual_time(async {
+        let held = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&held).attach(&mut nodes, &[Service::IntegrationStep], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let mut socket = open(&gateway, WIDE).await;
+        let service = Service::IntegrationStep.name();
+        for n in 0..30 {
+            let call = json!({"op": "call_service", "service": service, "id": n});
+            send(&mut socket, call).await;
+        }
+        settle().await;
+        // It is alive all the while.
+        let quiet = timeout(2 * (PING_INTERVAL + PONG_TIME), receive(&mut socket)).await;
+        assert!(quiet.is_err());
+        assert_eq!(gateway.gauges.connections(), 1);
+        let began = Instant::now();
+        socket.close(1000, "").await;
+        while socket.next_event().await.is_ok() {}
+        settle().await;
+        assert_elapsed(began, Duration::from_millis(10));
+        assert_eq!(gateway.gauges.connections(), 0);
+        assert!(held.take().is_gone(), "it need not go on");
+        assert_eq!(held.count(), 0, "the next one is not begun");
+    });
+}

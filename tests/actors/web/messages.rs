@@ -1,0 +1,109 @@
+//! Messages over a WebSocket: what a long one costs, and the forms in which they come.
+
+use std::cell::Cell;
+use std::rc::Rc;
+
+use super::*;
+
+/// The buffer that a long message is read into stays with the connection, so it stays charged.
+#[test]
+fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
+    const LONG: usize = 3 << 20;
+    in_virtual_time(async {
+        let memory = Memory::default();
+        let gateway = Gateway::within(memory.clone(), Nodes::default()).await;
+        let mut socket = open(&gateway, WIDE).await;
+        settle().await;
+        let before = memory.held();
+        let long = json!({"op": "publish", "topic": "/nobody", "msg": {"data": "x".repeat(LONG)}});
+        send(&mut socket, long).await;
+        send(&mut socket, json!({"op": "set_level", "level": "none"})).await;
+        settle().await;
+        let held = memory.held() - before;
+        assert!((LONG..2 * LONG).contains(&held), "{held}");
+        drop(socket);
+        sleep(Duration::from_secs(60)).await;
+        assert_eq!(memory.held(), 0);
+    });
+}
+
+/// It has come up to its last byte, so that only what is done with a whole message is counted, not its coming.
+#[test]
+fn a_long_message_is_looked_at_in_turns() {
+    const LONG: usize = 4 << 20;
+    /// Bytes of a turn.
+    const TURN: usize = 64 * 1024;
+    in_virtual_time(async {
+        let mut nodes = Nodes::default();
+        let node = Node {
+            on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
+            ..Node::default()
+        };
+        node.attach(&mut nodes, &[Service::Pause], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let light = json!({"op": "call_service", "service": "/arm_sim/pause", "id": 1});
+        let call = light.to_string();
+        let lines = "\n".repeat(LONG - call.len());
+        let numbers = "1,\n".repeat(LONG / 3 - 3);
+        for message in [
+            format!("{lines}{call}"),
+            format!("{call}{lines}"),
+            format!("[{numbers}"),
+            // No frame: that would be read by another thread, however many turns others have meanwhile.
+            format!("{{\"d\":[{numbers}}}"),
+        ] {
+            let mut socket = open(&gateway, WIDE).await;
+            let mut bytes = Vec::new();
+            append(&mut bytes, LAST | opcode::TEXT, [0; 4], message.as_bytes());
+            let last = bytes.pop().unwrap();
+            socket.stream().write_all(&bytes).await.unwrap();
+            settle().await;
+            let turns = Rc::new(Cell::new(0));
+            let counted = Rc::clone(&turns);
+            let others = actix_rt::spawn(async move {
+                loop {
+                    counted.set(counted.get() + 1);
+                    tokio::task::yield_now().await;
+                }
+            });
+            socket.stream().write_all(&[last]).await.unwrap();
+            if !message.contains(&call) {
+                send(&mut socket, light.clone()).await;
+            }
+            let answer = receive_text(&mut socket).await;
+            others.abort();
+            assert!(answer.contains(r#""result":true"#), "{answer}");
+            let turns = turns.get();
+            assert!(turns >= message.len() / TURN, "{turns} turns");
+        }
+    });
+}
+
+#[test]
+fn a_message_comes_as_cbor_or_as_cdr_in_cbor_as_each_subscriber_wants_it() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let (mut talker, mut plain) = (gateway.connect(WIDE), open(&gateway, WIDE).await);
+        let mut raw = open(&gateway, WIDE).await;
+        for (socket, compression) in [(&mut plain, "cbor"), (&mut raw, "cbor-raw")] {
+            let subscribe = json!({"op": "subscribe", "topic": "/t", "type": "std_msgs/String", "compression": compression});
+            send(socket, subscribe).await;
+        }
+        settle().await;
+        talker
+            .send(json!({"op": "advertise", "topic": "/t", "type": "std_msgs/String"}))
+            .await;
+        talker
+            .send(json!({"op": "publish", "topic": "/t", "msg": {"data": "abc"}}))
+            .await;
+        let holds = |message: &Event, part: &[u8]| matches!(message, Event::Binary(bytes) if bytes.windows(part.len()).any(|one| one == part));
+        // A map of one text, and a string in CDR: little-endian, its length with the zero behind it.
+        let (as_cbor, as_cdr) = (b"\xa1\x64data\x63abc", b"\0\x01\0\0\x04\0\0\0abc\0");
+        let (plain, raw) = (receive(&mut plain).await, receive(&mut raw).await);
+        assert!(
+            holds(&plain, as_cbor) && !holds(&plain, as_cdr),
+            "{plain:?}"
+        );
+        assert!(holds(&raw, as_cdr) && !holds(&raw, as_cbor), "{raw:?}");
+    });
+}

@@ -1,0 +1,75 @@
+//! HTTP and WebSocket where time matters: heads that do not come, peers that show no sign of life, clients that do not
+//! read. Here the client's end of a connection.
+//!
+//! **Invariant:** virtual time and in-memory pipes only; a time that is asserted is exact to the timers' grain.
+
+#![cfg(feature = "web")]
+
+mod closing;
+mod http;
+mod life;
+mod messages;
+mod unread;
+
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use crate::system::in_virtual_time;
+use crate::virtual_time::{Gateway, Node, WIDE, assert_elapsed, settle};
+use pendularm::actors::gateway::connection::Connection;
+use pendularm::actors::gateway::connection::admission::Admission;
+use pendularm::actors::gateway::limits::FRAME_TIME;
+use pendularm::actors::gateway::registry::Nodes;
+use pendularm::actors::resources::budget::Memory;
+use pendularm::protocol::catalog::Service;
+use pendularm_client::codec::Event;
+use pendularm_client::pipe::Client;
+use pendularm_client::websocket::{LAST, append, opcode};
+use serde_json::{Value, json};
+use tokio::io::{AsyncReadExt, AsyncWriteExt, DuplexStream, duplex};
+use tokio::time::{Instant, sleep};
+
+const PING_INTERVAL: Duration = Duration::from_secs(15);
+const PONG_TIME: Duration = Duration::from_secs(30);
+
+/// The client's end of a new connection.
+fn connect(gateway: &Gateway, room: usize) -> DuplexStream {
+    connect_through(gateway, &Arc::default(), room)
+}
+
+/// The same, on conditions that are shared with others.
+fn connect_through(gateway: &Gateway, admission: &Arc<Admission>, room: usize) -> DuplexStream {
+    let (ours, theirs) = duplex(room);
+    let (registry, gauges) = (gateway.registry.clone(), Arc::clone(&gateway.gauges));
+    let local = SocketAddr::from(([127, 0, 0, 1], 9095));
+    Connection::start_with(Arc::clone(admission), local, theirs, registry, gauges);
+    ours
+}
+
+async fn open(gateway: &Gateway, room: usize) -> Client<DuplexStream> {
+    let stream = connect(gateway, room);
+    Client::web_on(stream, Duration::from_secs(3600), "127.0.0.1:9095", "/").await
+}
+
+async fn send(socket: &mut Client<DuplexStream>, frame: Value) {
+    socket.send(&frame).await;
+}
+
+/// The next message other than a ping, which is answered.
+async fn receive(socket: &mut Client<DuplexStream>) -> Event {
+    loop {
+        match socket.next_event().await.expect("a message") {
+            Event::Ping(_) => {}
+            message => return message,
+        }
+    }
+}
+
+/// The same, which must be a text.
+async fn receive_text(socket: &mut Client<DuplexStream>) -> String {
+    match receive(socket).await {
+        Event::Text(text) => text,
+        other => panic!("{other:?} instead of a text"),
+    }
+}
