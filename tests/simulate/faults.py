@@ -119,7 +119,7 @@ def build():
     for part in ("Cargo.toml", "Cargo.lock"):
         text = (COPY / part).read_text()
         (COPY / part).write_text(re.sub(r'(name = "pendularm"\nversion = )"[^"]*"', r'\1"0.0.0-faults"', text, count=1))
-    play = COPY / "tests/simulate/play.rs"
+    play = COPY / "tests/simulate/play/mod.rs"
     text = play.read_text()
     anew = "    pendularm::FAULTS_DRAWN.store(seed | 1, std::sync::atomic::Ordering::SeqCst);\n    in_virtual_time(async {"
     play.write_text(text.replace("    in_virtual_time(async {", anew, 1))

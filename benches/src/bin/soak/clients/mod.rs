@@ -3,6 +3,7 @@
 //! **Invariant:** each ends by itself, within [`PATIENCE`](crate::world::PATIENCE) of the end of its tide.
 
 mod computing;
+mod contenders;
 mod floods;
 mod garbage;
 mod giants;
@@ -71,7 +72,7 @@ pub const KINDS: &[Kind] = &[
     kind!("subscription storms", 6, 3, storms::subscriptions),
     kind!("topic churns", 6, 3, storms::topics),
     kind!("providers", 14, 6, providers::provide),
-    kind!("providers that take over", 4, 2, providers::take_over),
+    kind!("providers that take over", 4, 2, contenders::take_over),
     kind!(
         "clients that call themselves",
         3,

@@ -1,7 +1,7 @@
 //! Clients that provide services, in every manner, and those that call them.
 //!
-//! **Invariant:** every caller gets one response, its own: the provider's content where that answers, else a refusal that
-//! says why; an answer too many reaches nobody.
+//! **Invariant:** every caller gets one response, its own: the provider's content where that answers, else a refusal
+//! that says why; an answer too many reaches nobody.
 
 use std::cell::Cell;
 use std::collections::{BTreeSet, VecDeque};
@@ -95,7 +95,7 @@ pub async fn provide(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fau
     provided.and(called)
 }
 
-async fn advertise(
+pub(super) async fn advertise(
     world: &Rc<World>,
     service: &str,
     rng: &mut fastrand::Rng,
@@ -175,8 +175,8 @@ fn expect(manner: Manner, n: u64, by: u64, taken: Rc<Cell<u64>>) -> Check {
                 }
                 same(values, &content(n, by))
             }
-            // Where the machine stood still, an answer that comes after its time may be read before anybody has looked at
-            // the clock.
+            // Where the machine stood still, an answer that comes after its time may be read before anybody has looked
+            // at the clock.
             Manner::Late if !refused && asked.elapsed() > 2 * SHORT => {
                 taken.set(taken.get() + 1);
                 same(values, &content(n, by))
@@ -206,14 +206,15 @@ fn no_answer(response: &Value) -> Result<(), String> {
     same(values, &json!({}))
 }
 
-fn same(values: &Value, expected: &Value) -> Result<(), String> {
+pub(super) fn same(values: &Value, expected: &Value) -> Result<(), String> {
     if values == expected {
         return Ok(());
     }
     Err(format!("another call's answer: {values}, not {expected}"))
 }
 
-/// Answers calls in its manner until its callers are done; how many answers were too many, and how many complaints came.
+/// Answers calls in its manner until its callers are done; how many answers were too many, and how many complaints
+/// came.
 async fn serve(
     mut provider: Client,
     manner: Manner,
@@ -314,73 +315,6 @@ async fn vanish(mut provider: Client, mut rng: fastrand::Rng) -> Result<(), Faul
             provider.swallow(PATIENCE).await?;
         }
         _ => {}
-    }
-    Ok(())
-}
-
-/// Two providers of one name, of which the newest has it, while a caller goes on calling.
-pub async fn take_over(world: Rc<World>, mut rng: fastrand::Rng) -> Result<(), Fault> {
-    let service = format!("/soak/contended/{}", world.number());
-    let first = advertise(&world, &service, &mut rng).await?;
-    let second = Client::connect(&world, "provider that takes over", Door::any(&mut rng)).await?;
-    let done = Cell::new(false);
-    let calling = async {
-        let called = call_on(&world, &service, rng.fork()).await;
-        done.set(true);
-        called
-    };
-    let answering = async {
-        tokio::try_join!(
-            contend(first, &service, &done),
-            contend(second, &service, &done)
-        )
-    };
-    let (answered, called) = tokio::join!(answering, calling);
-    answered.map(|_| ()).and(called)
-}
-
-async fn call_on(world: &Rc<World>, service: &str, mut rng: fastrand::Rng) -> Result<(), Fault> {
-    let mut client = Client::connect(world, "caller of contenders", Door::any(&mut rng)).await?;
-    for _ in 0..rng.usize(3..20) {
-        for _ in 0..rng.usize(1..10) {
-            let n = world.number();
-            let check = move |response: &Value| {
-                succeeded(response)?;
-                same(&response["values"], &json!({"n": n}))
-            };
-            client.push_call(service, json!({"n": n}), json!({}), false, Box::new(check));
-            world.count("calls forwarded", 1);
-        }
-        client.settle(|_| Ok(())).await?;
-        tokio::time::sleep(Duration::from_millis(rng.u64(..30))).await;
-    }
-    Ok(())
-}
-
-/// Takes the name over and over again, and answers what comes.
-async fn contend(mut provider: Client, service: &str, done: &Cell<bool>) -> Result<(), Fault> {
-    while !done.get() {
-        provider.push(&json!({"op": "advertise_service", "service": service}));
-        provider.flush().await?;
-        provider.world.count("services provided", 1);
-        let until = Instant::now() + Duration::from_millis(30);
-        while Instant::now() < until {
-            match provider.next(Duration::from_millis(10)).await? {
-                Came::Other(frame) if frame["op"] == "call_service" => {
-                    let values = json!({"n": frame["args"]["n"]});
-                    provider.push(
-                        &json!({"op": "service_response", "service": service, "id": frame["id"],
-                        "values": values, "result": true}),
-                    );
-                    provider.flush().await?;
-                }
-                Came::Other(frame) if frame["level"] == "error" => {
-                    return Err(provider.fault(format!("refused: {frame}")));
-                }
-                Came::End => return Err(provider.fault("the stream ended")),
-                _ => {}
-            }
-        }
     }
     Ok(())
 }

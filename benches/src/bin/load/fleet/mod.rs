@@ -2,16 +2,18 @@
 //!
 //! **Invariant:** every subscriber gets every message of its topic once and in order, or the run fails.
 
-use std::io::{ErrorKind, Read, Write};
+mod reading;
+
+use std::io::{ErrorKind, Write};
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use mio::net::TcpStream;
 use mio::{Events, Interest, Poll, Token};
 
-use crate::message::{Template, now, stamp};
+use crate::message::Template;
 use pendularm_benches::process;
-use pendularm_benches::protocol::{Event, Protocol};
+use pendularm_benches::protocol::Protocol;
 
 /// How long a server may take for what is asked of it before the run fails.
 const PATIENCE: Duration = Duration::from_secs(20);
@@ -19,7 +21,8 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const WARM_UP: Duration = Duration::from_millis(500);
 /// Messages that a flooding publisher hands over in one write.
 const BURST: u64 = 16;
-/// Messages of a flooding publisher that its slowest subscriber may not have yet: few enough that no server has a reason to drop any.
+/// Messages of a flooding publisher that its slowest subscriber may not have yet: few enough that no server has a
+/// reason to drop any.
 const WINDOW: u64 = 256;
 
 /// Who publishes, and how fast.
@@ -317,98 +320,6 @@ impl Fleet {
                 self.turn(Duration::from_millis(10));
             }
         }
-    }
-
-    /// Waits for events, but no longer than `wait`, and takes all that there is to read.
-    fn turn(&mut self, wait: Duration) {
-        let mut events = std::mem::replace(&mut self.events, Events::with_capacity(0));
-        match self.poll.poll(&mut events, Some(wait)) {
-            Err(error) if error.kind() != ErrorKind::Interrupted => panic!("epoll: {error}"),
-            _ => {}
-        }
-        for event in &events {
-            let Token(number) = event.token();
-            if event.is_writable() {
-                self.links[number].flush();
-            }
-            if event.is_readable() {
-                self.read(number);
-            }
-        }
-        self.events = events;
-    }
-
-    fn read(&mut self, number: usize) {
-        loop {
-            let read = match self.links[number].stream.read(&mut self.chunk) {
-                Ok(0) => panic!("{:?} has closed a connection", self.protocol),
-                Ok(read) => read,
-                Err(error) if error.kind() == ErrorKind::WouldBlock => return,
-                Err(error) => panic!("{:?}: {error}", self.protocol),
-            };
-            let mut unread = std::mem::take(&mut self.links[number].unread);
-            if unread.is_empty() {
-                let chunk = std::mem::take(&mut self.chunk);
-                let taken = self.take(number, &chunk[..read]);
-                unread.extend_from_slice(&chunk[taken..read]);
-                self.chunk = chunk;
-            } else {
-                unread.extend_from_slice(&self.chunk[..read]);
-                let taken = self.take(number, &unread);
-                unread.drain(..taken);
-            }
-            self.links[number].unread = unread;
-            // Less than asked for: there was no more.
-            if read < self.chunk.len() {
-                return;
-            }
-        }
-    }
-
-    /// Takes whole events off the front of `bytes`; gives how many bytes they had.
-    fn take(&mut self, number: usize, bytes: &[u8]) -> usize {
-        let mut taken = 0;
-        while let Some((event, length)) = (taken < bytes.len())
-            .then(|| self.protocol.next(&bytes[taken..]))
-            .flatten()
-        {
-            taken += length;
-            let link = &mut self.links[number];
-            match event {
-                Event::Message(payload) if self.scene.pace == Pace::Arm => {
-                    let stamp = stamp(payload);
-                    // A late one is followed at once by the next, and no step may be due between them: two may have one
-                    // stamp, three not.
-                    let mut latest = link.stamps.iter().rev();
-                    assert!(
-                        latest.next() <= Some(&stamp) && latest.next() < Some(&stamp),
-                        "the arm's messages came out of order"
-                    );
-                    link.stamps.push(stamp);
-                    self.deliveries += 1;
-                }
-                Event::Message(payload) => {
-                    let (sequence, sent) = self.template.read(payload).expect("a whole message");
-                    assert_eq!(
-                        sequence, link.received,
-                        "{:?}: the next message",
-                        self.protocol
-                    );
-                    link.received += 1;
-                    self.deliveries += 1;
-                    if self.measuring {
-                        self.latencies
-                            .push(u32::try_from(now() - sent).unwrap_or(u32::MAX));
-                    }
-                }
-                Event::Ready => link.ready = true,
-                Event::Complaint(what) => {
-                    panic!("{:?} says {}", self.protocol, String::from_utf8_lossy(what))
-                }
-                Event::Answer | Event::Other => {}
-            }
-        }
-        taken
     }
 }
 

@@ -1,0 +1,83 @@
+"""The stage of peers.py: the arm, the bridge, sessions on the router, and nodes of the SDK's."""
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import zenoh
+from programs import LIMIT, Process
+from rosbags.typesys import Stores, get_typestore
+from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
+from zenoh_ros2_sdk.qos import QosDurability, QosProfile
+
+ARM, BRIDGE, *NODE = sys.argv[1:]
+DOMAIN = 7
+JAZZY = get_typestore(Stores.ROS2_JAZZY)
+LATCHED = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+kept_ports = []
+
+
+def free_port():
+    """A port that stays free for who is told of it: a socket of ours has it, does not listen, and lets those have it too
+    who ask for it by its number."""
+    one = socket.socket()
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    one.bind(("127.0.0.1", 0))
+    kept_ports.append(one)
+    return one.getsockname()[1]
+
+
+def start_arm(port, *more):
+    arm = Process(ARM, "--bind", f"127.0.0.1:{port}", "--log", "off", *more, stream="stdout")
+    return arm, arm.said("listening on ").removeprefix("listening on ")
+
+
+def start_bridge(arm, router_port, *more):
+    router = f"tcp/127.0.0.1:{router_port}"
+    return Process(BRIDGE, "--connect", arm, "--router", router, "--domain", DOMAIN, *more)
+
+
+def open_session(port):
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", f'["tcp/127.0.0.1:{port}"]')
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
+
+
+def tokens(session, kind="*"):
+    """The tokens of that kind in the domain, taken apart: 8 is the node, 9 the name, 10 the type, 11 the hash."""
+    replies = session.liveliness().get(f"@ros2_lv/{DOMAIN}/*/*/*/{kind}/**")
+    return [str(reply.ok.key_expr).split("/") for reply in replies if reply.ok]
+
+
+def command_line(port, *arguments):
+    """The output of the SDK's command."""
+    command = [Path(sys.executable).with_name("zenoh-ros2"), "--no-daemon", "--router", f"127.0.0.1:{port}"]
+    command += ["--domain-id", str(DOMAIN), "--timeout", "5", *arguments]
+    return subprocess.run(command, check=True, capture_output=True, text=True, timeout=LIMIT).stdout
+
+
+class Peer:
+    """Nodes of the SDK's."""
+
+    def __init__(self, port):
+        self.at = {"domain_id": DOMAIN, "router_ip": "127.0.0.1", "router_port": port}
+
+    def message(self, name):
+        definition, _ = JAZZY.generate_msgdef(name, ros_version=2)
+        return {"msg_definition": definition, "type_hash": JAZZY.hash_rihs01(name), **self.at}
+
+    def subscribe(self, topic, name, qos=None):
+        heard = []
+        ROS2Subscriber(topic, name, heard.append, qos=qos, **self.message(name))
+        return heard
+
+    def publisher(self, topic, name):
+        return ROS2Publisher(topic, name, **self.message(name))
+
+    def service(self, name, kind, request, response, type_hash=None):
+        """A client that computes the type's hash from the definitions by itself, unless it is told."""
+        definitions = {"request_definition": request, "response_definition": response}
+        return ROS2ServiceClient(name, kind, timeout=LIMIT, type_hash=type_hash, **definitions, **self.at)

@@ -1,0 +1,121 @@
+"""The lesson: a blow-up is seen and left in one click, and the panels beside the arm say when one comes."""
+
+import math
+import time
+
+from lesson import NUMBER, Lesson
+
+
+class BlowUp(Lesson):
+    def diverge(self):
+        self.runtime.call("/arm_sim/set_integrator", method="euler", timestep=0.02)
+        self.page.click("#servo")
+        self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
+
+    def test_the_growth_is_a_picture_with_a_scale_that_can_be_read(self):
+        self.diverge()
+        self.keep("blow-up")
+        labels = self.page.run("own('axis.js').then(({ Axis, LOG_END }) => { const axis = new Axis(3, 0.2, 300); axis.begin();"
+                               " axis.offer(-1e148); axis.offer(1); axis.end(); return [axis.log, axis.low, axis.labels.length <= 12]; })")
+        self.assertEqual(labels, [True, -12, True])
+        # The plot shows more than one line along an axis and a spike: the line is at several heights.
+        picture = self.image("#plot-velocity")
+        color = self.color("joint1")
+        heights = {y // 12 for y in range(0, picture.height) for x in range(picture.width // 2, picture.width)
+                   if all(abs(a - b) < 24 for a, b in zip(picture[x, y], color))}
+        self.assertGreaterEqual(len(heights), 4)
+
+    def test_the_limit_of_an_arm_that_has_diverged_is_that_of_its_pose(self):
+        self.diverge()
+        limit = 1000 * self.values("/study/stability", integrator="euler")["timestep_limit_held"]
+        wanted = f"{float(format(limit, '.3g')):g} ms"
+        self.page.until(f"document.querySelector('#out-limit').textContent === '{wanted}'")
+        said = f"20 ms is above the limit {wanted}, at the setpoint (0.00, 0.00) rad."
+        self.page.until(f"document.querySelector('#notice').textContent.includes('{said}')")
+        self.page.until("document.querySelector('#limit-text').textContent.includes('Advised: ')")
+        self.assertNotIn(" ns", self.page.text("#limit-text"))
+
+    def test_the_map_stays_where_it_is_when_the_reason_comes(self):
+        self.page.click("#lesson-stiff")
+        self.page.until("document.querySelector('#why-text').textContent !== ''")
+        top = "document.querySelector('#map').getBoundingClientRect().top"
+        # The reason is a paragraph more or less with each setting: a click aimed at the map must not land beside it.
+        with_reason = self.page.run(top)
+        self.assertEqual(self.page.run(f"(document.querySelector('#why-text').textContent = '', {top})"), with_reason)
+
+    def test_a_click_in_the_map_brings_an_arm_that_has_diverged_back(self):
+        self.page.click("#lesson-stiff")
+        self.wait(lambda: self.values("/pid_controller/enable")["data"], "the lesson's servo")
+        self.runtime.call("/arm_sim/set_integrator", timestep=0.02)
+        self.page.until("document.querySelector('#run-state').textContent === 'diverged'")
+        begin_anew = "[...document.querySelectorAll('#notice button')].some((one) => one.textContent === 'Begin anew')"
+        self.page.until(begin_anew)
+        box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        # 0.2 ms at the present gains.
+        x, y = box[0] + 46 + (box[2] - 56) * math.log10(2) / 3, box[1] + 8 + (box[3] - 40) / 2
+        self.page.mouse("mousePressed", x, y)
+        self.page.mouse("mouseReleased", x, y)
+        self.page.until("document.querySelector('#run-state').textContent === 'running'")
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")
+
+    def test_one_button_recovers(self):
+        self.diverge()
+        button = self.page.until("[...document.querySelectorAll('#notice button')].find((one) => one.textContent.startsWith('Reset with'))?.textContent")
+        self.assertRegex(button, r"^Reset with [\d.]+ ms$")
+        self.page.click("#notice button")
+        self.page.until("document.querySelector('#run-state').textContent === 'running'")
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'stable'")
+        end = time.monotonic() + 1.5
+        while time.monotonic() < end:
+            self.assertEqual(self.page.text("#run-state"), "running")
+            time.sleep(0.1)
+
+    def test_the_pages_own_limits_are_those_of_the_study(self):
+        for links_pose in ([0.0, 0.0], [0.9, -1.3], [-1.2, 2.0]):
+            for method in ("euler", "midpoint", "verlet", "rk4"):
+                served = self.values("/study/stability", integrator=method, setpoint=links_pose)
+                held, continuous = self.page.run(f"""Promise.all([own('loop.js'), own('store.js')]).then(([loop, {{ state }}]) => {{
+                    const at = loop.loopAt(state.params, state.gains, {links_pose});
+                    return [loop.limitOf(at, '{method}', true), loop.limitOf(at, '{method}', false)];
+                }})""")
+                self.assertAlmostEqual(held, served["timestep_limit_held"], delta=1e-5 * held)
+                self.assertAlmostEqual(continuous, served["timestep_limit_continuous"], delta=1e-5 * continuous)
+
+    def test_a_click_in_the_map_goes_there(self):
+        self.tab("stability")
+        self.page.until("document.querySelector('#map-text').textContent.includes('bear')")
+        self.keep("stability")
+        box = self.page.run("(() => { const b = document.querySelector('#map').getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; })()")
+        # 10 ms is two thirds of the way from 0.1 ms to 100 ms; four times the gains is three quarters of the way up.
+        x = box[0] + 46 + (box[2] - 56) * 2 / 3
+        y = box[1] + box[3] - 32 - (box[3] - 40) * 3 / 4
+        self.page.mouse("mousePressed", x, y)
+        self.page.mouse("mouseReleased", x, y)
+        self.wait(lambda: abs(math.log(self.values("/arm_sim/set_integrator")["timestep"] / 0.01)) < 0.05, "timestep")
+        self.wait(lambda: abs(math.log(self.values("/pid_controller/set_gains")["kp"][0] / 4000)) < 0.05, "gains")
+
+    def test_the_modes_move_with_the_timestep(self):
+        self.page.click("#servo")
+        self.tab("stability")
+        inside = self.page.until("document.querySelector('#circle-text').textContent.includes('within the circle') && document.querySelector('#circle-text').textContent")
+        self.assertIn("1 ms", inside)
+        before = self.image("#circle").count(self.color("bad"))
+        self.page.fill(f"#timestep-field {NUMBER}", "0.006")
+        self.page.until("document.querySelector('#circle-text').textContent.includes('grows, flipping its sign at every step')")
+        self.assertGreater(self.image("#circle").count(self.color("bad")), before + 20)
+        self.keep("modes")
+
+    def test_error_against_run_time_is_measured_live(self):
+        self.tab("error")
+        self.page.fill(f"#ladder-form {NUMBER}", "1")
+        self.page.until("document.querySelectorAll('#ladder-table tbody tr').length === 8")
+        cells = self.page.run("[...document.querySelectorAll('#ladder-table tbody tr')].map((row) => [...row.cells].map((one) => one.textContent))")
+        number = lambda text: float(text.replace("\u2212", "-"))
+        # From 4 ms to 2 ms: by 2, 4, 4 and 16, within a factor, for a free swing of a second.
+        for column, factor in ((1, 2), (2, 4), (3, 4), (4, 16)):
+            ratio = number(cells[3][column]) / number(cells[4][column])
+            self.assertTrue(factor / 2 < ratio < 2 * factor, f"{ratio} for {factor}")
+        for method in range(1, 5):
+            self.assertGreater(self.image("#ladder").count(self.color(f"run{method}")), 40)
+        self.assertIn("costs least", self.page.text("#ladder-text"))
+        self.keep("error")

@@ -1,0 +1,64 @@
+//! A message's body in either encoding: whose it is, and whether it is what was sent.
+
+use serde::Deserialize;
+
+use crate::json::Json;
+
+/// A message's body, in either encoding.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Body<'a> {
+    Text(&'a str),
+    Binary(&'a Json),
+}
+
+impl Body<'_> {
+    /// Its publisher and its number.
+    pub(super) fn origin(&self) -> Option<(u64, u64)> {
+        #[derive(Deserialize)]
+        struct Origin {
+            from: u64,
+            number: u64,
+        }
+        match self {
+            Self::Text(text) => {
+                let origin: Origin = serde_json::from_str(text).ok()?;
+                Some((origin.from, origin.number))
+            }
+            Self::Binary(msg) => {
+                let number =
+                    |name: &str| msg.get(name).and_then(Json::number).map(|one| one as u64);
+                number("from").zip(number("number"))
+            }
+        }
+    }
+
+    /// Whether it is what was sent: to the byte, or in another encoding to the value.
+    pub(super) fn is(&self, sent: &str) -> bool {
+        match self {
+            Self::Text(text) => *text == sent,
+            Self::Binary(msg) => Json::read(sent).is_some_and(|sent| are_same(&sent, msg)),
+        }
+    }
+}
+
+fn are_same(one: &Json, other: &Json) -> bool {
+    match (one, other) {
+        (Json::Number(_), Json::Number(_)) => one.number() == other.number(),
+        (Json::Array(ones), Json::Array(others)) => {
+            ones.len() == others.len()
+                && ones
+                    .iter()
+                    .zip(others)
+                    .all(|(one, other)| are_same(one, other))
+        }
+        (Json::Object(ones), Json::Object(others)) => {
+            let all = |(key, one): &(Option<String>, Json)| {
+                key.as_deref()
+                    .and_then(|key| other.get(key))
+                    .is_some_and(|other| are_same(one, other))
+            };
+            ones.len() == others.len() && ones.iter().all(all)
+        }
+        _ => one == other,
+    }
+}

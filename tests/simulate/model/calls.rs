@@ -1,0 +1,227 @@
+//! Calls and goals: each comes to its provider unchanged, and its caller has the one answer that it must have.
+
+use std::time::Duration;
+
+use serde_json::Value;
+use serde_json::value::RawValue;
+use tokio::time::Instant;
+
+use super::offline::compute;
+use super::{Asked, Heard, Model, absolute};
+use crate::court::Court;
+use crate::honest::{Expect, Honest};
+use crate::json::Json;
+
+/// The status of a goal that ended because somebody asked for it.
+const CANCELED: &str = "5";
+
+impl Model {
+    pub(super) fn hear_call(
+        &mut self,
+        court: &Court,
+        honest: &Honest,
+        frame: &Heard<'_>,
+        text: &str,
+    ) {
+        let (Some(id), Some(service), Some(args)) = (frame.id, &frame.service, frame.args) else {
+            return court.wrong(format!("a call lacks something: {text:.200}"));
+        };
+        let number = Json::read(args.get()).and_then(|args| args.get("call")?.number());
+        // Hostile clients call too.
+        let Some(forward) = number.and_then(|number| self.forwards.get_mut(&(number as u64)))
+        else {
+            return;
+        };
+        if forward.args != args.get() || absolute(service) != absolute(&forward.service) {
+            return court.wrong(format!(
+                "a call came to its provider changed: {text:.200} instead of {}",
+                forward.args
+            ));
+        }
+        if forward.heard_by.replace(honest.who).is_some() {
+            return court.wrong(format!("call {number:?} came to a provider twice"));
+        }
+        self.asked.push(Asked {
+            provider: honest.who,
+            id: id.get().to_owned(),
+            service: service.clone(),
+            number: number.unwrap_or_default() as u64,
+        });
+    }
+
+    pub(super) fn hear_answer(
+        &mut self,
+        court: &Court,
+        honest: &mut Honest,
+        frame: &Heard<'_>,
+        text: &str,
+    ) {
+        let id = frame.id.map_or("", RawValue::get);
+        let Some(call) = honest.calls.remove(id) else {
+            if !honest.is_excused {
+                court.wrong(format!(
+                    "client {} got an answer that it does not wait for: {text:.300}",
+                    honest.who
+                ));
+            }
+            return;
+        };
+        court.count("calls answered");
+        honest.handled_before(call.order);
+        if call.is_computation() {
+            honest.computed = court.turns.get();
+        }
+        let (Some(values), Some(result), Some(status)) = (frame.values, frame.result, frame.status)
+        else {
+            return court.wrong(format!("an answer lacks something: {text:.200}"));
+        };
+        if frame.service.as_deref() != call.what.split(' ').next() {
+            return court.wrong(format!("the answer to {} says {text:.200}", call.what));
+        }
+        let Some(status) = Value::from_raw(status) else {
+            return court.wrong(format!("an answer's status is no text: {text:.200}"));
+        };
+        let lacks_room = status.contains("too many bytes") || status.contains("busy");
+        if lacks_room && !result && (self.is_scarce || !call.is_light) {
+            return;
+        }
+        if result != status.is_empty() && !matches!(call.expect, Expect::Forwarded(_)) {
+            return court.wrong(format!("result and status disagree: {text:.200}"));
+        }
+        let why = match call.expect {
+            Expect::Arm { is_good } => arm_answer(court, id, values, result, is_good),
+            Expect::Refusal => result.then(|| "it should be refused".to_owned()),
+            Expect::Member(name) => {
+                let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
+                (!result || value.get(name).is_none()).then(|| format!("it should have {name}"))
+            }
+            Expect::Solution { x, y } => self.solution(values, result, x, y),
+            Expect::Computed(ref computed) => compute(computed, self.links, values, result),
+            Expect::Forwarded(number) => {
+                self.forwarded(honest.is_hampered, number, values.get(), result, &status)
+            }
+            Expect::Goal { .. } => Some("a goal is answered by its result".to_owned()),
+            Expect::Anything => None,
+        };
+        if let Some(why) = why {
+            court.wrong(format!(
+                "client {}: {} with id {id}: {why}: {text:.400}",
+                honest.who, call.what
+            ));
+        }
+    }
+
+    pub(super) fn hear_goal(
+        &self,
+        court: &Court,
+        honest: &mut Honest,
+        frame: &Heard<'_>,
+        text: &str,
+    ) {
+        let id = frame.id.map_or("", RawValue::get);
+        let who = honest.who;
+        let goal = honest.calls.get(id);
+        let Some((Expect::Goal { has_feedback }, is_cancelled)) =
+            goal.map(|call| (call.expect.clone(), call.is_cancelled))
+        else {
+            if !honest.is_excused {
+                court.wrong(format!(
+                    "client {who} has no such goal under way: {text:.300}"
+                ));
+            }
+            return;
+        };
+        if frame.action.as_deref() != Some("/ik_action") || frame.values.is_none() {
+            court.wrong(format!("news of a goal lack something: {text:.300}"));
+        }
+        if frame.op == "action_result" {
+            honest.calls.remove(id);
+            court.count("goals ended");
+            let is_canceled = frame.status.map(RawValue::get) == Some(CANCELED);
+            if is_canceled && !is_cancelled && !self.ends_any_goal {
+                court.wrong(format!(
+                    "client {who} has not asked for the end of its goal: {text:.300}"
+                ));
+            }
+        } else if !has_feedback {
+            court.wrong(format!(
+                "client {who} did not ask for feedback: {text:.300}"
+            ));
+        }
+    }
+
+    /// The provider's answer, word for word; or a failure for which there is a reason.
+    fn forwarded(
+        &mut self,
+        hampered: bool,
+        number: u64,
+        values: &str,
+        result: bool,
+        status: &str,
+    ) -> Option<String> {
+        let forward = self.forwards.remove(&number)?;
+        let now = Instant::now();
+        if let Some((_, answered, text)) = &forward.answered
+            && (*answered, text.as_str()) == (result, values)
+        {
+            return None;
+        }
+        if result {
+            return Some(format!("its provider said {:?}", forward.answered));
+        }
+        let provided = self
+            .services
+            .get(&absolute(&forward.service))
+            .copied()
+            .unwrap_or_default();
+        let is_unsettled = provided.provider.is_none()
+            || !provided.is_confirmed
+            || provided.is_contested
+            || provided.changed >= forward.turns.saturating_sub(200);
+        let deadline = forward.since + forward.timeout;
+        let was_answered_in_time = forward
+            .answered
+            .is_some_and(|(when, _, _)| when + Duration::from_millis(50) < deadline);
+        let was_forgotten = forward
+            .orphaned
+            .is_some_and(|when| now > when + Duration::from_secs(1));
+        if was_forgotten && !hampered {
+            return Some("its provider has been gone for more than a second".to_owned());
+        }
+        let is_late = now >= deadline && (!was_answered_in_time || hampered);
+        (!is_late && !is_unsettled && !self.is_scarce)
+            .then(|| format!("nothing speaks for {status:?}"))
+    }
+}
+
+trait FromRaw: Sized {
+    fn from_raw(raw: &RawValue) -> Option<String>;
+}
+
+impl FromRaw for Value {
+    fn from_raw(raw: &RawValue) -> Option<String> {
+        serde_json::from_str(raw.get()).ok()
+    }
+}
+
+fn arm_answer(
+    court: &Court,
+    id: &str,
+    values: &RawValue,
+    result: bool,
+    is_good: bool,
+) -> Option<String> {
+    let Some((expected, is_done)) = court.expected.borrow_mut().remove(id) else {
+        return Some("the arm's double has not seen it".to_owned());
+    };
+    let value: Value = serde_json::from_str(values.get()).unwrap_or_default();
+    if expected.is_null() {
+        let is_answer = value["steps"].is_u64() && value["time"].is_f64();
+        return (!is_answer).then(|| "steps and time should have come".to_owned());
+    }
+    let should = is_good && is_done;
+    // Over WebSocket the answer to what is wrong is its text.
+    let is_text = !result && value.is_string();
+    ((value != expected && !is_text) || result != should)
+        .then(|| format!("the arm's double has {should} {expected}"))
+}

@@ -1,0 +1,157 @@
+//! Looks at what has come: it is held against the model, and nobody is cut off, waits for too long or holds too much.
+
+use std::time::Duration;
+
+use pendularm::actors::resources::budget::MODEST;
+use tokio::time::Instant;
+
+use super::Course;
+use crate::court::Verdict;
+use crate::honest::{Computed, Expect};
+use crate::world::SCARCE;
+
+/// Turns within which a light call is answered whose caller reads, all others' frames of those turns included.
+const LIGHT_TURNS: u64 = 30_000;
+/// Turns within which a computation is done, once the client's one before is, for each client that may have some too:
+/// what takes longest of what honest clients have computed takes some 1,000 where nobody else computes.
+const COMPUTED_TURNS: u64 = 2_000;
+/// The same for what is computed in a few turns: in two thousand seeds one took 43, beside a flood, and all others
+/// fewer than 40.
+const SHORT_TURNS: u64 = 80;
+/// A light call's patience in virtual time.
+const LIGHT_TIME: Duration = Duration::from_secs(1);
+
+/// How much more than the limit clients hold at most until whoever gives way is gone.
+const BESIDE: usize = 1 << 21;
+
+impl Course {
+    /// Lets virtual time pass, and looks now and then.
+    pub(super) async fn pass(&mut self, time: Duration) {
+        let mut left = time;
+        while !left.is_zero() && self.court.failure().is_none() {
+            left -= self.world.glance(left).await;
+            self.look();
+        }
+    }
+
+    /// Takes what has come, and holds it against the model; providers answer.
+    pub(super) fn look(&mut self) {
+        self.listen(true);
+    }
+
+    pub(super) fn listen(&mut self, answers: bool) {
+        let now = Instant::now();
+        for at in 0..self.honest.len() {
+            let one = &mut self.honest[at];
+            if one.stalled_until.is_some_and(|until| until <= now) {
+                one.stalled_until = None;
+                one.client.pause(false);
+            }
+            for received in one.client.take() {
+                self.model.hear(&self.court, &mut self.honest[at], received);
+            }
+            if answers {
+                self.workload(at).answer_calls();
+            }
+            self.check_end(at);
+            self.check_patience(at);
+        }
+        for one in &mut self.hostile {
+            if !one.client.is_paused() {
+                one.client.take_anything();
+            }
+        }
+        if self.model.missed > self.world.gauges.messages_dropped() {
+            let (missed, dropped) = (self.model.missed, self.world.gauges.messages_dropped());
+            self.court.wrong(format!(
+                "{missed} messages are missing, and {dropped} counted as dropped"
+            ));
+        }
+        self.check_room();
+    }
+
+    /// Nobody is cut off, unless there is little room.
+    fn check_end(&mut self, at: usize) {
+        let one = &self.honest[at];
+        if one.is_excused || one.has_finished || !(one.was_cut_off || one.client.has_ended()) {
+            return;
+        }
+        if self.plan.scarce && self.cut_off < self.world.gauges.memory().cut_off() {
+            self.cut_off += 1;
+            self.court.count("honest clients that held the most");
+            return self.abandon(at);
+        }
+        let (who, rest) = (one.who, one.client.rest());
+        self.court
+            .wrong(format!("client {who} was cut off: {rest}"));
+    }
+
+    fn check_patience(&mut self, at: usize) {
+        let one = &self.honest[at];
+        let (court, turns) = (&self.court, self.court.turns.get());
+        if one.is_excused || one.is_hampered || self.plan.scarce {
+            return;
+        }
+        for call in one.calls.values() {
+            let Expect::Forwarded(number) = call.expect else {
+                continue;
+            };
+            let forward = self.model.forwards.get(&number);
+            let late = forward.is_some_and(|one| one.since.elapsed() > one.timeout + LIGHT_TIME);
+            if late && court.jumps.get() == 0 {
+                let words = format!("{} has taken longer than its caller waits", call.what);
+                court.fail(Verdict::NoProgress, words);
+            }
+        }
+        // Its computations are done one behind the other.
+        let computations = one.calls.values().filter(|call| call.is_computation());
+        if let Some(next) = computations.min_by_key(|call| call.order)
+            && matches!(next.expect, Expect::Computed(_))
+        {
+            let taken = turns - next.turns.max(one.computed);
+            court.at_most("most turns that a computation waits", taken);
+            let clients = (self.honest.len() + self.hostile.len()) as u64;
+            // Where nothing is long on its way, what is over in a few turns has them soon, whatever others compute.
+            // In small pieces a client's own frames hold up its next one.
+            let is_wide = self.plan.room >= 1 << 16 && self.plan.piece >= 1 << 16;
+            let is_short = matches!(next.expect, Expect::Computed(Computed::Particle { .. }));
+            let each = if is_wide && is_short {
+                court.at_most("most turns that a short one waits", taken);
+                SHORT_TURNS
+            } else {
+                COMPUTED_TURNS
+            };
+            if taken > each * (1 + clients) {
+                let words = format!(
+                    "{:.80} has waited for {taken} turns beside {clients} clients",
+                    next.what
+                );
+                court.fail(Verdict::NoProgress, words);
+            }
+        }
+        for (id, call) in one.calls.iter().filter(|(_, call)| call.is_light) {
+            let (time, taken) = (call.since.elapsed(), turns - call.turns);
+            if (time > LIGHT_TIME && court.jumps.get() == 0) || taken > LIGHT_TURNS {
+                let words = format!(
+                    "{} with id {id} is unanswered after {time:?} and {taken} turns",
+                    call.what
+                );
+                court.fail(Verdict::NoProgress, words);
+            }
+        }
+    }
+
+    /// The limit is not exceeded.
+    fn check_room(&self) {
+        if !self.plan.scarce {
+            return;
+        }
+        // Who holds no more than what is modest never gives way.
+        let modest = MODEST * (self.honest.len() + self.hostile.len());
+        let (held, most) = (self.world.held(), SCARCE.max(modest) + BESIDE);
+        if held > most {
+            let words = format!("{held} bytes are held, where {most} may be");
+            self.court.wrong(words);
+        }
+    }
+}

@@ -1,0 +1,287 @@
+//! The course of one seed: clients come, do what they do while faults and hostile clients come between, then all of
+//! that ends and everything that is owed must come, then all leave and nothing must be left.
+
+mod faults;
+mod looks;
+mod rest;
+
+use std::rc::Rc;
+use std::time::Duration;
+
+use crate::client::{Client, Door};
+use crate::court::{Court, Failure, Verdict};
+use crate::honest::Honest;
+use crate::hostile::Hostile;
+use crate::model::Model;
+use crate::pipe::Fate;
+use crate::plan::{Burst, Feature, Plan};
+use crate::workload::{Numbers, Workload};
+use crate::world::{World, in_virtual_time};
+
+/// Bytes in a pipe, and in a write, without which what a flood brings would be on its way for too long.
+const FLOODED_ROOM: usize = 4096;
+const FLOODED_PIECE: usize = 100;
+/// Processor time that everybody's turns after one deed may take, however slow the machine is: an arm whose steps are
+/// too short to keep up takes seconds, as tests are built to be compiled quickly.
+const STANDSTILL: Duration = Duration::from_secs(10);
+
+/// The outcome of a seed.
+pub struct Outcome {
+    pub plan: String,
+    pub failure: Option<Failure>,
+    pub hash: u64,
+    pub log: Vec<String>,
+    pub tally: std::collections::BTreeMap<&'static str, u64>,
+}
+
+/// Plays one seed; with bursts, if it is no older than they are.
+pub fn play(seed: u64, is_newest: bool, keeps_log: bool) -> Outcome {
+    in_virtual_time(async {
+        let court = Rc::new(Court::new(seed, keeps_log));
+        let mut plan = Plan::draw(&court);
+        if is_newest {
+            plan = plan.with_bursts(&court);
+        }
+        let text = plan.to_string();
+        let mut course = Course::new(&court, plan, seed).await;
+        course.run().await;
+        let (hash, log) = court.record();
+        let tally = court.tally.take();
+        Outcome {
+            plan: text,
+            failure: court.failure(),
+            hash,
+            log,
+            tally,
+        }
+    })
+}
+
+struct Course {
+    court: Rc<Court>,
+    plan: Plan,
+    world: World,
+    model: Model,
+    numbers: Numbers,
+    honest: Vec<Honest>,
+    hostile: Vec<Hostile>,
+    /// Honest clients so far.
+    clients: u64,
+    /// Clients that were cut off because they held the most.
+    cut_off: u64,
+}
+
+impl Course {
+    async fn new(court: &Rc<Court>, plan: Plan, seed: u64) -> Self {
+        let world = World::start(court, plan.links, plan.scarce, seed).await;
+        let model = Model {
+            is_scarce: plan.scarce,
+            links: plan.links,
+            is_reshaped: plan.hostile > 0,
+            ..Model::default()
+        };
+        let mut course = Self {
+            court: Rc::clone(court),
+            plan,
+            world,
+            model,
+            numbers: Numbers::default(),
+            honest: Vec::new(),
+            hostile: Vec::new(),
+            clients: 0,
+            cut_off: 0,
+        };
+        for _ in 0..course.plan.honest {
+            let one = course.enter();
+            course.honest.push(one);
+        }
+        for _ in 0..course.plan.hostile {
+            let one = course.intrude();
+            course.hostile.push(one);
+        }
+        course
+    }
+
+    fn enter(&mut self) -> Honest {
+        let (client, fate) = self.connect(self.plan.room);
+        self.clients += 1;
+        self.court.count("honest clients");
+        Honest::new(self.clients, client, fate)
+    }
+
+    fn intrude(&self) -> Hostile {
+        // Theirs are wide: what they send is to arrive.
+        let (client, fate) = self.connect(1 << 16);
+        self.court.count("hostile clients");
+        Hostile::new(client, fate)
+    }
+
+    fn connect(&self, room: usize) -> (Client, Rc<std::cell::Cell<Fate>>) {
+        let (stream, fate) = self.world.connect(room);
+        let door = if self.court.chance(self.plan.socket) {
+            Door::Socket
+        } else {
+            Door::Plain
+        };
+        let piece = if room == self.plan.room {
+            self.plan.piece
+        } else {
+            room
+        };
+        (Client::new(door, stream, piece), fate)
+    }
+
+    async fn run(&mut self) {
+        self.settle_in().await;
+        for _ in 0..self.plan.steps {
+            self.step().await;
+            if self.court.failure().is_some() {
+                return;
+            }
+        }
+        for _ in 0..self.world.gauges.memory().cut_off() {
+            self.court.count("clients that held the most");
+        }
+        self.come_to_rest().await;
+        if self.court.failure().is_none() {
+            self.leave().await;
+        }
+    }
+
+    /// Everybody listens to something, and somebody provides what others call: else most of what follows is in vain.
+    async fn settle_in(&mut self) {
+        let provides = self
+            .plan
+            .features
+            .iter()
+            .any(|(one, _)| *one == Feature::CallOut);
+        for at in 0..self.honest.len() {
+            self.workload(at).perform(Feature::Subscribe);
+            self.workload(at).perform(Feature::Subscribe);
+            if provides && self.court.chance(0.7) {
+                self.workload(at).perform(Feature::Provide);
+            }
+        }
+        self.world.turns(100).await;
+        self.look();
+    }
+
+    async fn step(&mut self) {
+        let worked = processor_time();
+        if self.court.chance(self.plan.fault)
+            && let Some(fault) = self.court.weighed(&self.plan.faults)
+        {
+            self.court.count("faults");
+            self.fault(fault).await;
+        } else if self.court.chance(self.plan.hostility)
+            && let Some(deed) = self.court.weighed(&self.plan.hostilities)
+        {
+            let at = self.court.below(self.hostile.len());
+            self.court.note("hostile", format!("{deed:?}").as_bytes());
+            self.court.count("hostile deeds");
+            if self.hostile[at].client.has_ended() {
+                self.hostile[at] = self.intrude();
+            }
+            self.hostile[at].perform(deed, &self.court, &self.honest);
+        } else if !self.plan.bursts.is_empty() && self.court.chance(self.plan.burst) {
+            if let Some(burst) = self.court.weighed(&self.plan.bursts) {
+                self.court.count("bursts");
+                self.burst(burst).await;
+            }
+        } else if let Some(feature) = self.court.weighed(&self.plan.features) {
+            self.feature(feature).await;
+        }
+        let turns = 1 + self.court.below(20);
+        self.world.turns(turns).await;
+        self.look();
+        self.stand_still(worked);
+    }
+
+    fn stand_still(&self, worked: Option<Duration>) {
+        let (Some(before), Some(now)) = (worked, processor_time()) else {
+            return;
+        };
+        let took = now.saturating_sub(before);
+        if took > STANDSTILL {
+            self.court.fail(
+                Verdict::NoProgress,
+                format!("a deed kept the processor for {took:?}"),
+            );
+        }
+    }
+
+    async fn feature(&mut self, feature: Feature) {
+        if feature == Feature::Wait {
+            let time = self.court.among(&[1, 5, 20, 100, 400, 1500]);
+            return self.pass(Duration::from_millis(time)).await;
+        }
+        let at = self.somebody();
+        self.workload(at).perform(feature);
+    }
+
+    /// A client that can do something, by its place.
+    fn somebody(&mut self) -> usize {
+        let at = self.court.below(self.honest.len());
+        if !self.honest[at].is_active() {
+            self.honest[at] = self.replace(at);
+        }
+        at
+    }
+
+    async fn burst(&mut self, burst: Burst) {
+        self.court.note("burst", format!("{burst:?}").as_bytes());
+        let at = self.somebody();
+        match burst {
+            // A message in the second half of each interval: what a throttle may let through too early.
+            Burst::Stream => {
+                let who = self.honest[at].who;
+                let count = 10 + self.court.below(20);
+                for _ in 0..count {
+                    if self.honest[at].who != who || !self.honest[at].is_active() {
+                        return;
+                    }
+                    let interval = self.workload(at).stream();
+                    let apart = interval.mul_f64(0.55 + 0.4 * self.court.fraction());
+                    self.pass(apart).await;
+                }
+            }
+            // More than an outbox holds, while somebody does not read.
+            Burst::Flood => {
+                if self.plan.scarce
+                    || self.plan.room < FLOODED_ROOM
+                    || self.plan.piece < FLOODED_PIECE
+                {
+                    return;
+                }
+                if let Some(deaf) = self.workload(at).flood() {
+                    self.stall(deaf);
+                }
+            }
+            Burst::LongComputation => self.workload(at).compute_long(),
+            Burst::CancelAnothers => self.workload(at).cancel_anothers(),
+        }
+    }
+
+    fn workload(&mut self, at: usize) -> Workload<'_> {
+        Workload {
+            court: &self.court,
+            plan: &self.plan,
+            model: &mut self.model,
+            numbers: &mut self.numbers,
+            all: &mut self.honest,
+            at,
+        }
+    }
+}
+
+/// Processor time of this thread so far, where the system tells it.
+fn processor_time() -> Option<Duration> {
+    processor_time_of("thread-self")
+}
+
+/// Processor time of a thread, or of a process's first, so far.
+pub fn processor_time_of(thread: &str) -> Option<Duration> {
+    let text = std::fs::read_to_string(format!("/proc/{thread}/schedstat")).ok()?;
+    let nanoseconds = text.split(' ').next()?.parse().ok()?;
+    Some(Duration::from_nanos(nanoseconds))
+}

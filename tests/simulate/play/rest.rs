@@ -1,0 +1,186 @@
+//! The end of a seed: everything that is owed comes, and when all have left nothing is left of them.
+
+use std::time::Duration;
+
+use tokio::time::Instant;
+
+use super::Course;
+use crate::court::Verdict;
+use crate::honest::{Expect, Honest, Phase};
+use crate::workload::waits;
+
+/// Once the faults are over, all that is owed has come within so much virtual time.
+const LIVENESS: Duration = Duration::from_secs(40);
+/// When all have left, nothing is held for anybody after so much virtual time.
+const EMPTY: Duration = Duration::from_secs(100);
+
+impl Course {
+    /// Faults and hostile clients are gone: whatever is owed comes.
+    pub(super) async fn come_to_rest(&mut self) {
+        self.hostile.clear();
+        self.resume();
+        // Bytes that were sent before arrive before those that follow.
+        self.pass(Duration::from_millis(500)).await;
+        // A goal ends when the arm is reset, and time passes when it is not paused.
+        let mut sober = self.enter();
+        for (id, service, args) in [
+            ("\"end1\"", "/arm_sim/pause", "{\"data\":false}"),
+            (
+                "\"end2\"",
+                "/arm_sim/set_integrator",
+                "{\"method\":\"rk4\",\"timestep\":0.001}",
+            ),
+            ("\"end3\"", "/ik_trial/stop", "{}"),
+            ("\"end4\"", "/arm_sim/reset", "{}"),
+        ] {
+            sober.send(&format!("{{\"op\":\"call_service\",\"id\":{id},\"service\":\"{service}\",\"args\":{args}}}"), 0);
+            let is_arms = service.starts_with("/arm_sim");
+            let expect = if is_arms {
+                Expect::Arm { is_good: true }
+            } else {
+                Expect::Anything
+            };
+            sober.note_call(id, service, expect, true, &self.court);
+        }
+        self.honest.push(sober);
+        let began = Instant::now();
+        while began.elapsed() < LIVENESS && self.court.failure().is_none() && !self.is_at_rest() {
+            self.pass(Duration::from_millis(100)).await;
+        }
+        if self.court.failure().is_some() {
+            return;
+        }
+        self.world.compare().await;
+        let waiting: Vec<String> = self
+            .honest
+            .iter()
+            .filter(|one| !self.has_all(one))
+            .map(waits)
+            .collect();
+        if !waiting.is_empty() {
+            let words = format!(
+                "{LIVENESS:?} after the last fault clients wait: {}",
+                waiting.join(" | ")
+            );
+            return self.court.fail(Verdict::NoProgress, words);
+        }
+        self.check_messages();
+    }
+
+    /// Whether all that is owed has come. Calls that may wait for a day do not count, nor does whoever has stopped
+    /// sending.
+    fn has_all(&self, one: &Honest) -> bool {
+        let may_wait = |call: &Expect| match call {
+            Expect::Forwarded(number) => self
+                .model
+                .forwards
+                .get(number)
+                .is_some_and(|one| one.timeout > LIVENESS),
+            _ => false,
+        };
+        let is_answered = one.calls.values().all(|call| may_wait(&call.expect));
+        one.is_excused || one.has_finished || (is_answered && one.news.is_empty())
+    }
+
+    fn is_at_rest(&self) -> bool {
+        let all_heard = |one: &Honest| {
+            let pending = one
+                .subscriptions
+                .values()
+                .flat_map(|one| one.pending.values().flatten());
+            one.is_excused || one.has_finished || pending.filter(|(_, must)| *must).count() == 0
+        };
+        let throttled = |one: &Honest| {
+            one.subscriptions
+                .values()
+                .any(|one| one.throttle.is_some() && !has_newest(one))
+        };
+        let quiet = |one: &Honest| {
+            self.has_all(one)
+                && all_heard(one)
+                && (!throttled(one) || one.is_excused || one.has_finished)
+        };
+        self.honest.iter().all(quiet) && self.world.pool.is_idle()
+    }
+
+    /// Every message has come that had to, and of a throttled topic the newest.
+    fn check_messages(&mut self) {
+        for at in 0..self.honest.len() {
+            let one = &self.honest[at];
+            if one.is_excused || one.has_finished {
+                continue;
+            }
+            let subscriptions = one.subscriptions.iter();
+            let missing = |(topic, one): (&String, &crate::honest::Subscription)| {
+                let must: Vec<u64> = one
+                    .pending
+                    .values()
+                    .flatten()
+                    .filter(|(_, must)| *must)
+                    .map(|(n, _)| *n)
+                    .collect();
+                (!must.is_empty()).then(|| (must.len(), format!("{must:?} on {topic}")))
+            };
+            let missing: Vec<(usize, String)> = subscriptions.filter_map(missing).collect();
+            let stale = one
+                .subscriptions
+                .iter()
+                .find(|(_, one)| one.throttle.is_some() && !has_newest(one));
+            // A hostile client's message may be newer.
+            let is_quiet = !one.is_hampered && !self.plan.scarce && self.plan.hostile == 0;
+            if let Some((topic, subscription)) = stale.filter(|_| is_quiet) {
+                let (last, newest) = (subscription.last, &subscription.newest);
+                self.court.wrong(format!(
+                    "client {} has not heard the newest on {topic}: {last:?}, not {newest:?}",
+                    one.who
+                ));
+            }
+            for (count, which) in missing {
+                self.model
+                    .miss(&self.court, &self.honest[at], count, &which);
+            }
+        }
+        let dropped = self.world.gauges.messages_dropped();
+        if self.model.missed > dropped {
+            self.court.wrong(format!(
+                "{} messages are missing, and {dropped} counted as dropped",
+                self.model.missed
+            ));
+        }
+    }
+
+    /// All leave, some politely; nothing is held for anybody then.
+    pub(super) async fn leave(&mut self) {
+        for at in 0..self.honest.len() {
+            if self.court.chance(0.5) {
+                self.honest[at].client.finish();
+            }
+        }
+        self.world.turns(20).await;
+        self.honest.clear();
+        let began = Instant::now();
+        while began.elapsed() < EMPTY && !self.world.is_empty() && self.court.failure().is_none() {
+            self.world.glance(Duration::from_millis(100)).await;
+        }
+        if !self.world.is_empty() {
+            let (held, connections) = (self.world.held(), self.world.gauges.connections());
+            let idle = self.world.pool.is_idle();
+            self.court.wrong(format!(
+                "{EMPTY:?} after all have left {connections} are connected, {held} bytes are held, and the pool is idle: {idle}"
+            ));
+        }
+    }
+}
+
+/// Whether the last message that came is the last that somebody sent.
+fn has_newest(one: &crate::honest::Subscription) -> bool {
+    let last = one.last.map(|(number, _)| number);
+    // Sent before the subscription, or by a client that is gone: it may be handled behind newer ones of others.
+    let is_from_before = one
+        .last_from
+        .is_some_and(|from| !one.newest.contains_key(&from));
+    one.phase != Phase::On
+        || one.newest.is_empty()
+        || is_from_before
+        || one.newest.values().any(|newest| Some(*newest) <= last)
+}
