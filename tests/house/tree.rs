@@ -2,6 +2,7 @@
 //!
 //! **Invariant:** these checks look at every file that is written by hand, also at those that are added later.
 
+use std::ffi::OsStr;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -43,11 +44,19 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-pub(crate) fn rust_files(folder: &str) -> Vec<PathBuf> {
+/// Our files below `folder` whose names have one of these extensions.
+pub(crate) fn files_in(folder: &str, extensions: &[&str]) -> Vec<PathBuf> {
     let mut files = files(&root().join(folder));
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "rs"));
-    assert!(!files.is_empty(), "no Rust file in {folder}");
+    files.retain(|path| {
+        let extension = path.extension().and_then(OsStr::to_str);
+        extension.is_some_and(|extension| extensions.contains(&extension))
+    });
+    assert!(!files.is_empty(), "no file in {folder}: {extensions:?}");
     files
+}
+
+pub(crate) fn rust_files(folder: &str) -> Vec<PathBuf> {
+    files_in(folder, &["rs"])
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The list of topics and services agrees with itself, and says of each what is so of few.
 //!
-//! **Invariant:** that its rows are those of docs/protocol.md is for `tests/house/readme.rs` to see, which reads them there.
+//! **Invariant:** that its rows are those of docs/protocol.md is for `tests/house/readme/protocol.rs` to see, which reads
+//! them there.
 
 use std::collections::HashSet;
 

@@ -1,7 +1,7 @@
 //! Pages that mean harm: requests as a browser can be made to send them, and what the answers let it do.
 //!
 //! Attacks by a page in a real browser are in `tests/browser/test_hostile.py`; who may ask, and well-formed refusals, are
-//! in `wire_http.rs`, `wire_websocket.rs` and `wire_token.rs`.
+//! in `http/`, `websocket/handshake.rs` and `token.rs`.
 //!
 //! **Invariant:** whatever a page has its visitor's browser send, the arm's parameters stay as they were.
 

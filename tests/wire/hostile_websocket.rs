@@ -1,6 +1,6 @@
 //! WebSocket clients that mean harm: frames, closes and handshakes as no client of the protocol sends them.
 //!
-//! Others of that kind are in `websocket.rs`.
+//! Others of that kind are in `websocket/closing.rs` and `websocket/handshake.rs`.
 //!
 //! **Invariant:** whoever breaks a rule is told so by a close frame and closed, and the next client is served.
 

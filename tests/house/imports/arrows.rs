@@ -1,0 +1,135 @@
+//! Arrows between the files of a package: an import is followed to the file that defines its name.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use super::files::{File, Module, child, read};
+
+/// A package whose imports are looked at.
+pub(super) struct Package {
+    /// Its folder, from this one.
+    folder: &'static str,
+    /// Its name in paths.
+    name: &'static str,
+    /// It has more files than this.
+    more_than: usize,
+}
+
+pub(super) const PENDULARM: Package = Package {
+    folder: "",
+    name: "pendularm",
+    more_than: 100,
+};
+
+pub(super) const PACKAGES: [Package; 2] = [
+    PENDULARM,
+    Package {
+        folder: "ros2",
+        name: "pendularm_ros2",
+        more_than: 20,
+    },
+];
+
+/// Who names whom; the names by which that happens.
+pub(super) type Arrows = BTreeMap<(String, String), BTreeSet<String>>;
+/// A module, and what is named in it.
+type Place = (Module, Option<String>);
+/// Imports that have been followed already.
+type Seen = BTreeSet<(Module, String)>;
+
+fn parent(module: &Module) -> Option<Module> {
+    Some(module[..module.len().checked_sub(1)?].to_vec())
+}
+
+impl Package {
+    fn source(&self) -> PathBuf {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+        root.join(self.folder).join("src")
+    }
+}
+
+pub(super) struct House {
+    name: &'static str,
+    pub(super) modules: BTreeMap<Module, File>,
+}
+
+impl House {
+    pub(super) fn read(package: &Package) -> Self {
+        let mut modules = BTreeMap::new();
+        let source = package.source();
+        read(&source, &source, &Vec::new(), &mut modules);
+        assert!(modules.len() > package.more_than, "{}", modules.len());
+        Self {
+            name: package.name,
+            modules,
+        }
+    }
+
+    /// The meaning of `path` as it is spelled in the file of `from`: a module of ours, and the item in it unless the module
+    /// itself is meant. None for other crates' names, and for those that the file itself defines.
+    fn place(&self, from: &Module, path: &[String], seen: &mut Seen) -> Option<Place> {
+        let (first, behind) = path.split_first()?;
+        match first.as_str() {
+            "crate" => self.walk(Vec::new(), behind, seen),
+            name if name == self.name => self.walk(Vec::new(), behind, seen),
+            "self" => self.walk(from.clone(), behind, seen),
+            "super" => self.walk(parent(from)?, behind, seen),
+            name => {
+                let known = self.modules.contains_key(&child(from, name))
+                    || self.modules[from]
+                        .imports
+                        .iter()
+                        .any(|import| import.name == name);
+                known.then(|| self.walk(from.clone(), path, seen))?
+            }
+        }
+    }
+
+    /// The same for a path that goes on in `module`.
+    fn walk(&self, module: Module, path: &[String], seen: &mut Seen) -> Option<Place> {
+        let Some((name, behind)) = path.split_first() else {
+            return Some((module, None));
+        };
+        if name == "super" {
+            return self.walk(parent(&module)?, behind, seen);
+        }
+        let below = child(&module, name);
+        if self.modules.contains_key(&below) {
+            return self.walk(below, behind, seen);
+        }
+        let mut imports = self.modules[&module].imports.iter();
+        let import = imports.find(|import| import.name == *name);
+        match import {
+            // A name may be imported that is defined here too, as a macro's is.
+            Some(import) if seen.insert((module.clone(), name.clone())) => {
+                match self.place(&module, &import.path, seen)? {
+                    (handed_on, None) => self.walk(handed_on, behind, seen),
+                    defined => Some(defined),
+                }
+            }
+            _ => Some((module, Some(name.clone()))),
+        }
+    }
+
+    /// Arrows between files.
+    pub(super) fn arrows(&self) -> Arrows {
+        let mut arrows = Arrows::new();
+        for (module, file) in &self.modules {
+            let used = |name: &str| file.paths.iter().any(|path| path[0] == name);
+            let imports = file.imports.iter();
+            let imported = imports
+                .filter(|import| !import.handed_on || used(&import.name))
+                .map(|import| &import.path);
+            for path in imported.chain(&file.paths) {
+                // A module that is named without anything in it is no arrow; what is taken from it is.
+                if let Some((target, Some(name))) = self.place(module, path, &mut Seen::new())
+                    && target != *module
+                {
+                    let ends = (file.path.clone(), self.modules[&target].path.clone());
+                    arrows.entry(ends).or_default().insert(name);
+                }
+            }
+        }
+        arrows
+    }
+}

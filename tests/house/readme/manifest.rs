@@ -1,0 +1,109 @@
+//! The manifests: dependencies and their reasons, licences, the profile of the fuzz targets, and the oldest compiler.
+
+use std::collections::BTreeSet;
+use std::process::Command;
+
+use super::codes;
+use crate::papers::{table, text};
+
+/// The lines of a manifest, each with the section that it stands in.
+fn by_section(manifest: &str) -> impl Iterator<Item = (&str, &str)> {
+    let mut section = "";
+    manifest.lines().filter_map(move |line| {
+        if line.starts_with('[') {
+            section = line;
+            return None;
+        }
+        Some((section, line))
+    })
+}
+
+#[test]
+fn the_papers_have_a_reason_for_every_dependency() {
+    let manifest = text("Cargo.toml");
+    let dependencies: BTreeSet<String> = by_section(&manifest)
+        .filter(|(section, _)| section.ends_with("dependencies]"))
+        .filter_map(|(_, line)| Some(line.split_once(" =")?.0.to_owned()))
+        .collect();
+    let mut named = BTreeSet::new();
+    for row in table(&text("docs/development.md"), "crate") {
+        assert!(row[1].len() > 10, "no reason: {row:?}");
+        named.insert(codes(&row[0])[0].to_owned());
+    }
+    assert_eq!(named, dependencies);
+}
+
+#[test]
+fn the_licence_files_are_those_that_the_manifest_names() {
+    assert!(text("Cargo.toml").contains("license = \"MIT OR Apache-2.0\""));
+    assert!(text("LICENSE-MIT").contains("Permission is hereby granted, free of charge"));
+    assert!(text("LICENSE-APACHE").contains("Apache License"));
+}
+
+/// Where they are built otherwise, nothing that `make test` has built serves them, and CI builds all of it twice.
+#[test]
+fn the_fuzz_targets_are_built_as_the_tests_are() {
+    let profile = |path: &str| -> BTreeSet<String> {
+        by_section(&text(path))
+            .filter(|(section, line)| section.starts_with("[profile.dev") && line.contains('='))
+            .map(|(section, line)| format!("{section} {line}"))
+            .collect()
+    };
+    let lock = text("fuzz/Cargo.lock");
+    let mut tests = profile("Cargo.toml");
+    tests.retain(|setting| {
+        let package = setting.strip_prefix("[profile.dev.package.");
+        package.is_none_or(|rest| {
+            let name = rest.split(']').next().unwrap();
+            lock.contains(&format!("name = \"{name}\""))
+        })
+    });
+    assert!(tests.len() > 3, "{tests:?}");
+    assert_eq!(profile("fuzz/Cargo.toml"), tests);
+}
+
+/// `rust-version` is a promise to whoever has an older compiler than ours: no package may break it.
+#[test]
+fn no_dependency_asks_for_a_newer_compiler_than_we_do() {
+    let run = |command: &mut Command| {
+        let output = command
+            .current_dir(env!("CARGO_MANIFEST_DIR"))
+            .output()
+            .unwrap();
+        assert!(
+            output.status.success(),
+            "{}",
+            String::from_utf8_lossy(&output.stderr)
+        );
+        String::from_utf8(output.stdout).unwrap()
+    };
+    // Only packages for this platform are sure to be at hand after a build.
+    let compiler = run(Command::new("rustc").arg("-vV"));
+    let host = compiler
+        .lines()
+        .find_map(|line| line.strip_prefix("host: "))
+        .unwrap();
+    let metadata = run(Command::new(env!("CARGO"))
+        .args(["metadata", "--locked", "--offline", "--format-version", "1"])
+        .args(["--filter-platform", host]));
+    let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
+    let version = |text: &str| -> Vec<u32> {
+        text.split('.')
+            .map(|part| part.parse().unwrap())
+            .chain([0])
+            .take(3)
+            .collect()
+    };
+    let ours = version(env!("CARGO_PKG_RUST_VERSION"));
+    let packages = metadata["packages"].as_array().unwrap();
+    assert!(packages.len() > 10, "{} packages", packages.len());
+    for package in packages {
+        if let Some(theirs) = package["rust_version"].as_str() {
+            assert!(
+                version(theirs) <= ours,
+                "{} asks for Rust {theirs}",
+                package["name"]
+            );
+        }
+    }
+}

@@ -1,0 +1,45 @@
+//! The papers of the house say what is so: the tables of README and docs/ against the Makefile, the manifest and the
+//! catalog. Here README itself.
+//!
+//! **Invariant:** each check reads both sides, so that neither can change alone.
+
+mod architecture;
+mod make;
+mod manifest;
+mod page;
+mod protocol;
+mod report;
+
+use std::process::Command;
+
+use crate::papers::{table, text};
+
+/// The texts between the code marks of a cell, in order.
+fn codes(cell: &str) -> Vec<&str> {
+    cell.split('`').skip(1).step_by(2).collect()
+}
+
+#[test]
+fn the_readme_is_read_in_one_sitting() {
+    let length = text("README.md").len();
+    assert!(length <= 10_000, "README.md has {length} bytes");
+}
+
+#[test]
+fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
+    let help = Command::new(env!("CARGO_BIN_EXE_pendularm"))
+        .arg("--help")
+        .output()
+        .unwrap();
+    let help = String::from_utf8(help.stdout).unwrap();
+    let rows = table(&text("README.md"), "option");
+    for row in &rows {
+        let (option, variable) = (codes(&row[0])[0], codes(&row[1])[0]);
+        let line = help.lines().find(|line| {
+            line.contains(&format!("{option} <")) || line.contains(&format!("{option}[=<"))
+        });
+        let line = line.unwrap_or_else(|| panic!("{option} is not in the help"));
+        assert!(line.contains(&format!("[env: {variable}]")), "{line}");
+    }
+    assert_eq!(help.matches("[env: ").count(), rows.len());
+}

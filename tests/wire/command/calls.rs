@@ -1,0 +1,83 @@
+//! `service call` and `action send_goal`.
+
+use serde_json::{Value, json};
+
+use super::{Going, json_of, refusal, said};
+use crate::common::Runtime;
+
+#[test]
+fn a_service_is_called_with_yaml_or_json_and_its_refusal_is_the_runtimes() {
+    let runtime = Runtime::start();
+    let call = |args: &[&str]| said(&runtime, &[&["service", "call"], args].concat());
+    assert_eq!(
+        call(&["/pid_controller/enable", "{data: true}"]),
+        "data: true\n"
+    );
+    let gravity = ["/arm_sim/set_params", "gravity: 1.62\nmasses: [1, 0.5]"];
+    let params = call(&gravity);
+    assert_eq!(
+        params,
+        "gravity: 1.62\nmasses:\n- 1.0\n- 0.5\nlengths:\n- 1.0\n- 1.0\n"
+    );
+    let type_name = "pendularm_interfaces/srv/SetIntegrator";
+    let set = ["service", "call", "/arm_sim/set_integrator", type_name];
+    assert_eq!(json_of(&runtime, &set)["method"], "rk4");
+    let set = [&set[..], &["{\"method\": \"verlet\", \"timestep\": 2e-3}"]].concat();
+    assert_eq!(
+        json_of(&runtime, &set),
+        json!({"method": "verlet", "timestep": 0.002})
+    );
+    let refused = |args: &[&str]| refusal(&runtime, &[&["service", "call"], args].concat(), 1);
+    let negative = refused(&["/arm_sim/set_integrator", "{timestep: -1}"]);
+    assert!(negative.starts_with("timestep must be"), "{negative}");
+    assert_eq!(refused(&["/nothing"]), "no provider for service /nothing");
+    let other = refused(&["/arm_sim/reset", "std_srvs/srv/SetBool", "{}"]);
+    assert!(other.contains("not std_srvs/srv/SetBool"), "{other}");
+}
+
+#[test]
+fn a_goal_is_followed_to_its_end_and_a_signal_cancels_it() {
+    let runtime = Runtime::start();
+    said(
+        &runtime,
+        &["service", "call", "/pid_controller/enable", "[true]"],
+    );
+    let goal = ["action", "send_goal", "/ik_action", "{x: 0.5, y: 1.2}"];
+    let result = json_of(&runtime, &goal);
+    assert_eq!(result["status"], "SUCCEEDED");
+    assert_eq!(result["result"]["outcome"], "reached");
+    let typed = "pendularm_interfaces/action/MoveTo";
+    let goal = [
+        "action",
+        "send",
+        "-f",
+        "/ik_action",
+        typed,
+        "{x: 1.2, y: 0.5}",
+    ];
+    let text = said(&runtime, &goal);
+    assert!(text.starts_with("feedback:\n  goal_id: "), "{text}");
+    assert!(text.ends_with("\nstatus: SUCCEEDED\n---\n"), "{text}");
+
+    said(
+        &runtime,
+        &["service", "call", "/pid_controller/enable", "[false]"],
+    );
+    let mut child = Going::start(&runtime, &[&goal[..], &["--json"]].concat());
+    assert!(child.line().starts_with("{\"feedback\":"));
+    child.interrupt();
+    let (status, rest, complaint) = child.end();
+    let last: Value = serde_json::from_str(rest.lines().last().unwrap()).unwrap();
+    assert_eq!((status, &last["status"]), (Some(1), &json!("CANCELED")));
+    assert_eq!(complaint, "pendularm: the goal ended as CANCELED\n");
+
+    let refused = |goal: &[&str]| refusal(&runtime, &[&["action", "send"], goal].concat(), 1);
+    assert_eq!(
+        refused(&["/nothing", "{}"]),
+        "action: no action is called /nothing"
+    );
+    let far = refused(&["/ik_action", "{x: 9, y: 0}"]);
+    assert!(far.contains("beyond the arm's reach"), "{far}");
+    let other = refused(&["/ik_action", "std_msgs/msg/String", "{}"]);
+    assert_eq!(other, format!("action_type must be {typed}"));
+}

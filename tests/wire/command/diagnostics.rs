@@ -1,0 +1,35 @@
+//! `diagnostics`: its page, and its exit status.
+
+use serde_json::json;
+
+use super::{ask, json_of, said};
+use crate::common::Runtime;
+
+#[test]
+fn diagnostics_are_a_page_and_their_status_tells_whether_all_is_well() {
+    let runtime = Runtime::start();
+    let page = said(&runtime, &["diagnostics"]);
+    assert!(page.starts_with("OK arm_sim: running\n  state "), "{page}");
+    assert_eq!(json_of(&runtime, &["diagnostics"])["status"][0]["level"], 0);
+    let mut client = runtime.connect();
+    client.ask(
+        "/pid_controller/set_gains",
+        json!({"kp": [1e6, 1e6], "kd": [1e5, 1e5]}),
+    );
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.02}));
+    client.ask("/pid_controller/enable", json!({"data": true}));
+    client.subscribe("/diagnostics");
+    client.send(&json!({"op": "publish", "topic": "/joint_trajectory", "msg": {"points": [{"positions": [1, 1]}]}}));
+    client.receive_where("a divergence", |frame| {
+        frame["topic"] == "/diagnostics" && frame["msg"]["status"][0]["level"] == 2
+    });
+    let output = ask(&runtime, &["diagnostics"]);
+    assert_eq!(output.status.code(), Some(1));
+    let page = String::from_utf8(output.stdout).unwrap();
+    assert!(page.starts_with("ERROR arm_sim: diverged: "), "{page}");
+    let complaint = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        complaint.starts_with("pendularm: arm_sim: diverged"),
+        "{complaint}"
+    );
+}

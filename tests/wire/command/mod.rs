@@ -1,0 +1,109 @@
+//! The commands that ask a running one: what each prints, in YAML and in JSON, and what it says where the runtime
+//! refuses.
+
+mod calls;
+mod diagnostics;
+mod lists;
+mod parameters;
+mod topics;
+
+use std::io::{BufRead, BufReader};
+use std::process::{Child, Output, Stdio};
+
+use serde_json::Value;
+
+use crate::common::{self, Runtime};
+
+/// A command with the address of a runtime, ready to be started.
+fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
+    let mut command = common::program();
+    // Behind `--` there are no options any more.
+    let (verb, rest) = arguments.split_at(arguments.len().min(2));
+    command
+        .args(verb)
+        .args(["--connect", &runtime.address.to_string()])
+        .args(["--timeout", &common::PATIENCE.as_secs().to_string()])
+        .args(rest)
+        .stdin(Stdio::null());
+    command
+}
+
+fn ask(runtime: &Runtime, arguments: &[&str]) -> Output {
+    command(runtime, arguments).output().unwrap()
+}
+
+/// Standard output of a command that has to succeed.
+#[track_caller]
+fn said(runtime: &Runtime, arguments: &[&str]) -> String {
+    let output = ask(runtime, arguments);
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{arguments:?}: {complaint}");
+    assert_eq!(complaint, "", "{arguments:?}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The same, in JSON.
+#[track_caller]
+fn json_of(runtime: &Runtime, arguments: &[&str]) -> Value {
+    let text = said(runtime, &[arguments, &["--json"]].concat());
+    assert_eq!(text.lines().count(), 1, "{text}");
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The one line of a command that has to be refused with this exit status.
+#[track_caller]
+fn refusal(runtime: &Runtime, arguments: &[&str], status: i32) -> String {
+    let output = ask(runtime, arguments);
+    let complaint = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(
+        output.status.code(),
+        Some(status),
+        "{arguments:?}: {complaint}"
+    );
+    assert_eq!(complaint.lines().count(), 1, "{complaint}");
+    assert!(output.stdout.is_empty());
+    complaint
+        .trim_end()
+        .strip_prefix("pendularm: ")
+        .unwrap()
+        .to_owned()
+}
+
+/// A command that goes on, and its output line by line.
+struct Going(Child, BufReader<std::process::ChildStdout>);
+
+impl Going {
+    fn start(runtime: &Runtime, arguments: &[&str]) -> Self {
+        let mut child = command(runtime, arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let lines = BufReader::new(child.stdout.take().unwrap());
+        Self(child, lines)
+    }
+
+    fn line(&mut self) -> String {
+        let mut line = String::new();
+        self.1.read_line(&mut line).unwrap();
+        line
+    }
+
+    fn interrupt(&self) {
+        let pid = self.0.id().to_string();
+        let sent = std::process::Command::new("kill")
+            .args(["-INT", &pid])
+            .status();
+        assert!(sent.unwrap().success());
+    }
+
+    /// Exit status, the rest of standard output, and standard error.
+    fn end(self) -> (Option<i32>, String, String) {
+        let Self(child, mut lines) = self;
+        let mut rest = String::new();
+        std::io::Read::read_to_string(&mut lines, &mut rest).unwrap();
+        let output = child.wait_with_output().unwrap();
+        let complaint = String::from_utf8(output.stderr).unwrap();
+        (output.status.code(), rest, complaint)
+    }
+}

@@ -1,0 +1,170 @@
+//! `topic echo`, `topic hz` and `topic pub`.
+
+use serde_json::{Value, json};
+
+use super::{Going, ask, json_of, refusal, said};
+use crate::common::{self, Client, Runtime};
+
+#[test]
+fn a_message_is_echoed_in_yaml_as_ros2_does_or_on_a_line_of_json() {
+    let runtime = Runtime::start();
+    let yaml = said(&runtime, &["topic", "echo", "/joint_states", "--once"]);
+    assert!(yaml.starts_with("header:\n  stamp:\n    sec: "), "{yaml}");
+    assert!(
+        yaml.contains("\nname:\n- joint1\n- joint2\nposition:\n- "),
+        "{yaml}"
+    );
+    assert!(yaml.ends_with("---\n"), "{yaml}");
+    let json = json_of(&runtime, &["topic", "echo", "joint_states", "--once"]);
+    assert_eq!(json["name"], json!(["joint1", "joint2"]));
+    let unknown = refusal(&runtime, &["topic", "echo", "/nothing"], 1);
+    assert!(unknown.contains("/nothing is no topic yet"), "{unknown}");
+    let typed = ["topic", "echo", "/clock", "std_msgs/msg/String"];
+    assert_eq!(
+        refusal(&runtime, &typed, 1),
+        "/clock is of type rosgraph_msgs/msg/Clock, not std_msgs/msg/String"
+    );
+    json_of(
+        &runtime,
+        &["topic", "echo", "/clock", "rosgraph_msgs/Clock", "--once"],
+    );
+}
+
+#[test]
+fn a_part_of_a_message_is_echoed_so_many_times() {
+    let runtime = Runtime::start();
+    let echo = |field, more: &[&'static str]| {
+        [&["topic", "echo", "/joint_states", "--field", field], more].concat()
+    };
+    let names = said(&runtime, &echo("name[1]", &["-n", "2"]));
+    assert_eq!(names, "joint2\n---\njoint2\n---\n");
+    let stamp = json_of(&runtime, &echo("header.stamp", &["--times", "1"]));
+    assert!(
+        stamp["sec"].is_u64() && stamp["nanosec"].is_u64(),
+        "{stamp}"
+    );
+    let unknown = refusal(&runtime, &echo("name[2]", &["--once"]), 1);
+    assert_eq!(unknown, "the message has no name[2]");
+    for wrong in [echo("name[x]", &[]), echo("name", &["--once", "-n", "2"])] {
+        assert_eq!(ask(&runtime, &wrong).status.code(), Some(2), "{wrong:?}");
+    }
+}
+
+#[test]
+fn what_another_client_says_acts_on_no_terminal_and_loses_nothing() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    let msg = json!({"data": "\u{1b}[2J\u{202e}\u{9b}31m\r\n---\n", "ok": "\u{e9} yes: no", "\u{1b}": [[], {}, [1, [2]]]});
+    client.send(&json!({"op": "advertise", "topic": "/hostile", "type": "std_msgs/msg/String"}));
+    client.settle();
+    for arguments in [
+        vec!["topic", "echo", "/hostile", "--once"],
+        vec!["topic", "echo", "/hostile", "--once", "--json"],
+    ] {
+        let child = Going::start(&runtime, &arguments);
+        wait_for_subscriber(&mut client, "/hostile", 1);
+        client.send(&json!({"op": "publish", "topic": "/hostile", "msg": msg}));
+        let (status, text, complaint) = child.end();
+        assert_eq!((status, complaint.as_str()), (Some(0), ""));
+        let acts = |one: char| one != '\n' && (one.is_control() || one == '\u{202e}');
+        assert!(!text.contains(acts), "{text:?}");
+        if arguments.contains(&"--json") {
+            assert_eq!(serde_json::from_str::<Value>(&text).unwrap(), msg);
+        } else {
+            assert!(text.contains("ok: \"\u{e9} yes: no\"\n"), "{text}");
+            assert!(
+                text.contains("\"\\u001b\":\n- []\n- {}\n- - 1\n  - - 2\n"),
+                "{text}"
+            );
+        }
+        wait_for_subscriber(&mut client, "/hostile", 0);
+    }
+}
+
+/// Until so many nodes subscribe to the topic: clients are one node together.
+fn wait_for_subscriber(client: &mut Client, topic: &str, count: usize) {
+    let deadline = std::time::Instant::now() + common::PATIENCE;
+    loop {
+        let nodes = client.ask("/rosapi/subscribers", json!({"topic": topic}));
+        if nodes["subscribers"].as_array().unwrap().len() == count {
+            return;
+        }
+        assert!(std::time::Instant::now() < deadline, "{topic}: {nodes}");
+    }
+}
+
+/// The rate is asked for by two independent numbers: it is the inverse of the mean, which lies between the extremes.
+#[test]
+fn a_rate_is_told_every_second_until_a_signal() {
+    let runtime = Runtime::start();
+    let mut child = Going::start(&runtime, &["topic", "hz", "/clock", "--json"]);
+    let first: Value = serde_json::from_str(&child.line()).unwrap();
+    let second: Value = serde_json::from_str(&child.line()).unwrap();
+    let number = |name: &str| second[name].as_f64().unwrap();
+    assert!(number("window") > first["window"].as_f64().unwrap());
+    assert!(number("min") <= number("rate").recip() && number("rate").recip() <= number("max"));
+    assert!(number("std_dev") >= 0.0 && number("std_dev") <= number("max") - number("min"));
+    child.interrupt();
+    let (status, _, complaint) = child.end();
+    assert_eq!((status, complaint.as_str()), (Some(0), ""));
+    let mut child = Going::start(&runtime, &["topic", "hz", "-w", "2", "/clock"]);
+    assert!(child.line().starts_with("average rate: "));
+    let details = child.line();
+    assert!(
+        details.starts_with("\tmin: ") && details.ends_with("window: 2\n"),
+        "{details}"
+    );
+    child.interrupt();
+    assert_eq!(child.end().0, Some(0));
+}
+
+#[test]
+fn messages_are_published_once_so_many_times_or_until_a_signal() {
+    let runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.subscribe("/joint_trajectory");
+    let point = "points: [{positions: [0.3, -0.5]}]";
+    let once = ["topic", "pub", "-1", "/joint_trajectory", point];
+    let line = "publishing #1: {\"points\":[{\"positions\":[0.3,-0.5]}]}\n";
+    assert_eq!(said(&runtime, &once), line);
+    let heard = client.message("/joint_trajectory");
+    assert_eq!(heard, json!({"points": [{"positions": [0.3, -0.5]}]}));
+    let fast = [
+        "topic",
+        "pub",
+        "/chatter",
+        "std_msgs/msg/String",
+        "{data: hi}",
+        "-r",
+        "200",
+        "-t",
+        "3",
+    ];
+    let lines = said(&runtime, &fast);
+    assert_eq!(
+        lines.lines().last(),
+        Some("publishing #3: {\"data\":\"hi\"}")
+    );
+    let mut child = Going::start(
+        &runtime,
+        &["topic", "pub", "/chatter", "data: hi", "-r", "100"],
+    );
+    child.line();
+    assert!(child.line().starts_with("publishing #2"));
+    child.interrupt();
+    assert_eq!(child.end().0, Some(0));
+    for (topic, message, word) in [
+        ("/joint_states", "{}", "belongs to the runtime"),
+        (
+            "/joint_trajectory",
+            "points: [{positions: [1]}]",
+            "positions",
+        ),
+        ("/joint_trajectory", "5", "msg must be"),
+    ] {
+        let output = ask(&runtime, &["topic", "pub", "--once", topic, message]);
+        let complaint = String::from_utf8(output.stderr).unwrap();
+        assert!(complaint.contains(word), "{complaint}");
+        assert_eq!((output.status.code(), output.stdout), (Some(1), vec![]));
+    }
+}

@@ -1,0 +1,98 @@
+//! The report's folder: what is served from it, and that no path leads out of it.
+
+use std::fs;
+#[cfg(unix)]
+use std::process::Command;
+
+use crate::common::Runtime;
+use crate::web_client::{folder, get};
+
+#[test]
+fn the_report_is_served_from_its_folder_with_a_policy_of_its_own() {
+    let folder = folder("report");
+    fs::write(folder.join("index.html"), "<h1>report</h1>").unwrap();
+    fs::create_dir(folder.join("data")).unwrap();
+    fs::write(folder.join("data/error.csv"), "h,e\n").unwrap();
+    fs::write(folder.join("figure.svg"), "<svg/>").unwrap();
+    let runtime = Runtime::with(&["--report", folder.to_str().unwrap()]);
+    for (path, kind, body) in [
+        ("/report/", "text/html", "<h1>report</h1>"),
+        ("/report/index.html", "text/html", "<h1>report</h1>"),
+        ("/report/data/error.csv?x=1", "text/csv", "h,e\n"),
+        ("/report/figure.svg", "image/svg+xml", "<svg/>"),
+    ] {
+        let file = get(runtime.address, path);
+        assert_eq!((file.status, file.text()), (200, body), "{path}");
+        assert!(file.header("content-type").unwrap().starts_with(kind));
+        let policy = file.header("content-security-policy").unwrap();
+        assert!(
+            policy.contains("default-src 'none'") && policy.contains("style-src 'unsafe-inline'")
+        );
+        assert!(!policy.contains("script-src") && !policy.contains("connect-src"));
+    }
+    let moved = get(runtime.address, "/report");
+    assert_eq!(
+        (moved.status, moved.header("location")),
+        (301, Some("/report/"))
+    );
+}
+
+#[test]
+fn a_report_larger_than_a_socket_holds_arrives_whole() {
+    let folder = folder("large");
+    let text: String = (0..500_000).map(|line| format!("{line}\n")).collect();
+    fs::write(folder.join("large.txt"), &text).unwrap();
+    let runtime = Runtime::with(&["--report", folder.to_str().unwrap()]);
+    assert!(get(runtime.address, "/report/large.txt").text() == text);
+}
+
+#[test]
+fn no_path_leads_out_of_the_reports_folder() {
+    let outside = folder("outside");
+    let inside = outside.join("inside");
+    fs::create_dir(&inside).unwrap();
+    fs::write(outside.join("secret.txt"), "secret").unwrap();
+    fs::write(inside.join(".hidden.txt"), "secret").unwrap();
+    fs::write(inside.join("program.exe"), "secret").unwrap();
+    fs::create_dir(inside.join("folder.txt")).unwrap();
+    #[cfg(unix)]
+    {
+        std::os::unix::fs::symlink(outside.join("secret.txt"), inside.join("link.txt")).unwrap();
+        std::os::unix::fs::symlink(&outside, inside.join("up")).unwrap();
+    }
+    let runtime = Runtime::with(&["--report", inside.to_str().unwrap()]);
+    for rest in [
+        "../secret.txt",
+        "%2e%2e/secret.txt",
+        "..%2fsecret.txt",
+        "..%5csecret.txt",
+        "./../secret.txt",
+        "/secret.txt",
+        "link.txt",
+        "up/secret.txt",
+        ".hidden.txt",
+        "program.exe",
+        "folder.txt",
+        "missing.txt",
+        "%00.txt",
+        "",
+    ] {
+        let answer = get(runtime.address, &format!("/report/{rest}"));
+        assert_eq!(answer.status, 404, "{rest}");
+        assert!(answer.text().contains("--report"), "{}", answer.text());
+        assert!(!answer.text().contains("secret"));
+    }
+}
+
+/// A pipe without a writer would keep its reader waiting.
+#[cfg(unix)]
+#[test]
+fn a_pipe_in_the_reports_folder_holds_up_nobody() {
+    let folder = folder("pipe");
+    let made = Command::new("mkfifo").arg(folder.join("a.txt")).status();
+    if !made.is_ok_and(|status| status.success()) {
+        return;
+    }
+    let runtime = Runtime::with(&["--report", folder.to_str().unwrap()]);
+    assert_eq!(get(runtime.address, "/report/a.txt").status, 404);
+}

@@ -1,0 +1,117 @@
+//! The program itself: how it ends, and on which of its outputs it says why.
+
+use std::process::{Command, Output, Stdio};
+
+use crate::common;
+
+/// The program itself with these arguments.
+fn program(arguments: &[&str]) -> Command {
+    let mut command = common::program();
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+#[track_caller]
+fn is_bad_usage(output: &Output, names: &str) {
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(
+        said.starts_with("pendularm: ") && said.contains(names),
+        "{said}"
+    );
+    assert!(output.stdout.is_empty());
+}
+
+#[test]
+fn bad_usage_ends_the_program_with_one_line_and_status_2() {
+    is_bad_usage(
+        &program(&["--links", "4"]).output().unwrap(),
+        "--links must be 2 or 3, got \"4\"",
+    );
+    is_bad_usage(&program(&["fly"]).output().unwrap(), "\"fly\"");
+    for variable in [
+        "ARM_SIM_LINKS",
+        "ARM_SIM_BIND",
+        "ARM_SIM_SEED",
+        "ARM_SIM_LOG",
+    ] {
+        is_bad_usage(
+            &program(&[]).env(variable, "nonsense").output().unwrap(),
+            variable,
+        );
+    }
+    is_bad_usage(
+        &program(&["--bind", "0.0.0.0:0"]).output().unwrap(),
+        "loopback",
+    );
+}
+
+/// The address is taken: by a listener of this test's own.
+#[test]
+fn as_json_the_reason_for_not_starting_is_an_object_too() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    let output = program(&["--bind", &address, "--log-format", "json"])
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    let log = String::from_utf8(output.stderr).unwrap();
+    let last: serde_json::Value = serde_json::from_str(log.lines().last().unwrap()).unwrap();
+    assert_eq!(last["level"], "ERROR");
+    assert!(
+        last["message"].as_str().unwrap().contains(&address),
+        "{log}"
+    );
+    let output = program(&["--bind", &address]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        said.lines().last().unwrap().starts_with("pendularm: "),
+        "{said}"
+    );
+}
+
+/// Every write to `/dev/full` fails.
+#[cfg(target_os = "linux")]
+fn full() -> Stdio {
+    let full = std::fs::File::options().write(true).open("/dev/full");
+    Stdio::from(full.unwrap())
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn output_that_is_lost_is_a_failure() {
+    for arguments in [
+        &["--help"][..],
+        &["--version"],
+        &["plan", "--error", "0.1", "--duration", "0.1"],
+        #[cfg(feature = "cli")]
+        &["completions", "bash"],
+    ] {
+        let output = program(arguments).stdout(full()).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {said}");
+        assert!(said.starts_with("pendularm: standard output: "), "{said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+    }
+}
+
+#[test]
+fn a_reader_that_is_gone_is_no_failure() {
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let output = program(&["--help"]).stdout(writer).output().unwrap();
+    assert_eq!((output.status.code(), output.stderr), (Some(0), vec![]));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_complaint_that_nobody_takes_changes_no_exit_status() {
+    let status = |arguments: &[&str]| {
+        let mut program = program(arguments);
+        program.stdout(full()).stderr(full());
+        program.status().unwrap().code()
+    };
+    assert_eq!(status(&["--help"]), Some(1));
+    assert_eq!(status(&["--links", "4"]), Some(2));
+}

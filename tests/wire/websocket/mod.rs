@@ -1,0 +1,9 @@
+//! WebSocket on the port: the same rosbridge as over TCP, message by message; who may open one; bytes that mean harm.
+//!
+//! **Invariant:** nothing comes over a WebSocket that was not asked for.
+
+#![cfg(feature = "web")]
+mod closing;
+mod handshake;
+mod levels;
+mod messages;
