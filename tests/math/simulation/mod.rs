@@ -1,0 +1,58 @@
+//! The live loop: motion against 50-digit references, determinism, what each call changes and what it keeps.
+
+mod changes;
+mod disturbances;
+mod motion;
+mod stepping;
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::dynamics::forward_dynamics;
+use pendularm::math::integrator::{Method, increment, two_sum};
+use pendularm::math::pid::{Gains, Setpoint};
+use pendularm::math::simulation::Simulation;
+
+fn no_gains<const N: usize>() -> Gains<N> {
+    Gains {
+        kp: [0.0; N],
+        ki: [0.0; N],
+        kd: [0.0; N],
+    }
+}
+
+/// Steps under constant efforts with nothing but the method and the dynamics, summed as the simulation sums.
+struct Offline<const N: usize> {
+    arm: Arm<N>,
+    method: Method,
+    dt: f64,
+    tau: [f64; N],
+    state: State<N>,
+    carry: State<N>,
+}
+
+impl<const N: usize> Offline<N> {
+    fn step(&mut self) {
+        let State {
+            position: q,
+            velocity: v,
+        } = &mut self.state;
+        let acceleration =
+            |_, q: &[f64; N], v: &[f64; N]| forward_dynamics(&self.arm, q, v, &self.tau);
+        let (dq, dv) = increment(self.method, acceleration, 0.0, q, v, self.dt);
+        for i in 0..N {
+            (q[i], self.carry.position[i]) = two_sum(q[i], dq[i] + self.carry.position[i]);
+            (v[i], self.carry.velocity[i]) = two_sum(v[i], dv[i] + self.carry.velocity[i]);
+        }
+    }
+}
+
+/// Two links swinging under control, away from anything special.
+fn moving(method: Method) -> Simulation<2> {
+    let mut simulation = Simulation::new(Arm::default(), Gains::default());
+    simulation.set_method(method);
+    simulation.set_setpoint(Setpoint {
+        position: [0.7, -1.1],
+        velocity: [0.1, 0.0],
+    });
+    simulation.enable(true);
+    simulation
+}

@@ -1,0 +1,151 @@
+//! Steps: where they start, what one is made of, how rounding and time add up, and who may watch them.
+
+use std::ops::ControlFlow;
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Gains;
+use pendularm::math::simulation::Simulation;
+
+use super::{Offline, moving, no_gains};
+
+#[test]
+fn a_simulation_starts_in_the_starting_pose_with_runge_kutta_at_a_millisecond_and_no_control() {
+    let simulation = Simulation::new(Arm::default(), Gains::<3>::default());
+    assert_eq!(simulation.state(), &State::rest());
+    assert_eq!(simulation.state().position, [0.0; 3]);
+    assert_eq!(simulation.method(), Method::Rk4);
+    assert_eq!(simulation.timestep(), 0.001);
+    assert!(!simulation.pid().is_enabled());
+    assert_eq!(simulation.effort(), &[0.0; 3]);
+    assert_eq!((simulation.time(), simulation.steps()), (0.0, 0));
+    assert_eq!(simulation.divergence(), None);
+}
+
+#[test]
+fn many_steps_at_once_are_the_same_bits_as_one_by_one() {
+    for method in Method::ALL {
+        for on in [false, true] {
+            let mut at_once = moving(method);
+            at_once.enable(on);
+            let mut one_by_one = at_once.clone();
+            assert_eq!(at_once.advance(1000), 1000);
+            for _ in 0..1000 {
+                assert!(one_by_one.step());
+            }
+            assert_eq!(at_once, one_by_one, "{method}");
+        }
+    }
+}
+
+/// The law runs on the state at the start and its effort is held through all stages: the step is the one that the
+/// offline stepper takes under that effort.
+#[test]
+fn a_step_runs_the_control_law_once_and_holds_its_effort() {
+    for method in Method::ALL {
+        let mut simulation = moving(method);
+        simulation.advance(100);
+        let state = *simulation.state();
+        simulation.set_state(state);
+        let control = simulation.pid().control(&state, simulation.timestep());
+        let mut offline = Offline {
+            arm: *simulation.arm(),
+            method,
+            dt: simulation.timestep(),
+            tau: control.effort,
+            state,
+            carry: State::rest(),
+        };
+        offline.step();
+        assert!(simulation.step());
+        assert_eq!(simulation.state(), &offline.state, "{method}");
+        assert_eq!(simulation.effort(), &control.effort);
+        assert_eq!(simulation.pid().integral(), &control.integral);
+    }
+}
+
+#[test]
+fn without_control_the_arm_falls_and_the_effort_is_zero() {
+    let mut simulation = Simulation::new(Arm::<2>::default(), Gains::default());
+    simulation.advance(100);
+    assert!(simulation.state().position[0] < -0.05);
+    assert_eq!(simulation.effort(), &[0.0; 2]);
+    assert_eq!(simulation.pid().integral(), &[0.0; 2]);
+}
+
+#[test]
+fn an_arm_at_rest_without_gravity_stays_where_it_is_to_the_last_bit() {
+    let arm = Arm::new([1.0, 0.5, 2.0], [1.0, 3.0, 0.1], 0.0).unwrap();
+    let start = State {
+        position: [0.3, 4.0, -1e8],
+        velocity: [0.0; 3],
+    };
+    for method in Method::ALL {
+        let mut simulation = Simulation::new(arm, no_gains());
+        simulation.set_method(method);
+        simulation.set_state(start);
+        simulation.advance(1000);
+        assert_eq!(simulation.state(), &start);
+        assert_eq!(simulation.time(), 1.0);
+    }
+}
+
+/// A link that turns at 0.1 rad/s without gravity moves by the same increment each step: a million of them add up to
+/// that product, where a plain sum would be thousands of units in the last place off.
+#[test]
+fn a_million_tiny_steps_lose_no_digit() {
+    let arm = Arm::new([1.0], [1.0], 0.0).unwrap();
+    let mut simulation = Simulation::new(arm, no_gains());
+    simulation.set_method(Method::Euler);
+    simulation.set_timestep(1e-6);
+    simulation.set_state(State {
+        position: [0.0],
+        velocity: [0.1],
+    });
+    simulation.advance(1_000_000);
+    let [q] = simulation.state().position;
+    assert!((q - 1e6 * (1e-6 * 0.1)).abs() <= 0.1 * f64::EPSILON, "{q}");
+    assert_eq!(simulation.time(), 1.0);
+}
+
+#[test]
+fn time_is_a_product_and_goes_on_over_a_new_timestep() {
+    let mut simulation = moving(Method::Rk4);
+    simulation.advance(100_000);
+    assert_eq!(simulation.time(), 100.0);
+    simulation.set_timestep(0.0003);
+    assert_eq!(simulation.time(), 100.0);
+    simulation.advance(7);
+    assert_eq!(simulation.time(), 100.0 + 7.0 * 0.0003);
+    assert_eq!(simulation.steps(), 100_007);
+    simulation.set_method(Method::Euler);
+    assert_eq!(simulation.time(), 100.0 + 7.0 * 0.0003);
+}
+
+#[test]
+fn setting_the_same_timestep_again_does_not_turn_time_into_a_sum() {
+    let mut simulation = moving(Method::Euler);
+    for _ in 0..1000 {
+        simulation.set_timestep(0.0001);
+        simulation.step();
+    }
+    assert_eq!(simulation.time(), 1000.0 * 0.0001);
+}
+
+#[test]
+fn an_observer_sees_every_step_in_order_and_may_end_the_advance() {
+    let mut simulation = moving(Method::Midpoint);
+    simulation.advance(10);
+    let mut seen = Vec::new();
+    let taken = simulation.advance_with(100, |now| {
+        seen.push(now.steps());
+        if now.steps() == 15 {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    assert_eq!(taken, 5);
+    assert_eq!(seen, [11, 12, 13, 14, 15]);
+    assert_eq!(simulation.steps(), 15);
+}

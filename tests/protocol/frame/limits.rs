@@ -1,0 +1,131 @@
+//! The limits of a frame's length and nesting, and of what the reader keeps.
+
+use pendularm::protocol::limits::{MAX_FRAME, MAX_NESTING};
+use pendularm::protocol::wire::frame::{FrameError, FrameReader};
+
+use super::{frame, nested, outcomes, read};
+
+#[test]
+fn a_frame_of_exactly_the_limit_is_taken() {
+    let text = format!("{{\"a\":\"{}\"}}", "x".repeat(MAX_FRAME - 8));
+    assert_eq!(text.len(), MAX_FRAME);
+    let stream = format!("{text}\n{{}}\n");
+    // No `assert_eq!`: it would print megabytes.
+    assert!(read([stream.as_bytes()]) == [frame(&text), frame("{}")]);
+    assert!(read(stream.as_bytes().chunks(4093)) == [frame(&text), frame("{}")]);
+}
+
+/// Frames one byte and a lot beyond the limit, ended by their brackets or by a newline, whole and in pieces; also one
+/// with brackets and a newline's escape in the part that is skipped, and one in which something else goes wrong behind
+/// the limit.
+#[test]
+fn a_longer_frame_gets_one_error_and_is_skipped_to_where_it_would_have_ended() {
+    let filler = |length: usize| "x".repeat(length);
+    let over = MAX_FRAME - 5;
+    for text in [
+        format!("{{\"a\":\"{}\"}}", filler(MAX_FRAME - 7)),
+        format!("{{\"a\":\"{}\"}}", filler(2 * over)),
+        format!("{{\"a\":\"{}\",\"b\":[\"]}}\\\"\\n\",{{}}]}}", filler(over)),
+        format!("{{\"a\":\"{}\n", filler(over)),
+        format!("{{\"a\":\"{}\"]}}}}{{}}\n", filler(over)),
+        format!(
+            "{{\"a\":\"{}\",\"b\":{}\n",
+            filler(over),
+            nested(MAX_NESTING + 9)
+        ),
+    ] {
+        let stream = text + "{\"b\":2}";
+        let expected = [Err(FrameError::TooLong(MAX_FRAME)), frame("{\"b\":2}")];
+        assert_eq!(read([stream.as_bytes()]), expected);
+        for size in [64 * 1024, 999_983] {
+            assert_eq!(
+                read(stream.as_bytes().chunks(size)),
+                expected,
+                "pieces of {size}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_frame_that_is_too_long_is_reported_before_it_ends_and_is_not_kept() {
+    let mut reader = FrameReader::new();
+    let chunk = [b' '; 64 * 1024];
+    reader.push(b"{");
+    let mut errors = 0;
+    for _ in 0..200 {
+        reader.push(&chunk);
+        errors += reader
+            .by_ref()
+            .filter(|found| *found == Err(FrameError::TooLong(MAX_FRAME)))
+            .count();
+    }
+    assert_eq!(errors, 1);
+    assert!(
+        reader.buffered() <= chunk.len(),
+        "{} bytes kept",
+        reader.buffered()
+    );
+    assert_eq!(reader.finish(), None);
+}
+
+#[test]
+fn an_idle_reader_gives_back_the_memory_of_a_long_frame() {
+    let mut reader = FrameReader::new();
+    let text = format!("{{\"a\":\"{}\"}}\n", "x".repeat(1_000_000));
+    reader.push(text.as_bytes());
+    assert_eq!(reader.by_ref().count(), 1);
+    assert!(reader.buffered() < 64 * 1024);
+    // Room for usual frames stays, so that they are read without allocating.
+    assert!(reader.buffered() >= 16 * 1024);
+}
+
+#[test]
+fn what_is_buffered_is_what_has_come_of_an_unfinished_frame() {
+    let mut reader = FrameReader::new();
+    let half = format!("{{\"a\":\"{}", "x".repeat(100_000));
+    reader.push(half.as_bytes());
+    assert_eq!(reader.next(), None);
+    assert!(reader.buffered() >= half.len());
+}
+
+/// The reader never is at the end of a frame when it is at the end of what was pushed.
+#[test]
+fn frames_that_are_done_with_are_not_kept_though_one_is_always_unfinished() {
+    let mut reader = FrameReader::new();
+    let text = format!("{{\"a\":\"{}\"}}\n", "x".repeat(1000));
+    let (front, back) = text.split_at(10);
+    let chunk = format!("{back}{}{front}", text.repeat(9));
+    reader.push(front.as_bytes());
+    for _ in 0..100 {
+        assert_eq!(reader.next(), None);
+        reader.push(chunk.as_bytes());
+        assert_eq!(reader.by_ref().filter(Result::is_ok).count(), 10);
+        // The unfinished bytes and those pushed last, twice, and the reserve of a growing buffer.
+        assert!(reader.buffered() < 5 * chunk.len());
+    }
+}
+
+#[test]
+fn nesting_up_to_the_limit_is_taken_and_one_deeper_is_malformed() {
+    let (deepest, deeper) = (nested(MAX_NESTING), nested(MAX_NESTING + 1));
+    assert_eq!(outcomes(deepest.as_bytes()), [frame(&deepest)]);
+    assert_eq!(
+        outcomes((deeper + "{}").as_bytes()),
+        [Err(FrameError::TooDeep), frame("{}")]
+    );
+}
+
+#[test]
+fn nesting_without_bound_is_one_malformed_frame() {
+    let stream = nested(1_000_000) + "{\"b\":2}\n";
+    assert_eq!(
+        read([stream.as_bytes()]),
+        [Err(FrameError::TooDeep), frame("{\"b\":2}")]
+    );
+    let open = "{\"a\":".repeat(500_000) + "\n{\"b\":2}\n";
+    assert_eq!(
+        read([open.as_bytes()]),
+        [Err(FrameError::TooDeep), frame("{\"b\":2}")]
+    );
+}

@@ -1,0 +1,61 @@
+//! The outbox of one connection: what waits, what is dropped, what is held back.
+//!
+//! **Invariant:** time is told, never waited for.
+
+mod costs;
+mod properties;
+mod queue;
+mod series;
+mod throttles;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use bytes::Bytes;
+use pendularm::protocol::outbox::Outbox;
+
+const MIB: usize = 1024 * 1024;
+
+/// An outbox under test, with a clock of its own.
+struct Bench {
+    outbox: Outbox,
+    now: Instant,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self {
+            outbox: Outbox::new(),
+            now: Instant::now(),
+        }
+    }
+
+    fn push(&mut self, topic: &str, frame: impl Into<Bytes>) {
+        self.outbox.push(&Arc::from(topic), frame.into(), self.now);
+    }
+
+    fn respond(&mut self, frame: &'static str, supersedes: &[&str]) {
+        self.outbox.push_response(Bytes::from(frame), supersedes);
+    }
+
+    fn throttle(&mut self, topic: &str, ms: u64, queue_length: usize) {
+        let throttle = (Duration::from_millis(ms), queue_length);
+        self.outbox.set_throttle(&Arc::from(topic), Some(throttle));
+    }
+
+    fn advance(&mut self, ms: u64) {
+        self.now += Duration::from_millis(ms);
+    }
+
+    fn take(&mut self, max_frames: usize, max_bytes: usize) -> Vec<Bytes> {
+        let mut batch = Vec::new();
+        self.outbox
+            .take_frames(self.now, max_frames, max_bytes, &mut batch);
+        batch
+    }
+
+    fn take_all(&mut self) -> Vec<String> {
+        let text = |frame: &Bytes| String::from_utf8(frame.to_vec()).unwrap();
+        self.take(usize::MAX, usize::MAX).iter().map(text).collect()
+    }
+}

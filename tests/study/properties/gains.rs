@@ -1,0 +1,66 @@
+//! Suggested gains, on moves that their search has not made.
+
+use std::f64::consts::TAU;
+
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::pid::Setpoint;
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::gains::{GainsSearch, MOVES, SETTLED, Wish};
+use pendularm::study::stability::limits;
+
+use super::{Dice, Tally, cases, property, run, tells};
+
+/// Arms of 10 cm to 10 m and of 10 g to 100 kg a link: gains that are suggested leave the margin and settle on moves
+/// that the search has not made.
+fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
+    let mut dice = Dice::of(case);
+    let (length, mass) = (dice.size(1.0), dice.size(1.7));
+    let lengths = std::array::from_fn(|_| length * dice.size(0.2));
+    let masses = std::array::from_fn(|_| mass * dice.size(0.3));
+    let arm = Arm::<N>::new(lengths, masses, 9.81).unwrap();
+    let method = Method::ALL[dice.0.usize(0..Method::ALL.len())];
+    let free = ControlLoop::free(arm).with_method(method);
+    let wish = Wish {
+        settling_time: 4.0,
+        margin: 1.0 + dice.0.f64(),
+    };
+    let mut search = GainsSearch::new(&free, wish).unwrap();
+    let answer = std::iter::repeat_with(|| search.advance()).find_map(|answer| answer);
+    let Some(Ok(found)) = answer else {
+        tally.open += 1;
+        return;
+    };
+    tally.tried += 1;
+    let told = format!("case {case}: {free:?} {found:?} after {MOVES} moves");
+    let control = ControlLoop {
+        gains: found.gains,
+        setpoint: Setpoint::at(std::array::from_fn(|_| TAU * dice.any())),
+        ..free
+    };
+    assert!(found.settled_after <= wish.settling_time, "{told}");
+    let least = limits(&control).trusted().unwrap();
+    assert!(
+        least >= 0.999 * wish.margin * free.timestep,
+        "{told}: {least}"
+    );
+    let mut live = control.simulation(State::rest());
+    let mut off_at = 0.0;
+    // Ten moves stand for all of them: another may take a half more.
+    while live.time() < 2.0 * wish.settling_time {
+        assert!(live.step(), "{told}: diverged");
+        let off = |i: usize| (live.state().position[i] - control.setpoint.position[i]).abs();
+        if (0..N).any(|i| off(i) > SETTLED) {
+            off_at = live.time();
+        }
+    }
+    assert!(
+        off_at <= 1.5 * wish.settling_time,
+        "{told}: {off_at} s, {control:?}"
+    );
+}
+
+#[test]
+fn gains_for_random_arms_hold_on_other_moves() {
+    tells(property!(suggested_gains_hold, 12, 2_000));
+}

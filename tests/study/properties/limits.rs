@@ -1,0 +1,150 @@
+//! Limits of the timestep: what they divide, and that no pose has a smaller one.
+
+use std::f64::consts::PI;
+
+use pendularm::report::experiments::measure::{STEPS, growth};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::linear::{Linear, equilibrium};
+use pendularm::study::stability::{
+    BEYOND, Rest, Sampling, largest_timestep, limit_held, limits, step_matrix,
+};
+
+use super::{Dice, Tally, cases, property, run, tells};
+
+/// How far below and above a predicted limit the arm is watched.
+const ASIDE: f64 = 0.03;
+
+/// By how many factors e the slowest mode's energy must change while a nudge is watched, or the watch is too short to
+/// tell what becomes of it: in the first of the windows compared faster modes have hidden it.
+const DECIDED: f64 = 12.0;
+
+/// Growth of the energy of a small deviation at this timestep, infinite where it escapes, and whether the watch is long
+/// enough for the slowest mode to show.
+fn watched<const N: usize>(control: &ControlLoop<N>, linear: &Linear) -> (f64, bool) {
+    let step = step_matrix(linear, control.method, Sampling::Held, control.timestep);
+    let changes = 1.25 * STEPS as f64 * step.spectral_radius().ln();
+    let growth = growth(control, Sampling::Held).unwrap_or(f64::INFINITY);
+    (growth, changes.abs() > DECIDED)
+}
+
+/// Where it is said to rest nothing pushes, a nudge dies out below the limit and grows beyond it; unstable at every
+/// timestep means just that.
+fn a_limit_divides_decay_from_growth<const N: usize>(case: u64, tally: &mut Tally) {
+    let control = Dice::of(case).control::<N>();
+    let told = format!("case {case}: {control:?}");
+    let rest = equilibrium(&control);
+    let linear = Linear::at(&control, &rest.position, &rest.integrating);
+    let load = pendularm::math::dynamics::gravity_load(&control.arm, &rest.position);
+    let stiffest = control.gains.kp.iter().copied();
+    let largest = load.map(f64::abs).into_iter().chain(stiffest);
+    // Springs magnify what rounding makes of angles of some turns.
+    assert!(
+        rest.residual <= 1e-12 * largest.fold(1.0, f64::max),
+        "{told}: {rest:?}"
+    );
+    let mut judge = |timestep: f64, grows: bool| {
+        let control = control.with_timestep(timestep);
+        let (growth, is_shown) = watched(&control, &linear);
+        // Decay that is seen is decay; what seems to grow may be a slow mode that swings.
+        if is_shown || (growth < 1.0 && !grows) {
+            tally.tried += 1;
+            assert_eq!(growth >= 1.0, grows, "{told}: {growth:e} at {timestep} s");
+        } else {
+            tally.open += 1;
+        }
+    };
+    let rates = linear.flow().eigenvalues().into_iter();
+    let fastest = rates
+        .map(pendularm::study::matrix::Complex::modulus)
+        .fold(0.0, f64::max);
+    match limit_held(&control) {
+        Some(0.0) => judge(0.02 / fastest, true),
+        Some(limit) => {
+            judge((1.0 - ASIDE) * limit, false);
+            judge((1.0 + ASIDE) * limit, true);
+        }
+        None => judge(control.timestep, false),
+    }
+}
+
+/// No pose has a smaller limit than the smallest, the advice is within it, and what is critical grows.
+fn no_pose_is_worse_than_the_worst<const N: usize>(case: u64, tally: &mut Tally) {
+    let mut dice = Dice::of(case);
+    let control = dice.control::<N>();
+    let told = format!("case {case}: {control:?}");
+    let found = limits(&control);
+    let least = found.minimum_held.unwrap_or(f64::INFINITY);
+    assert!(
+        found.advised.is_none_or(|advised| advised <= least),
+        "{told}: {found:?}"
+    );
+    // A loop that runs away in earnest is said to, and one that is stable at some timestep is not.
+    let is_said = found.rest == Rest::Unstable;
+    assert!(
+        if is_said {
+            found.held == Some(0.0)
+        } else {
+            !runs_away(&control)
+        },
+        "{told}: {found:?}"
+    );
+    // A limit counts growth of 1e-11, which may be a hair before the bound or behind it.
+    assert!(
+        found.bound.is_none_or(|bound| bound <= 1.0001 * least),
+        "{told}: {found:?}"
+    );
+    if let Some(critical) = found.critical {
+        assert!(
+            critical.growth_per_step > 1.0
+                && critical.joint < N
+                && critical.frequency <= 0.500_001 / (BEYOND * least),
+            "{told}: {found:?}"
+        );
+    }
+    for _ in 0..5 {
+        let pose = std::array::from_fn(|_| PI * dice.any());
+        let linear = Linear::at_pose(&control, &pose);
+        // A pose from which gravity pulls the arm away says nothing about timesteps.
+        let held = largest_timestep(&linear, control.method, Sampling::Held);
+        let Some(held) = held.filter(|held| *held > 0.0) else {
+            tally.open += 1;
+            continue;
+        };
+        tally.tried += 1;
+        if let Some(bound) = found.bound {
+            assert!(
+                held >= 0.999 * bound,
+                "{told}: {held} at {pose:?}, {found:?}"
+            );
+        }
+        // A worst pose that is found by search alone may be missed by a little.
+        let within = if found.certified { 0.99 } else { 0.9 };
+        assert!(
+            held >= within * least,
+            "{told}: {held} at {pose:?}, {found:?}"
+        );
+    }
+}
+
+/// Whether the loop runs away from where it rests in continuous time.
+fn runs_away<const N: usize>(control: &ControlLoop<N>) -> bool {
+    let modes = Linear::at_setpoint(control).flow().eigenvalues();
+    let fastest = modes.iter().map(|mode| mode.modulus()).fold(0.0, f64::max);
+    modes.iter().any(|mode| mode.re > 1e-9 * fastest)
+}
+
+#[test]
+fn limits_divide_decay_from_growth_on_random_loops() {
+    tells(property!(a_limit_divides_decay_from_growth, 300, 1_000_000));
+}
+
+#[test]
+fn no_pose_of_a_random_loop_is_worse_than_the_worst() {
+    tells(property!(no_pose_is_worse_than_the_worst, 80, 20_000));
+}
+
+/// Its gains run away where nothing weighs, in a pose that gravity steadies: what grows there grows without gravity.
+#[test]
+fn what_is_critical_grows_also_where_only_the_arm_without_weight_runs_away() {
+    no_pose_is_worse_than_the_worst::<3>(285, &mut Tally::default());
+}

@@ -1,0 +1,121 @@
+//! Planned runs and answered errors, against motions of twice the digits.
+
+use std::f64::consts::PI;
+
+use glam::DVec2;
+use pendularm::math::arm::{Arm, State};
+use pendularm::math::integrator::Method;
+use pendularm::math::kinematics::forward;
+use pendularm::report::experiments::reference::{Law, ReferenceMotion};
+use pendularm::study::control_loop::ControlLoop;
+use pendularm::study::planner::{Planning, Task};
+use pendularm::study::rollout::{Plan, Rollout};
+
+use super::{Dice, Tally, cases, property, run, tells};
+
+/// A state to begin with, and a time for which the motion from there is known.
+fn start<const N: usize>(dice: &mut Dice, arm: &Arm<N>) -> (State<N>, f64) {
+    let reach = arm.reach();
+    let state = State {
+        position: std::array::from_fn(|_| PI * dice.any()),
+        velocity: std::array::from_fn(|_| dice.any() / reach.sqrt()),
+    };
+    (state, (0.5 + 1.5 * dice.0.f64()) * reach.sqrt().min(2.0))
+}
+
+/// A planned run is within the allowed error of a motion of twice the digits.
+fn a_plan_keeps_its_error<const N: usize>(case: u64, tally: &mut Tally) {
+    let mut dice = Dice::of(case);
+    let arm = dice.arm::<N>();
+    let (start, duration) = start(&mut dice, &arm);
+    let error = arm.reach() * 1e-4 * dice.size(2.0);
+    let task = Task {
+        control: ControlLoop::free(arm),
+        start,
+        duration,
+        error,
+    };
+    let mut planning = Planning::new(task).unwrap();
+    let planned = std::iter::repeat_with(|| planning.advance()).find_map(|planned| planned);
+    let Some(Ok(planned)) = planned else {
+        tally.open += 1;
+        return;
+    };
+    for candidate in &planned.candidates {
+        let control = task.control.with_method(candidate.method);
+        let mut live = control.with_timestep(candidate.timestep).simulation(start);
+        let steps = (duration / candidate.timestep).round() as usize;
+        let every = (steps / 10).max(1);
+        let spacing = candidate.timestep * every as f64;
+        let truth = ReferenceMotion::of(&arm, &start, &Law::FREE, spacing, steps / every);
+        let tip = |state: &State<N>| -> DVec2 { forward(arm.lengths(), &state.position).position };
+        for index in 0..truth.len() {
+            live.advance(every as u64);
+            let off = tip(live.state()).distance(tip(&truth.state(index).unwrap()));
+            assert!(off <= error, "case {case}: {off:e} {task:?} {candidate:?}");
+        }
+        tally.tried += 1;
+    }
+}
+
+/// An error that a rollout answers is that to a motion of twice the digits, give or take its uncertainty; where none is
+/// answered the two are of one size.
+fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tally) {
+    let mut dice = Dice::of(case);
+    let arm = dice.arm::<N>();
+    let (start, duration) = start(&mut dice, &arm);
+    let control =
+        ControlLoop::free(arm).with_method(Method::ALL[dice.0.usize(0..Method::ALL.len())]);
+    let timestep = duration / f64::from(dice.0.u32(100..4000));
+    let plan = Plan {
+        control: control.with_timestep(timestep),
+        start,
+        duration,
+        samples: 5,
+        reference: true,
+    };
+    let mut rollout = Rollout::new(plan).unwrap();
+    while rollout.advance(u64::MAX) > 0 {}
+    let deviation = rollout.deviation().unwrap();
+    if rollout.divergence().is_some() || deviation.errors.len() < 5 {
+        tally.open += 1;
+        return;
+    }
+    let mut before = 0.0;
+    let times = &rollout.times()[1..];
+    let intervals: Vec<f64> = times
+        .iter()
+        .map(|time| time - std::mem::replace(&mut before, *time))
+        .collect();
+    let truth = ReferenceMotion::between(&arm, &start, &Law::FREE, &intervals);
+    let off = (0..truth.len()).map(|index| {
+        let position = &rollout.positions()[index + 1];
+        truth.angle_error(index, position).unwrap()
+    });
+    let off = off.fold(0.0, f64::max);
+    let told = format!("case {case}: {off:e} {plan:?} {deviation:?}");
+    match deviation.known() {
+        // The reference is off by no more than some times what two of them differ by.
+        Some(error) => {
+            assert!((error - off).abs() <= 0.5 * off + 1e-15, "{told}");
+            tally.tried += 1;
+        }
+        None => {
+            assert!(
+                off <= 50.0 * deviation.largest_uncertainty() + 1e-14,
+                "{told}"
+            );
+            tally.open += 1;
+        }
+    }
+}
+
+#[test]
+fn plans_for_random_arms_keep_their_error() {
+    tells(property!(a_plan_keeps_its_error, 30, 10_000));
+}
+
+#[test]
+fn errors_of_random_rollouts_are_the_true_ones() {
+    tells(property!(an_answered_error_is_the_true_one, 60, 20_000));
+}
