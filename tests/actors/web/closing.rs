@@ -1,4 +1,4 @@
-//! WebSockets that are closed: for an unfinished message, for what they hold, at the runtime's end.
+//! WebSocket connections that are closed: for an unfinished message, for what they hold, at the runtime's end.
 
 use super::*;
 use pendularm::actors::gateway::messages::FinishAll;

@@ -1,4 +1,4 @@
-//! WebSockets whose client reads little or nothing.
+//! WebSocket clients that read little or nothing.
 
 use super::*;
 use bytes::Bytes;
