@@ -139,11 +139,12 @@ fn serve(options: &Options) -> ExitCode {
         std::process::exit(i32::from(FAILED));
     });
     let lines = log.clone();
-    let outcome = runtime::run(options, move || {
+    let last_resort = Box::new(move || {
         lines.say("pendularm: a thread is busy and does not end in time: ending without it");
         lines.finish();
         std::process::exit(0);
     });
+    let outcome = runtime::run(options, last_resort);
     if let (Err(error), LogFormat::Json) = (&outcome, options.log_format) {
         log.say(&error.to_string());
     }

@@ -87,11 +87,12 @@ pub enum RunError {
 }
 
 /// Serves clients until SIGINT or SIGTERM. Should the end that it asks for take too long, `last_resort` is called, on
-/// another thread; it should not return.
+/// another thread; it should not return. It is boxed because a generic runtime would be compiled anew, with all of its
+/// actors, in every crate that runs one.
 ///
 /// # Errors
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
-pub fn run(options: &Options, last_resort: impl FnOnce() + Send + 'static) -> Result<(), RunError> {
+pub fn run(options: &Options, last_resort: Box<dyn FnOnce() + Send>) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
     // Answers that clients were owed are dropped here, which is part of the end.
     System::new().block_on(serve(options, &mut signals))

@@ -32,7 +32,7 @@ impl Signals {
     ///
     /// # Errors
     /// If the operating system refuses a thread or a signal handler.
-    pub(super) fn hear(last_resort: impl FnOnce() + Send + 'static) -> std::io::Result<Self> {
+    pub(super) fn hear(last_resort: Box<dyn FnOnce() + Send>) -> std::io::Result<Self> {
         let runtime = Builder::new_current_thread().enable_all().build()?;
         let (mut interrupt, mut terminate) = {
             let _entered = runtime.enter();
@@ -82,7 +82,7 @@ mod tests {
     fn who_does_not_end_in_time_is_ended_and_nobody_else() {
         for name in ["-TERM", "-INT"] {
             let (ended, end) = mpsc::channel();
-            let signals = Signals::hear(move || ended.send(()).unwrap()).unwrap();
+            let signals = Signals::hear(Box::new(move || ended.send(()).unwrap())).unwrap();
             let before = Instant::now();
             signal_this_process(name);
             assert_eq!(signals.came.blocking_recv(), Ok(()));
@@ -90,7 +90,7 @@ mod tests {
             assert!(before.elapsed() >= LAST_RESORT);
         }
         let (ended, end) = mpsc::channel::<()>();
-        let signals = Signals::hear(move || ended.send(()).unwrap()).unwrap();
+        let signals = Signals::hear(Box::new(move || ended.send(()).unwrap())).unwrap();
         signal_this_process("-TERM");
         drop(signals);
         assert!(end.recv().is_err(), "an orderly end has no last resort");
