@@ -1,4 +1,4 @@
-"""Many arms are as many single ones, to the bit, whatever shares the work."""
+"""Many arms are as many single ones, to the bit, whatever shares the work; arrays go in and out as they lie, and bad values are refused by name."""
 
 import numpy as np
 import pytest

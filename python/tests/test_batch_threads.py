@@ -1,4 +1,4 @@
-"""Many arms and many threads: calls wait for each other, an interrupt leaves nothing behind, and threads end."""
+"""Many arms and many threads: calls wait for each other or are refused whole, an interrupt leaves no effort on, and threads end."""
 
 import os
 import signal

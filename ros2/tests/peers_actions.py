@@ -15,7 +15,7 @@ def definition(fields, **inside):
 
 
 def test_a_goal_is_sent_as_an_action(peer, session):
-    """The SDK has no action client: its services and subscriptions are one. They take the hashes that the graph tells."""
+    """Its services and subscriptions are one action. They take the hashes that the graph tells."""
     import numpy
 
     place = "/ik_action/_action/"

@@ -1,4 +1,4 @@
-"""The lesson: there is always a way back, each lesson is a click, and a page that is still does little."""
+"""The lesson: there is always a way back, also in the recording; plots share one cursor; each lesson is a click, gains are offered, and a page that is still does little."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""The lesson: a blow-up is seen and left in one click, and the panels beside the arm say when one comes."""
+"""The lesson: a blow-up is seen and left in one click; limits, map and modes tell of one beforehand, and errors are measured live."""
 
 import math
 import time

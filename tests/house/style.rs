@@ -16,7 +16,7 @@ const MAX_LINES: usize = 400;
 const FOLDERS: [&str; 9] = [
     "src", "tests", "benches", "fuzz", "client", "python", "ros2", "page", "scripts",
 ];
-const LANGUAGES: [&str; 4] = ["rs", "py", "js", "sh"];
+const LANGUAGES: [&str; 5] = ["rs", "py", "js", "mjs", "sh"];
 /// Longest line, in characters.
 const MAX_WIDTH: usize = 120;
 

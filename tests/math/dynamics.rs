@@ -1,4 +1,4 @@
-//! The equation of motion against 50-digit values, on ordinary and on extreme arms. Its properties: `math_dynamics_properties.rs`.
+//! The equation of motion against 50-digit values, on ordinary and on extreme arms. Its properties: `dynamics_properties.rs`.
 
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::dynamics::{

@@ -1,6 +1,6 @@
 //! The cases that an independent check found wrong, replayed with its own numbers: arm, gains, pose, timestep.
 //!
-//! Each kind of case is tried on many others elsewhere, above all in `properties.rs`.
+//! Each kind of case is tried on many others elsewhere, above all in `properties/`.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 

@@ -1,4 +1,4 @@
-//! The limits on what one connection may register, which the README lists.
+//! The limits on what one connection may register, which docs/protocol.md lists.
 //!
 //! **Invariant:** what is over a limit is refused by name; what was registered before stays, and what is withdrawn makes
 //! room again.

@@ -230,7 +230,6 @@ where
     }
 }
 
-/// Runs `test` in a system of its own whose clock stands, except that it jumps to the next timer when all wait.
 fn of_timestep(timestep: f64) -> SetIntegrator {
     SetIntegrator {
         timestep: Some(timestep),

@@ -1,4 +1,5 @@
-//! A connection in virtual time: throttling, stalls, calls one after the other, the queue of computations.
+//! A connection in virtual time: throttling, stalls, order and writes, calls one after the other, the queue of
+//! computations.
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 

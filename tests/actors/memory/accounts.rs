@@ -22,7 +22,7 @@ async fn asked(account: &Account) -> Option<bool> {
 }
 
 #[test]
-fn the_limits_are_as_the_readme_says_and_leave_room_for_every_client() {
+fn the_limits_are_as_the_papers_say_and_leave_room_for_every_client() {
     const { assert!(MAX_HELD == 384 * MIB && MAX_MEMORY == 640 * MIB) };
     // A client that never gives way, times all that there may be.
     const { assert!(MAX_CONNECTIONS * MODEST <= MAX_HELD) };

@@ -9,7 +9,7 @@ use pendularm::actors::wire::{ROOM_TIME, SMALL_ANSWER};
 
 const STEP: &str = "/arm_sim/integration_step";
 
-/// A gateway with real computations, on real threads: so this test is in real time.
+/// A gateway with real computations, on real threads: so these tests are in real time.
 async fn computing(limit: usize, workers: &WorkerPool) -> Gateway {
     let mut nodes = Nodes::default();
     Integration::attach(&Integration::new(workers.clone()).start(), &mut nodes);

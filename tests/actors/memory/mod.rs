@@ -1,5 +1,5 @@
-//! Memory that all clients together may hold, in virtual time: who gives way when it is too much, and that nobody else
-//! does.
+//! Memory that all clients together may hold: who gives way when it is too much, and that nobody else does. In virtual
+//! time, but for `computations.rs`.
 //!
 //! **Invariant:** a client that asks for little and reads what it gets is served whatever the others do.
 

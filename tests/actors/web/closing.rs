@@ -1,8 +1,11 @@
-//! WebSocket connections that are closed: for an unfinished message, for what they hold, at the runtime's end.
+//! WebSocket connections that are closed: by the peer, for an unfinished message, for what they hold, at the runtime's
+//! end.
 
 use super::*;
+use crate::virtual_time::Held;
 use pendularm::actors::gateway::messages::FinishAll;
 use pendularm_client::Error;
+use tokio::time::timeout;
 
 /// The head of a masked frame with the mask 0: so its payload goes as it is.
 fn frame_head(opcode: u8, length: usize) -> Vec<u8> {
@@ -181,5 +184,35 @@ fn a_client_that_does_not_answer_the_close_frame_is_waited_for_no_longer_than_fi
         sleep(Duration::from_secs(2)).await;
         assert_eq!(gateway.gauges.connections(), 0);
         drop(socket);
+    });
+}
+
+/// With its queue full no frame of it is performed, but its close is seen all the same.
+#[test]
+fn a_peer_that_closes_while_its_queue_is_full_is_gone_at_once() {
+    in_virtual_time(async {
+        let held = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&held).attach(&mut nodes, &[Service::IntegrationStep], &[]);
+        let gateway = Gateway::with(nodes).await;
+        let mut socket = open(&gateway, WIDE).await;
+        let service = Service::IntegrationStep.name();
+        for n in 0..30 {
+            let call = json!({"op": "call_service", "service": service, "id": n});
+            send(&mut socket, call).await;
+        }
+        settle().await;
+        // It is alive all the while.
+        let quiet = timeout(2 * (PING_INTERVAL + PONG_TIME), receive(&mut socket)).await;
+        assert!(quiet.is_err());
+        assert_eq!(gateway.gauges.connections(), 1);
+        let began = Instant::now();
+        socket.close(1000, "").await;
+        while socket.next_event().await.is_ok() {}
+        settle().await;
+        assert_elapsed(began, Duration::from_millis(10));
+        assert_eq!(gateway.gauges.connections(), 0);
+        assert!(held.take().is_gone(), "it need not go on");
+        assert_eq!(held.count(), 0, "the next one is not begun");
     });
 }

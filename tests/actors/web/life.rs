@@ -84,33 +84,3 @@ fn while_the_client_is_not_read_it_need_not_show_life() {
         assert_eq!(gateway.gauges.connections(), 1);
     });
 }
-
-/// With its queue full no frame of it is performed, but its close is seen all the same.
-#[test]
-fn a_peer_that_closes_while_its_queue_is_full_is_gone_at_once() {
-    in_virtual_time(async {
-        let held = Held::default();
-        let mut nodes = Nodes::default();
-        Node::holding(&held).attach(&mut nodes, &[Service::IntegrationStep], &[]);
-        let gateway = Gateway::with(nodes).await;
-        let mut socket = open(&gateway, WIDE).await;
-        let service = Service::IntegrationStep.name();
-        for n in 0..30 {
-            let call = json!({"op": "call_service", "service": service, "id": n});
-            send(&mut socket, call).await;
-        }
-        settle().await;
-        // It is alive all the while.
-        let quiet = timeout(2 * (PING_INTERVAL + PONG_TIME), receive(&mut socket)).await;
-        assert!(quiet.is_err());
-        assert_eq!(gateway.gauges.connections(), 1);
-        let began = Instant::now();
-        socket.close(1000, "").await;
-        while socket.next_event().await.is_ok() {}
-        settle().await;
-        assert_elapsed(began, Duration::from_millis(10));
-        assert_eq!(gateway.gauges.connections(), 0);
-        assert!(held.take().is_gone(), "it need not go on");
-        assert_eq!(held.count(), 0, "the next one is not begun");
-    });
-}

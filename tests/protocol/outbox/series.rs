@@ -1,4 +1,4 @@
-//! Series of messages in an outbox.
+//! Series of messages in an outbox: how they are taken, dropped, counted and throttled.
 //!
 //! **Invariant:** a series is one frame to whoever takes several, and messages one by one to whoever takes one.
 
@@ -6,7 +6,12 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use bytes::Bytes;
-use pendularm::protocol::outbox::Outbox;
+use pendularm::protocol::outbox::{MAX_TOPIC_BYTES, Outbox};
+
+/// A frame that publishes `msg` on `topic`.
+fn line(topic: &str, msg: &str) -> String {
+    format!("{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}\n")
+}
 
 fn topic() -> Arc<str> {
     Arc::from("/a")
@@ -47,4 +52,110 @@ fn a_series_is_taken_as_one_frame_where_several_are_asked_for() {
     assert_eq!(take(&mut outbox, 2), [SERIES]);
     let mut outbox = with(&[SERIES]);
     assert_eq!(take(&mut outbox, 1), [&SERIES[..SERIES.len() / 2]]);
+}
+
+#[test]
+fn a_full_outbox_drops_the_oldest_messages_of_a_series_and_keeps_the_rest() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let mut outbox = Outbox::new();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n:06}}}"));
+    let series: String = (0..3).map(numbered).collect();
+    outbox.push(&topic, Bytes::from(series), now);
+    let rest = numbered(0).len() + 1;
+    outbox.push(&topic, Bytes::from(vec![b' '; MAX_TOPIC_BYTES - rest]), now);
+    assert_eq!(outbox.dropped(), 2);
+    let mut batch = Vec::new();
+    outbox.take_frames(now, 9, usize::MAX, &mut batch);
+    assert_eq!(batch[0], numbered(2));
+    assert_eq!((batch.len(), outbox.topic_bytes()), (2, 0));
+}
+
+/// As many go, and are counted, as would have gone message by message.
+#[test]
+fn a_full_outbox_counts_what_it_drops_of_a_long_series() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n:06}}}"));
+    let length = numbered(0).len();
+    for kept in [
+        0,
+        1,
+        length - 1,
+        length,
+        length + 1,
+        500 * length,
+        999 * length,
+    ] {
+        let mut outbox = Outbox::new();
+        let series: String = (0..1000).map(numbered).collect();
+        outbox.push(&topic, Bytes::from(series), now);
+        outbox.push(&topic, Bytes::from(vec![b' '; MAX_TOPIC_BYTES - kept]), now);
+        let left = kept / length;
+        assert_eq!(outbox.dropped(), 1000 - left as u64, "{kept}");
+        let mut batch = Vec::new();
+        outbox.take_frames(now, 1, usize::MAX, &mut batch);
+        assert_eq!(left > 0, batch[0] == numbered(1000 - left), "{kept}");
+    }
+}
+
+#[test]
+fn a_throttled_topic_keeps_as_many_of_a_series_as_its_queue_is_long() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
+    for length in [1, 2, 8, 9, 10, 50] {
+        let mut outbox = Outbox::new();
+        outbox.set_throttle(&topic, Some((Duration::from_millis(10), length)));
+        for series in [0..10, 10..20] {
+            let series: String = series.map(numbered).collect();
+            outbox.push(&topic, Bytes::from(series), now);
+        }
+        let mut batch = Vec::new();
+        for n in 0..30 {
+            let later = now + n * Duration::from_millis(10);
+            outbox.take_frames(later, 1, usize::MAX, &mut batch);
+        }
+        let first = 20 - length.min(19);
+        let wanted: Vec<String> = [0].into_iter().chain(first..20).map(numbered).collect();
+        assert_eq!(batch, wanted, "{length}");
+    }
+}
+
+#[test]
+fn a_throttled_topic_gets_each_message_of_a_series_by_itself() {
+    let now = Instant::now();
+    let topic: Arc<str> = "/x".into();
+    let mut outbox = Outbox::new();
+    outbox.set_throttle(&topic, Some((Duration::from_millis(10), 1)));
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
+    outbox.push(
+        &topic,
+        Bytes::from((0..5).map(numbered).collect::<String>()),
+        now,
+    );
+    let mut batch = Vec::new();
+    outbox.take_frames(now, 9, usize::MAX, &mut batch);
+    outbox.take_frames(now + Duration::from_millis(10), 9, usize::MAX, &mut batch);
+    assert_eq!(
+        batch,
+        [numbered(0), numbered(4)],
+        "the first, and the newest later"
+    );
+    assert_eq!((outbox.dropped(), outbox.topic_bytes()), (0, 0));
+}
+
+#[test]
+fn one_frame_of_a_series_is_taken_where_one_is_asked_for() {
+    let now = Instant::now();
+    let mut outbox = Outbox::new();
+    let numbered = |n: usize| line("/x", &format!("{{\"n\":{n}}}"));
+    let series = Bytes::from((0..3).map(numbered).collect::<String>());
+    outbox.push(&"/x".into(), series, now);
+    for n in 0..3 {
+        let mut batch = Vec::new();
+        outbox.take_frames(now, 1, usize::MAX, &mut batch);
+        assert_eq!(batch, [numbered(n)]);
+    }
+    assert!(outbox.is_empty());
 }

@@ -1,4 +1,4 @@
-//! The page and its files: their types, their policy, how long they may be kept, and where they are.
+//! The page and its files: their types, their packing, their policy, how long they may be kept, and where they are.
 
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! Arguments that do not exist, lack their value or come twice, and those that are no text.
+//! Arguments that do not exist, lack their value or come twice, those that are no text, and any at all.
 
 use std::ffi::OsString;
 

@@ -1,7 +1,6 @@
 //! The command line and the environment: what is taken, what is refused, and in which words.
 //!
-//! **Invariant:** the tests of the values hand arguments and variables in; only those in `program.rs` start the program
-//! itself.
+//! **Invariant:** arguments and variables are passed in; only the tests in `program.rs` start the program itself.
 
 mod arguments;
 mod commands;

@@ -1,4 +1,5 @@
-//! Closes: for a message that is too long or no message, as the client's wish, and at the runtime's end.
+//! Closes: for messages that are too long, for frames against the protocol, at the client's wish, at the runtime's end;
+//! and a client that goes without one.
 
 use crate::common::{PATIENCE, Runtime};
 use crate::web_client::Socket;
