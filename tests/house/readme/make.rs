@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-use super::codes;
+use super::{codes, printed};
 use crate::papers::{table, text};
 
 #[test]
@@ -38,20 +38,14 @@ fn the_papers_list_the_targets_that_make_help_lists() {
 #[test]
 fn make_alone_shows_the_help() {
     let make = |arguments: &[&str]| {
-        let output = Command::new("make")
-            .args(arguments)
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            // Under `make test` the outer make hands its own flags down.
-            .env_remove("MAKEFLAGS")
-            .env_remove("MAKELEVEL")
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        String::from_utf8(output.stdout).unwrap()
+        // Under `make test` the outer make hands its own flags down.
+        let mut command = Command::new("make");
+        printed(
+            command
+                .args(arguments)
+                .env_remove("MAKEFLAGS")
+                .env_remove("MAKELEVEL"),
+        )
     };
     let help = make(&[]);
     assert_eq!(help, make(&["help"]));

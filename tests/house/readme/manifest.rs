@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::process::Command;
 
-use super::codes;
+use super::{codes, printed};
 use crate::papers::{table, text};
 
 /// The lines of a manifest, each with the section that it stands in.
@@ -65,27 +65,17 @@ fn the_fuzz_targets_are_built_as_the_tests_are() {
 /// `rust-version` is a promise to whoever has an older compiler than ours: no package may break it.
 #[test]
 fn no_dependency_asks_for_a_newer_compiler_than_we_do() {
-    let run = |command: &mut Command| {
-        let output = command
-            .current_dir(env!("CARGO_MANIFEST_DIR"))
-            .output()
-            .unwrap();
-        assert!(
-            output.status.success(),
-            "{}",
-            String::from_utf8_lossy(&output.stderr)
-        );
-        String::from_utf8(output.stdout).unwrap()
-    };
     // Only packages for this platform are sure to be at hand after a build.
-    let compiler = run(Command::new("rustc").arg("-vV"));
+    let compiler = printed(Command::new("rustc").arg("-vV"));
     let host = compiler
         .lines()
         .find_map(|line| line.strip_prefix("host: "))
         .unwrap();
-    let metadata = run(Command::new(env!("CARGO"))
-        .args(["metadata", "--locked", "--offline", "--format-version", "1"])
-        .args(["--filter-platform", host]));
+    let metadata = printed(
+        Command::new(env!("CARGO"))
+            .args(["metadata", "--locked", "--offline", "--format-version", "1"])
+            .args(["--filter-platform", host]),
+    );
     let metadata: serde_json::Value = serde_json::from_str(&metadata).unwrap();
     let version = |text: &str| -> Vec<u32> {
         text.split('.')

@@ -19,6 +19,20 @@ fn codes(cell: &str) -> Vec<&str> {
     cell.split('`').skip(1).step_by(2).collect()
 }
 
+/// The standard output of a command that is started in the project's folder and succeeds.
+fn printed(command: &mut Command) -> String {
+    let output = command
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .unwrap();
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    String::from_utf8(output.stdout).unwrap()
+}
+
 #[test]
 fn the_readme_is_read_in_one_sitting() {
     let length = text("README.md").len();
@@ -27,11 +41,7 @@ fn the_readme_is_read_in_one_sitting() {
 
 #[test]
 fn every_option_of_the_help_is_in_the_readme_with_its_variable() {
-    let help = Command::new(env!("CARGO_BIN_EXE_pendularm"))
-        .arg("--help")
-        .output()
-        .unwrap();
-    let help = String::from_utf8(help.stdout).unwrap();
+    let help = printed(Command::new(env!("CARGO_BIN_EXE_pendularm")).arg("--help"));
     let rows = table(&text("README.md"), "option");
     for row in &rows {
         let (option, variable) = (codes(&row[0])[0], codes(&row[1])[0]);
