@@ -21,7 +21,6 @@ mod admission;
 mod arm_sim;
 mod arm_turns;
 mod connection;
-mod connection_end;
 mod encodings;
 mod endings;
 mod ik;

@@ -28,10 +28,6 @@ mod clock_diagnostics;
 mod closing;
 #[cfg(feature = "cli")]
 mod command;
-#[cfg(feature = "cli")]
-mod command_end;
-#[cfg(feature = "cli")]
-mod command_hostile;
 #[path = "../support/common.rs"]
 mod common;
 mod divergence;

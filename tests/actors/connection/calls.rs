@@ -2,13 +2,6 @@
 
 use super::*;
 use pendularm::actors::gateway::limits::{MAX_COMPUTATIONS_WAITING, MAX_RESPONSES_WAITING};
-use serde_json::Value;
-
-const STEP: &str = Service::IntegrationStep.name();
-
-fn id(frame: &Value) -> u64 {
-    frame["id"].as_u64().expect("an id")
-}
 
 #[test]
 fn the_next_frame_is_taken_only_when_the_last_call_has_ended() {

@@ -1,9 +1,10 @@
 //! A connection in virtual time: throttling, stalls, order and writes, calls one after the other, the queue of
-//! computations.
+//! computations, and how it ends.
 //!
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
 mod calls;
+mod ending;
 mod stalls;
 mod throttling;
 mod writes;
@@ -16,10 +17,11 @@ use pendularm::actors::gateway::messages::Publish;
 use pendularm::actors::gateway::registry::Nodes;
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::messages;
-use serde_json::json;
+use serde_json::{Value, json};
 use tokio::time::sleep;
 
 const PARAMS: &str = Service::SetParams.name();
+const STEP: &str = Service::IntegrationStep.name();
 
 /// A gateway whose computations and whose parameters wait for the test to answer.
 async fn held_back() -> (Gateway, Held, Held) {
@@ -28,4 +30,8 @@ async fn held_back() -> (Gateway, Held, Held) {
     Node::holding(&computations).attach(&mut nodes, &[Service::IntegrationStep], &[]);
     Node::holding(&calls).attach(&mut nodes, &[Service::SetParams], &[]);
     (Gateway::with(nodes).await, computations, calls)
+}
+
+fn id(frame: &Value) -> u64 {
+    frame["id"].as_u64().expect("an id")
 }

@@ -1,8 +1,10 @@
-//! The commands that ask a running one: what each prints, in YAML and in JSON, and what it says where the runtime
-//! refuses.
+//! The commands that ask a running one: what each prints, in YAML and in JSON, what it says where the runtime refuses,
+//! and how it ends where there is nobody to ask or where a server means harm.
 
 mod calls;
 mod diagnostics;
+mod ending;
+mod hostile;
 mod lists;
 mod parameters;
 mod topics;

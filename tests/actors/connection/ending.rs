@@ -3,37 +3,20 @@
 //! **Invariant:** no test depends on how fast the machine is; times are read from the paused clock.
 
 use std::sync::Arc;
-use std::time::Duration;
 
-use crate::system::in_virtual_time;
-use crate::virtual_time::{Gateway, Held, Node, WIDE, assert_elapsed, settle};
+use super::*;
+use crate::virtual_time::assert_elapsed;
 use actix::prelude::*;
 use pendularm::actors::gateway::limits::{LINGER, RESPONSES_TIME, STALL_LIMIT};
 use pendularm::actors::gateway::messages::{FinishAll, RefuseCalls};
-use pendularm::actors::gateway::registry::{Attach, Nodes, Registry};
+use pendularm::actors::gateway::registry::{Attach, Registry};
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::protocol::catalog::Service;
-use serde_json::{Value, json};
-use tokio::time::{Instant, sleep};
-
-const STEP: &str = Service::IntegrationStep.name();
-
-/// A gateway whose computations wait for the test to answer.
-async fn held_back() -> (Gateway, Held) {
-    let computations = Held::default();
-    let mut nodes = Nodes::default();
-    Node::holding(&computations).attach(&mut nodes, &[Service::IntegrationStep], &[]);
-    (Gateway::with(nodes).await, computations)
-}
-
-fn id(frame: &Value) -> u64 {
-    frame["id"].as_u64().expect("an id")
-}
+use tokio::time::Instant;
 
 #[test]
 fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
     in_virtual_time(async {
-        let (gateway, computations) = held_back().await;
+        let (gateway, computations, _) = held_back().await;
         let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
         for n in 0..3 {
@@ -59,7 +42,7 @@ fn a_half_closed_client_is_owed_its_computations_and_its_calls() {
 #[test]
 fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
     in_virtual_time(async {
-        let (gateway, computations) = held_back().await;
+        let (gateway, computations, _) = held_back().await;
         let (mut client, mut provider) = (gateway.connect(WIDE), gateway.connect(WIDE));
         provider.provide("/s").await;
         client.call(STEP, 1).await;
@@ -83,7 +66,7 @@ fn a_half_closed_client_is_not_kept_for_ever_by_a_call_or_a_computation() {
 #[test]
 fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
     in_virtual_time(async {
-        let (gateway, computations) = held_back().await;
+        let (gateway, computations, _) = held_back().await;
         let mut client = gateway.connect(WIDE);
         for n in 0..30 {
             client.call(STEP, n).await;
@@ -114,7 +97,7 @@ fn a_client_that_ends_while_its_queue_is_full_is_not_kept() {
 #[test]
 fn a_client_whose_queue_is_full_is_read_a_little_further_and_all_of_it_is_performed() {
     in_virtual_time(async {
-        let (gateway, computations) = held_back().await;
+        let (gateway, computations, _) = held_back().await;
         let mut client = gateway.connect(WIDE);
         let calls: u64 = 3000;
         for n in 0..calls {
@@ -166,7 +149,7 @@ fn a_half_closed_client_that_reads_nothing_is_let_go() {
 #[test]
 fn at_the_end_of_the_runtime_every_waiting_computation_is_refused_before_the_stream_ends() {
     in_virtual_time(async {
-        let (gateway, computations) = held_back().await;
+        let (gateway, computations, _) = held_back().await;
         let mut client = gateway.connect(WIDE);
         for n in 0..17 {
             client.call(STEP, n).await;
