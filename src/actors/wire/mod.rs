@@ -14,6 +14,6 @@ mod routes;
 mod served;
 
 pub use self::caller::{Address, Caller, ROOM_TIME, SMALL_ANSWER, ServiceCall, TopicMessage};
-pub(in crate::actors) use self::routes::LONG_ARGUMENTS;
+pub(in crate::actors) use self::routes::read_arguments;
 pub use self::routes::{Nodes, Route};
 pub use self::served::{Answered, Callable, Streamed};

@@ -15,7 +15,7 @@ use crate::actors::resources::aside::{Errand, aside};
 use crate::protocol::catalog::{Action, Service, Topic};
 
 /// Arguments longer than this are read aside: some tenth of a millisecond. Only computations take such.
-pub(in crate::actors) const LONG_ARGUMENTS: usize = 16 * 1024;
+const LONG_ARGUMENTS: usize = 16 * 1024;
 
 /// Hands what has come to the node that is meant.
 pub type Route<T> = Box<dyn Fn(T) + Send>;
@@ -71,12 +71,19 @@ impl Nodes {
                     Err(rejections) => caller.refuse(&rejections.status()),
                 }
             };
-            if length > LONG_ARGUMENTS {
-                actix_rt::spawn(aside(Errand::reading(length), read));
-            } else {
-                read();
-            }
+            read_arguments(length, read);
         };
         self.services.insert(service, Box::new(take));
+    }
+}
+
+/// Has arguments of so many bytes read: long ones on another thread, and what their client sends behind them waits.
+pub(in crate::actors) fn read_arguments(length: usize, read: impl FnOnce() + Send + 'static) {
+    if length > LONG_ARGUMENTS {
+        // Boxed, for every kind of task is compiled anew: there is one then, not one for each service.
+        let read: Box<dyn FnOnce() + Send> = Box::new(read);
+        actix_rt::spawn(aside(Errand::reading(length), read));
+    } else {
+        read();
     }
 }

@@ -7,9 +7,8 @@ use actix::prelude::*;
 use super::{FollowPath, PathFollower, StopFollowing};
 use crate::actors::arm::sim::joint_names;
 use crate::actors::node::Done;
-use crate::actors::resources::aside::{Errand, aside};
 use crate::actors::wire::action_client::{ActionClient, ActionRequest};
-use crate::actors::wire::{LONG_ARGUMENTS, Nodes, Route};
+use crate::actors::wire::{Nodes, Route, read_arguments};
 use crate::math::trajectory::{Tolerance, Waypoint};
 use crate::protocol::catalog::Action;
 use crate::protocol::op::follow::{FollowGoal, JointTolerance};
@@ -45,11 +44,7 @@ fn requests<const N: usize>(
                 Ok(goal) => follow.do_send(path(&goal, client, done)),
                 Err(rejections) => client.refuse(&rejections.status()),
             };
-            if length > LONG_ARGUMENTS {
-                actix_rt::spawn(aside(Errand::reading(length), read));
-            } else {
-                read();
-            }
+            read_arguments(length, read);
         }
         ActionRequest::Cancel { from, done } => stop.do_send(StopFollowing { from, done }),
     })
