@@ -9,6 +9,7 @@ use std::task::Poll;
 
 use futures_util::{SinkExt, StreamExt};
 use tokio::io::{AsyncRead, AsyncWrite};
+use tokio::task::yield_now;
 use tokio::time::Instant;
 use tokio_tungstenite::WebSocketStream;
 use tokio_tungstenite::tungstenite::Message;
@@ -69,21 +70,25 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
         })
     }
 
-    /// The next message; `None` once the connection is closed. A long one is received in turns: with its last byte,
-    /// whichever that is, the library unmasks and checks all of it.
+    /// The next message; `None` once the connection is closed. All is received in turns. Those of a long one are
+    /// shared with other readers: with its last byte, whichever that is, the library unmasks and checks all of it.
     pub(super) async fn next(&self) -> Option<Result<Message, Error>> {
         loop {
-            let received = poll_fn(|cx| {
-                let mut socket = self.socket.borrow_mut();
-                socket.get_mut().begin_turn();
-                Poll::Ready(socket.poll_next_unpin(cx))
-            });
+            let received = poll_fn(|cx| Poll::Ready(self.socket.borrow_mut().poll_next_unpin(cx)));
             if let Poll::Ready(message) = received.await {
                 return message;
             }
-            let mut next = Poll::Pending;
-            poll_fn(|_| std::mem::replace(&mut next, Poll::Ready(()))).await;
-            let long = self.socket.borrow().get_ref().long();
+            let (is_turn_over, long) = {
+                let mut socket = self.socket.borrow_mut();
+                (socket.get_mut().begin_turn(), socket.get_ref().long())
+            };
+            if !is_turn_over {
+                let mut next = Poll::Pending;
+                poll_fn(|_| std::mem::replace(&mut next, Poll::Ready(()))).await;
+            } else if long.is_none() {
+                // Other sockets are looked at too before this one goes on.
+                yield_now().await;
+            }
             if let Some(bytes) = long {
                 turns::read_bytes(bytes).await;
             }

@@ -48,7 +48,7 @@ pub(super) struct Watched<S> {
     is_complete: bool,
     /// Bytes that wait to be written, and their buffer, which may be twice as long.
     unsent: Share,
-    /// Bytes that may still be read before others have a turn.
+    /// Bytes that may still be read before others have a turn, however many messages they are.
     turn: usize,
 }
 
@@ -88,9 +88,11 @@ impl<S> Watched<S> {
         }
     }
 
-    /// Reading has another turn.
-    pub(super) const fn begin_turn(&mut self) {
+    /// Begins another turn of reading; whether one was over, and nobody has been asked to wake who reads.
+    pub(super) const fn begin_turn(&mut self) -> bool {
+        let is_over = self.turn == 0;
         self.turn = TURN;
+        is_over
     }
 
     /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
@@ -143,7 +145,6 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         if self.turn == 0 {
-            cx.waker().wake_by_ref();
             return Poll::Pending;
         }
         let before = buffer.filled().len();
