@@ -54,6 +54,9 @@ pub(super) struct Watched<S> {
 
 /// Bytes of a control frame beside its payload: two, and the mask's four.
 const CONTROL_HEAD: usize = 6;
+/// Bytes of a turn that a control frame counts as, beside its own: a ping is answered with a write of its own, which
+/// takes longer than reading these.
+const CONTROL_COST: usize = 1024;
 
 impl<S> Watched<S> {
     /// A stream on which nothing has come yet; `life` is when its other side last gave a sign of life.
@@ -118,6 +121,7 @@ impl<S> Watched<S> {
 
     /// A control frame with so much payload has come: it may stand between the parts of a message.
     pub(super) fn control(&mut self, payload: usize) {
+        self.turn = self.turn.saturating_sub(CONTROL_COST);
         self.settle(self.pending.saturating_sub(CONTROL_HEAD + payload));
     }
 
