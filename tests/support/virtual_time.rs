@@ -199,6 +199,14 @@ impl Node {
         }
     }
 
+    /// A node that answers its calls at once, with nothing.
+    pub fn answering() -> Self {
+        Self {
+            on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
+            ..Self::default()
+        }
+    }
+
     /// Starts it as the one that serves `services`, takes and publishes `topics`.
     pub fn attach(self, nodes: &mut Nodes, services: &[Service], topics: &[Topic]) {
         let address = self.start();

@@ -10,11 +10,7 @@ const PAUSE: &str = "/arm_sim/pause";
 /// A gateway whose `/arm_sim/pause` is answered at once.
 async fn gateway(memory: Memory) -> Gateway {
     let mut nodes = Nodes::default();
-    let answering = Node {
-        on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
-        ..Node::default()
-    };
-    answering.attach(&mut nodes, &[Service::Pause], &[]);
+    Node::answering().attach(&mut nodes, &[Service::Pause], &[]);
     Gateway::within(memory, nodes).await
 }
 

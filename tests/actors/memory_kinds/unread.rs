@@ -11,11 +11,7 @@ const PAUSE: &str = "/arm_sim/pause";
 
 fn answering() -> Nodes {
     let mut nodes = Nodes::default();
-    let node = Node {
-        on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
-        ..Node::default()
-    };
-    node.attach(&mut nodes, &[Service::Pause], &[]);
+    Node::answering().attach(&mut nodes, &[Service::Pause], &[]);
     nodes
 }
 

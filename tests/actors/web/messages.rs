@@ -5,6 +5,32 @@ use std::rc::Rc;
 
 use super::*;
 
+const PAUSE: &str = Service::Pause.name();
+/// Bytes that are read at most before others have a turn.
+const TURN: usize = 64 * 1024;
+
+/// How many turns others have while `doing` is done, and what came of it.
+async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
+    let turns = Rc::new(Cell::new(0));
+    let counted = Rc::clone(&turns);
+    let others = actix_rt::spawn(async move {
+        loop {
+            counted.set(counted.get() + 1);
+            tokio::task::yield_now().await;
+        }
+    });
+    let done = doing.await;
+    others.abort();
+    (turns.get(), done)
+}
+
+/// A gateway whose `/arm_sim/pause` answers at once.
+async fn pausing_gateway() -> Gateway {
+    let mut nodes = Nodes::default();
+    Node::answering().attach(&mut nodes, &[Service::Pause], &[]);
+    Gateway::with(nodes).await
+}
+
 /// The buffer that a long message is read into stays with the connection, so it stays charged.
 #[test]
 fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
@@ -27,42 +53,13 @@ fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
     });
 }
 
-/// Bytes that are read at most before others have a turn.
-const TURN: usize = 64 * 1024;
-
-/// How many turns others have while `doing` is done, and what came of it.
-async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
-    let turns = Rc::new(Cell::new(0));
-    let counted = Rc::clone(&turns);
-    let others = actix_rt::spawn(async move {
-        loop {
-            counted.set(counted.get() + 1);
-            tokio::task::yield_now().await;
-        }
-    });
-    let done = doing.await;
-    others.abort();
-    (turns.get(), done)
-}
-
-/// A gateway whose `/arm_sim/pause` answers at once.
-async fn pausing_gateway() -> Gateway {
-    let mut nodes = Nodes::default();
-    let node = Node {
-        on_call: Box::new(|mut call| call.caller.succeed(&json!({}))),
-        ..Node::default()
-    };
-    node.attach(&mut nodes, &[Service::Pause], &[]);
-    Gateway::with(nodes).await
-}
-
 /// It has come up to its last byte, so that only what is done with a whole message is counted, not its coming.
 #[test]
 fn a_long_message_is_looked_at_in_turns() {
     const LONG: usize = 4 << 20;
     in_virtual_time(async {
         let gateway = pausing_gateway().await;
-        let light = json!({"op": "call_service", "service": "/arm_sim/pause", "id": 1});
+        let light = json!({"op": "call_service", "service": PAUSE, "id": 1});
         let call = light.to_string();
         let lines = "\n".repeat(LONG - call.len());
         let numbers = "1,\n".repeat(LONG / 3 - 3);
@@ -113,16 +110,10 @@ fn what_is_no_message_is_read_in_turns() {
             }
             let (turns, answer) = turns_of_others(async {
                 socket.stream().write_all(&bytes).await.unwrap();
-                let call = json!({"op": "call_service", "service": "/arm_sim/pause", "id": 1});
-                send(&mut socket, call).await;
-                loop {
-                    if let Event::Text(text) = socket.next_event().await.expect("a message") {
-                        return text;
-                    }
-                }
+                socket.call(PAUSE, json!({})).await
             })
             .await;
-            assert!(answer.contains(r#""result":true"#), "{answer}");
+            assert_eq!(answer["result"], true, "{answer}");
             assert!(turns >= frames / most, "{kind}: {turns} turns");
         }
     });

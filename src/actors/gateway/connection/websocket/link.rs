@@ -85,12 +85,12 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
             if !is_turn_over {
                 let mut next = Poll::Pending;
                 poll_fn(|_| std::mem::replace(&mut next, Poll::Ready(()))).await;
-            } else if long.is_none() {
-                // Other sockets are looked at too before this one goes on.
-                yield_now().await;
             }
-            if let Some(bytes) = long {
-                turns::read_bytes(bytes).await;
+            match long {
+                Some(bytes) => turns::read_bytes(bytes).await,
+                // Other sockets are looked at too before this one goes on.
+                None if is_turn_over => yield_now().await,
+                None => {}
             }
         }
     }

@@ -91,7 +91,7 @@ impl<S> Watched<S> {
         }
     }
 
-    /// Begins another turn of reading; whether one was over, and nobody has been asked to wake who reads.
+    /// Begins another turn of reading. True if one was over: then whoever reads goes on without being woken.
     pub(super) const fn begin_turn(&mut self) -> bool {
         let is_over = self.turn == 0;
         self.turn = TURN;
@@ -148,6 +148,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
         cx: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
+        // Nobody is woken for it: who reads begins the next turn.
         if self.turn == 0 {
             return Poll::Pending;
         }
