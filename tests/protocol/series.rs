@@ -6,7 +6,7 @@ use pendularm::protocol::limits::MAX_NAME;
 use pendularm::protocol::messages;
 use pendularm::protocol::op::{self, Op};
 use pendularm::protocol::wire::frame::FrameReader;
-use pendularm::protocol::wire::series::{MAX_SERIES, Series};
+use pendularm::protocol::wire::series::{MAX_SERIES, Series, first_message};
 use proptest::prelude::*;
 
 fn line(topic: &str, msg: &str) -> String {
@@ -149,6 +149,15 @@ fn a_series_ends_where_something_else_comes_and_the_stream_goes_on_there() {
     assert_eq!(reader.series(), None);
     assert_eq!(reader.next().unwrap().unwrap().text, x.trim_end());
     assert_eq!(reader.series().unwrap().frames, x);
+}
+
+/// Its end is not looked for, which would take the gateway milliseconds for each of its subscribers.
+#[test]
+fn what_is_longer_than_a_series_is_one_message() {
+    let with_newline = line("/x", &format!("\"\n{}\"", "x".repeat(MAX_SERIES)));
+    assert_eq!(first_message(with_newline.as_bytes()), with_newline.len());
+    let series = line("/x", "{}").repeat(2);
+    assert_eq!(first_message(series.as_bytes()), series.len() / 2);
 }
 
 #[test]

@@ -103,10 +103,9 @@ impl Outbox {
         self.keep_bounded();
     }
 
-    /// Whether there is room for it once all else has gone; if not, it counts as dropped. The newest messages of a
-    /// series that is too long may still fit.
+    /// Whether there is room for it once all else has gone; if not, it counts as dropped.
     fn may_fit(&mut self, frame: &Bytes) -> bool {
-        let fits = frame.len() <= MAX_TOPIC_BYTES || first_message(frame) < frame.len();
+        let fits = frame.len() <= MAX_TOPIC_BYTES;
         self.dropped += u64::from(!fits);
         fits
     }

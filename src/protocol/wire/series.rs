@@ -63,8 +63,8 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
     (length > 0).then_some((topic, length))
 }
 
-/// How long the first message of frames for one client is: of a series one line, of anything else (fragments, binary)
-/// all of it.
+/// How long the first message of frames for one client is: of a series one line, of anything else (what is longer than a
+/// series, fragments, binary) all of it. That takes no longer for a message of megabytes.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
     first_messages(frames, 0).0
@@ -74,7 +74,7 @@ pub fn first_message(frames: &[u8]) -> usize {
 /// and how many. One at least.
 #[must_use]
 pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
-    if !frames.starts_with(HEAD) {
+    if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
         return (frames.len(), 1);
     }
     let from = bytes.saturating_sub(1).min(frames.len());
