@@ -33,6 +33,7 @@ use crate::actors::gateway::messages::{FinishAll, RefuseCalls};
 use crate::actors::gateway::registry::{Attach, Registry};
 use crate::actors::node::ShutDown;
 use crate::actors::resources::gauges::Gauges;
+use crate::actors::resources::priority::give_way;
 use crate::actors::ros::parameters::Parameters;
 use crate::actors::ros::rosapi::{ArmParameters, RosapiNode};
 use crate::actors::ros::rosout::Rosout;
@@ -94,8 +95,13 @@ pub enum RunError {
 /// If the port can't be bound, or the operating system refuses a thread or a signal handler.
 pub fn run(options: &Options, last_resort: Box<dyn FnOnce() + Send>) -> Result<(), RunError> {
     let mut signals = Signals::hear(last_resort)?;
+    // The threads that it starts are those for long work of the gateway.
+    let tokio = Builder::new_current_thread()
+        .enable_all()
+        .on_thread_start(give_way)
+        .build()?;
     // Answers that clients were owed are dropped here, which is part of the end.
-    System::new().block_on(serve(options, &mut signals))
+    System::with_tokio_rt(move || tokio).block_on(serve(options, &mut signals))
 }
 
 async fn serve(options: &Options, signals: &mut Signals) -> Result<(), RunError> {

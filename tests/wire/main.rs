@@ -64,6 +64,8 @@ mod order;
 mod parameters;
 mod pause_reset;
 mod pid;
+#[cfg(target_os = "linux")]
+mod priority;
 mod readme;
 #[cfg(feature = "record")]
 mod record;

@@ -7,4 +7,5 @@ pub mod aside;
 pub mod awake;
 pub mod budget;
 pub mod gauges;
+pub mod priority;
 pub mod work_clock;

@@ -23,6 +23,7 @@ use self::queue::{Job, PoolState};
 pub use self::turns::{Owner, RUNTIME};
 use crate::actors::gateway::limits::MAX_CONNECTIONS;
 use crate::actors::resources::budget::free_elsewhere;
+use crate::actors::resources::priority::give_way;
 
 /// Computations that may be here at once, waiting or running: one of each connection.
 pub const MAX_ADMITTED: usize = MAX_CONNECTIONS;
@@ -47,7 +48,10 @@ impl WorkerPool {
             let shared = Arc::clone(&pool.shared);
             thread::Builder::new()
                 .name(format!("worker-{number}"))
-                .spawn(move || shared.work())?;
+                .spawn(move || {
+                    give_way();
+                    shared.work();
+                })?;
         }
         Ok(pool)
     }

@@ -1,0 +1,15 @@
+//! Who runs first where there are more threads than cores: the arm and the gateway, which serve all, before what works
+//! for one client.
+
+/// How far a thread steps back, on the system's scale of niceness. Beside one that does not it still has a quarter of a
+/// core: other programs, which it gives way to as well, can't starve it.
+#[cfg(target_os = "linux")]
+const STEP_BACK: i32 = 5;
+
+/// From now on the present thread gives way to the program's others. Only on Linux: elsewhere the whole process would
+/// step back.
+pub fn give_way() {
+    // Where that is forbidden all threads are equals.
+    #[cfg(target_os = "linux")]
+    let _ = rustix::process::nice(STEP_BACK);
+}
