@@ -5,8 +5,8 @@
 use bytes::Bytes;
 use pendularm::protocol::messages::{
     Clock, DiagnosticArray, DiagnosticStatus, Empty, ErrorForm, Header, JointState,
-    JointTrajectory, JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, publish,
-    publish_raw, respelled, response, response_raw, status,
+    JointTrajectory, JointTrajectoryPoint, KeyValue, Level, Stamp, call, failure, message_text,
+    publish, publish_raw, respelled, response, response_raw, status,
 };
 use pendularm::protocol::wire::fragments;
 use pendularm::protocol::wire::payload::Payload;
@@ -298,4 +298,15 @@ fn what_is_made_of_a_message_has_no_spare_room() {
             assert_eq!(room, Ok(length));
         }
     }
+}
+
+/// A topic is known with and without its slash, and each subscriber reads its own spelling.
+#[test]
+fn a_message_can_be_told_under_another_spelling_of_its_topic() {
+    let frame = publish("/a\"b", &json!({"x": [1, null]}));
+    assert_eq!(message_text("/a\"b", &frame), br#"{"x":[1,null]}"#);
+    let other = publish("a\"b", &json!({"x": [1, null]}));
+    assert_eq!(respelled("/a\"b", "a\"b", &frame), other);
+    let same = respelled("/a\"b", "/a\"b", &frame);
+    assert_eq!(same.as_ptr(), frame.as_ptr(), "the bytes are shared");
 }

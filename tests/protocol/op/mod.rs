@@ -2,10 +2,13 @@
 //!
 //! **Invariant:** every bad field is tried in every operation that has it.
 
+mod actions;
 mod calls;
 mod connection;
+mod encodings;
+mod fragments;
 mod hostile;
-mod later;
+mod long;
 mod members;
 mod reading;
 mod subscribing;
@@ -22,6 +25,15 @@ fn op(frame: &str) -> Op {
 fn status(frame: &str) -> String {
     match read(frame).op {
         Err(error @ OpError::Status(_)) => error.to_string(),
+        other => panic!("{frame}: {other:?}"),
+    }
+}
+
+/// What is said about a bad field, however the sender hears of it.
+#[track_caller]
+fn problem(frame: &str) -> String {
+    match read(frame).op {
+        Err(OpError::Status(problem) | OpError::Goal { problem, .. }) => problem.to_string(),
         other => panic!("{frame}: {other:?}"),
     }
 }
