@@ -25,7 +25,7 @@ trap cleanup EXIT
 install_peers
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
-(cd "$benches" && cargo build --release --locked --quiet --bin load)
+(cd "$benches" && cargo build --release --locked --quiet --no-default-features --bin load)
 program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
 
 # Waits until something listens on port $1; $2 is who it should be.
