@@ -80,14 +80,12 @@ fuzz-faults: ## Put faults into a copy of the sources and see each found by its 
 lint: ## Check formatting and lints; any warning fails
 	@echo "make lint: rustfmt, clippy"
 	$(CARGO) fmt --check --all
-	$(CARGO) fmt --check --manifest-path benches/Cargo.toml
 	$(CARGO) fmt --check --manifest-path fuzz/Cargo.toml
 	$(CARGO) fmt --check --manifest-path python/Cargo.toml
 	$(CARGO) fmt --check --manifest-path ros2/Cargo.toml
 	$(CARGO) clippy --locked --workspace --all-targets -- -D warnings
 	$(CARGO) clippy --locked --no-default-features -- -D warnings
 	$(CARGO) clippy --locked --no-default-features --features runtime -- -D warnings
-	$(CARGO) clippy --locked --manifest-path benches/Cargo.toml --target-dir "$(TARGET_DIR)" --all-targets -- -D warnings
 	@echo "planted faults: has each its place in the sources still?"
 	python3 tests/simulate/faults.py check
 	python3 fuzz/faults/run.py check
@@ -163,7 +161,7 @@ soak: ## Let badly behaved clients come and go for MINUTES (1), and check what m
 clean: ## Remove what was built, measured and packed; vendored sources stay
 	@echo "make clean: $(TARGET_DIR)/ and the other packages' build folders, report/, $(ARCHIVE)"
 	$(CARGO) clean
-	rm -rf $(ARCHIVE) report benches/target fuzz/target python/target tests/clients/roslibrust/target
+	rm -rf $(ARCHIVE) report fuzz/target python/target tests/clients/roslibrust/target
 
 vendor: ## Fetch the dependencies' sources into vendor/, so that every later build is offline
 	@bash scripts/vendor.sh

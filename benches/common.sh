@@ -1,8 +1,9 @@
 # Sourced by run.sh, load/run.sh, attack/run.sh, peers/run.sh and scripts/soak.sh: where results go, and on what they were measured.
-# Needs: `root` (this project). Sets: `benches`, `built`, `core`. A kept run names the processor, never the machine or a path.
+# Needs: `root` (this project). Sets: `benches`, `target`, `built`, `core`. A kept run names the processor, never the machine or a path.
 
 benches=$root/benches
-built=${CARGO_TARGET_DIR:-$benches/target}/release
+target=${CARGO_TARGET_DIR:-$root/target}
+built=$target/release
 
 # The last core, which interrupts visit least; without taskset, wherever the system likes.
 core=${CORE:-$(($(getconf _NPROCESSORS_ONLN) - 1))}
@@ -25,8 +26,8 @@ results_folder() {
         mkdir -p "$benches/results/$(date +%F)-$(machine)"
         echo "$benches/results/$(date +%F)-$(machine)"
     else
-        mkdir -p "$benches/target/results"
-        echo "$benches/target/results"
+        mkdir -p "$target/results"
+        echo "$target/results"
     fi
 }
 

@@ -26,7 +26,7 @@ instructions() {
 say "building pendularm and its benchmarks (release)"
 (cd "$root" && cargo build --release --locked --quiet)
 (cd "$benches" && cargo build --release --locked --quiet --features echo)
-program=${CARGO_TARGET_DIR:-$root/target}/release/pendularm
+program=$built/pendularm
 folder=$(results_folder)
 environment "make bench" >"$folder/environment.txt"
 

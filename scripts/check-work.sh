@@ -13,8 +13,7 @@ if [ "${1:-}" != --record ] && ! grep -qx "# $toolchain" "$recorded"; then
     exit 0
 fi
 
-# The folder of `make soak` and its like, which want the same build.
-target=${CARGO_TARGET_DIR:-$root/benches/target}
+target=${CARGO_TARGET_DIR:-$root/target}
 (cd "$root/benches" && cargo build --release --locked --quiet --bin work)
 
 # The difference between two runs: the start of the program is not the step's.

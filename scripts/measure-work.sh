@@ -11,13 +11,13 @@ command -v valgrind >/dev/null || { echo "measure-work: valgrind is not installe
 mkdir -p "$out"
 # Functions and symbols are counted by their names, which a release build does without otherwise.
 export CARGO_PROFILE_RELEASE_STRIP=none
-target=${CARGO_TARGET_DIR:-$root/target}/benches
+target=${CARGO_TARGET_DIR:-$root/target}
 scratch=$(mktemp -d)
 server=
 trap 'if [ -n "$server" ]; then kill "$server" 2>/dev/null || true; fi; rm -rf "$scratch"' EXIT
 
-(cd "$root/benches" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet --bin work --bin estimate --bin allocations)
-program=${CARGO_TARGET_DIR:-$root/target}/release/pendularm
+(cd "$root/benches" && cargo build --release --locked --quiet --bin work --bin estimate --bin allocations)
+program=$target/release/pendularm
 if grep -q '^web = ' "$root/Cargo.toml"; then
     (cd "$root" && cargo build --release --locked --quiet --no-default-features --features runtime)
     cp "$program" "$scratch/bare"

@@ -9,4 +9,4 @@ source "$root/benches/common.sh"
 (cd "$root" && cargo build --release --locked --quiet)
 (cd "$benches" && cargo build --release --locked --quiet --no-default-features --bin soak)
 environment "make soak MINUTES=${MINUTES:-1}${SEED:+ SEED=$SEED}${ONLY:+ ONLY=$ONLY}"
-exec "$built/soak" "${CARGO_TARGET_DIR:-$root/target}/release/pendularm"
+exec "$built/soak" "$built/pendularm"

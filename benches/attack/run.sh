@@ -20,7 +20,7 @@ trap 'rm -rf "$scratch"' EXIT
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
 (cd "$benches" && cargo build --release --locked --quiet --no-default-features --bin attack)
-program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
+program=${PROGRAM:-$built/pendularm}
 
 arguments=()
 case " ${ARGS:-} " in

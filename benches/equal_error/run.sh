@@ -27,7 +27,7 @@ prefix=$packages/cmeel.prefix
 mujoco=$(echo "$packages"/mujoco/libmujoco.so.*)
 [ -e "$mujoco" ] || fail "the wheel of MuJoCo has no library for this system"
 
-out=$benches/target/equal-error
+out=$target/equal-error
 mkdir -p "$out"
 say "compiling"
 "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_C_SOURCE=200809L -isystem "$packages/mujoco/include" \
@@ -40,7 +40,7 @@ if [ ! -e "$out/pinocchio" ] || [ -n "$(find "$here" "$benches/peers/rod_arm.hpp
         "$here/pinocchio.cpp" -o "$out/pinocchio" -L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib"
 fi
 # Beside the benches' own, so that what both need is built once.
-(cd "$here" && CARGO_TARGET_DIR="$(dirname "$built")" cargo build --release --locked --quiet)
+(cd "$here" && CARGO_TARGET_DIR=$target cargo build --release --locked --quiet)
 
 folder=$(results_folder)/equal-error
 rm -rf "$folder"

@@ -26,7 +26,7 @@ install_peers
 say "building (release)"
 [ -n "${PROGRAM:-}" ] || (cd "$root" && cargo build --release --locked --quiet)
 (cd "$benches" && cargo build --release --locked --quiet --no-default-features --bin load)
-program=${PROGRAM:-${CARGO_TARGET_DIR:-$root/target}/release/pendularm}
+program=${PROGRAM:-$built/pendularm}
 
 # Waits until something listens on port $1; $2 is who it should be.
 await() {

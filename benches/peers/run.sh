@@ -31,14 +31,14 @@ mujoco=$(echo "$packages"/mujoco/libmujoco.so.*)
 
 # Compiles $1 from the source $2 with the rest, unless it is newer than all that is written here.
 program() {
-    local output=$benches/target/peers/$1 source=$here/$2
+    local output=$target/peers/$1 source=$here/$2
     shift 2
     if [ ! -e "$output" ] || [ -n "$(find "$here" -maxdepth 1 -type f -newer "$output" -print -quit)" ]; then
         say "compiling ${output##*/}"
         "$@" "$source" -o "$output" "${libraries[@]}"
     fi
 }
-mkdir -p "$benches/target/peers"
+mkdir -p "$target/peers"
 # The definitions are those of Pinocchio's own CMake files. Against the library: no -march, for the alignment of Eigen's
 # types hangs on it and must be the library's.
 pinocchio=("$cxx" -std=c++17 -O3 -DNDEBUG -w -DBOOST_MPL_LIMIT_LIST_SIZE=30 -DBOOST_MPL_LIMIT_VECTOR_SIZE=30
@@ -56,13 +56,13 @@ program mujoco mujoco.c "$cc" -std=c11 -O3 -march=native -Wall -Wextra -D_POSIX_
 libraries=(-L"$prefix/lib" -lboost_serialization -Wl,-rpath,"$prefix/lib")
 program generate generate.cpp "${pinocchio[@]}" -O0
 for links in 2 3; do
-    forward=$benches/target/peers/forward-$links.h
-    "$benches/target/peers/generate" "$links" >"$forward"
+    forward=$target/peers/forward-$links.h
+    "$target/peers/generate" "$links" >"$forward"
     generated() { # name, flags
         local name=$1
         shift
         "$cc" -std=c11 -Wall -Wextra -D_POSIX_C_SOURCE=200809L "-DJOINTS=$links" "-DGENERATED=\"$forward\"" "$@" \
-            "$here/generated.c" -o "$benches/target/peers/generated-$name-$links" -lm
+            "$here/generated.c" -o "$target/peers/generated-$name-$links" -lm
     }
     generated plain -O3
     generated native -O3 -march=native
@@ -88,11 +88,11 @@ system() {
     local states=states-$2.txt
     case $1 in
         pendularm) "$built/peers" "$3" "$2" "$states" ;;
-        "pinocchio wheel") "$benches/target/peers/pinocchio-wheel" "$1" "$2" "$states" "$3" ;;
-        "pinocchio native") "$benches/target/peers/pinocchio-native" "$1" "$2" "$states" "$3" ;;
-        generated*) "$benches/target/peers/${1/ /-}-$2" "$1" "$2" "$states" "$3" ;;
-        mujoco) "$benches/target/peers/mujoco" "$1" "$2" "$states" "$3" ;;
-        "mujoco bare") "$benches/target/peers/mujoco" "$1" "$2" "$states" "$3" bare ;;
+        "pinocchio wheel") "$target/peers/pinocchio-wheel" "$1" "$2" "$states" "$3" ;;
+        "pinocchio native") "$target/peers/pinocchio-native" "$1" "$2" "$states" "$3" ;;
+        generated*) "$target/peers/${1/ /-}-$2" "$1" "$2" "$states" "$3" ;;
+        mujoco) "$target/peers/mujoco" "$1" "$2" "$states" "$3" ;;
+        "mujoco bare") "$target/peers/mujoco" "$1" "$2" "$states" "$3" bare ;;
     esac
 }
 export -f system

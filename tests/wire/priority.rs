@@ -1,5 +1,5 @@
-//! Where threads are more than cores, those that work for one client give way to the arm and the gateway, which work for
-//! all.
+//! Where threads are more than cores, those that work for one client give way to the arm and the gateway, which work
+//! for all.
 //!
 //! **Invariant:** only Linux is asked, which has a priority for each thread.
 

@@ -1,5 +1,7 @@
 //! Who runs first where there are more threads than cores: the arm and the gateway, which serve all, before what works
 //! for one client.
+//!
+//! **Invariant:** a thread steps back once, when it starts, and stays there.
 
 /// How far a thread steps back, on the system's scale of niceness. Beside one that does not it still has a quarter of a
 /// core: other programs, which it gives way to as well, can't starve it.

@@ -63,8 +63,8 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
     (length > 0).then_some((topic, length))
 }
 
-/// How long the first message of frames for one client is: of a series one line, of anything else (what is longer than a
-/// series, fragments, binary) all of it. That takes no longer for a message of megabytes.
+/// How long the first message of frames for one client is: of a series one line, of anything else (more bytes than a
+/// series has, fragments, binary) all of it. A message of megabytes takes no longer.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
     first_messages(frames, 0).0

@@ -29,7 +29,7 @@ fn status(frame: &str) -> String {
     }
 }
 
-/// What is said about a bad field, however the sender hears of it.
+/// The words about a bad field, however the sender hears of them.
 #[track_caller]
 fn problem(frame: &str) -> String {
     match read(frame).op {
