@@ -11,7 +11,7 @@ use std::time::Duration;
 use bytes::BytesMut;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::task::spawn_blocking;
+use tokio::task::{spawn_blocking, yield_now};
 use tokio::time::{Instant, timeout, timeout_at};
 
 use super::access::AccessError;
@@ -286,6 +286,8 @@ pub(crate) async fn answer<S: AsyncRead + AsyncWrite + Unpin>(
         take(stream.write_all(response.head().as_bytes())).await?;
         for piece in response.body().chunks(PIECE) {
             take(stream.write_all(piece)).await?;
+            // The system may take megabytes at once: others have their turns in between.
+            yield_now().await;
         }
         take(stream.shutdown()).await
     };

@@ -69,6 +69,33 @@ fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() 
     });
 }
 
+/// The pipe takes all of it at once, as a system's buffer takes megabytes.
+#[test]
+fn a_file_of_a_report_is_sent_in_turns() {
+    const LONG: usize = 4 << 20;
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let folder = std::env::temp_dir().join(format!("pendularm-turns-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
+        file.set_len(LONG as u64).unwrap();
+        let admission = Arc::new(Admission {
+            token: None,
+            site: Site::new(Access::default(), folder.clone()),
+            ..Admission::default()
+        });
+        let mut stream = connect_through(&gateway, &admission, WIDE);
+        let request = HEAD.replace("GET /", "GET /report/a.csv") + "\r\n";
+        stream.write_all(request.as_bytes()).await.unwrap();
+        assert_eq!(stream.read_u8().await.unwrap(), b'H');
+        let mut rest = vec![0; LONG];
+        let (turns, _) = turns_of_others(stream.read_exact(&mut rest)).await;
+        // One piece has come with the first byte.
+        assert!(turns >= LONG / TURN - 1, "{turns} turns");
+        std::fs::remove_dir_all(&folder).unwrap();
+    });
+}
+
 /// Two of the longest files are on their way to clients that don't take them: the older one gives way to a third, and
 /// the page is not concerned.
 #[test]

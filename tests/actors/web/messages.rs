@@ -1,29 +1,8 @@
 //! Messages over a WebSocket: what a long one costs, and the forms in which they come.
 
-use std::cell::Cell;
-use std::rc::Rc;
-
 use super::*;
 
 const PAUSE: &str = Service::Pause.name();
-/// Bytes that are read at most before others have a turn.
-const TURN: usize = 64 * 1024;
-
-/// How many turns others have while `doing` is done, and what came of it.
-async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
-    let turns = Rc::new(Cell::new(0));
-    let counted = Rc::clone(&turns);
-    let others = actix_rt::spawn(async move {
-        loop {
-            counted.set(counted.get() + 1);
-            tokio::task::yield_now().await;
-        }
-    });
-    let done = doing.await;
-    others.abort();
-    (turns.get(), done)
-}
-
 /// A gateway whose `/arm_sim/pause` answers at once.
 async fn pausing_gateway() -> Gateway {
     let mut nodes = Nodes::default();

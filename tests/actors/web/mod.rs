@@ -11,7 +11,9 @@ mod life;
 mod messages;
 mod unread;
 
+use std::cell::Cell;
 use std::net::SocketAddr;
+use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -72,4 +74,22 @@ async fn receive_text(socket: &mut Client<DuplexStream>) -> String {
         Event::Text(text) => text,
         other => panic!("{other:?} instead of a text"),
     }
+}
+
+/// Bytes that are read or written at most before others have a turn.
+const TURN: usize = 64 * 1024;
+
+/// How many turns others have while `doing` is done, and what came of it.
+async fn turns_of_others<T>(doing: impl Future<Output = T>) -> (usize, T) {
+    let turns = Rc::new(Cell::new(0));
+    let counted = Rc::clone(&turns);
+    let others = actix_rt::spawn(async move {
+        loop {
+            counted.set(counted.get() + 1);
+            tokio::task::yield_now().await;
+        }
+    });
+    let done = doing.await;
+    others.abort();
+    (turns.get(), done)
 }
