@@ -16,7 +16,8 @@
 //! | `cli` | yes | `command`: commands that ask a running one, completions and manual |
 //!
 //! Without default features the library is [`math`] and [`study`]: a program that only steps arms needs
-//! no more, and compiles `glam` and `thiserror` beside it.
+//! no more, and compiles `glam` and `thiserror` beside it. With `batch`, and `fearless_simd`, a step of Runge-Kutta on
+//! x86-64 takes a tenth (2 links) to a fifth (3) fewer instructions.
 //!
 //! ```
 //! use pendularm::math::{arm::Arm, pid::Gains, simulation::Simulation};
