@@ -2,6 +2,7 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::SocketAddr;
+use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
@@ -56,6 +57,18 @@ pub fn end(child: &mut Child) -> (ExitStatus, Duration) {
 pub struct Runtime {
     child: Child,
     pub address: SocketAddr,
+}
+
+/// A process or thread as its file `stat` below `/proc` describes it: its name, and the fields behind that, the first of
+/// which `man 5 proc` counts as the third.
+pub fn stat(file: impl AsRef<Path>) -> (String, Vec<String>) {
+    let text = std::fs::read_to_string(file).unwrap();
+    let (name, fields) = text.rsplit_once(") ").unwrap();
+    let name = name.split_once('(').unwrap().1;
+    (
+        name.to_owned(),
+        fields.split_whitespace().map(str::to_owned).collect(),
+    )
 }
 
 impl Runtime {

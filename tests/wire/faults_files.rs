@@ -4,7 +4,7 @@
 
 use std::time::Instant;
 
-use crate::common::{Client, PATIENCE, Runtime};
+use crate::common::{Client, PATIENCE, Runtime, stat};
 use pendularm::actors::gateway::limits::MAX_CONNECTIONS;
 use serde_json::json;
 
@@ -20,12 +20,9 @@ fn set_soft_limit(runtime: &Runtime, files: usize) {
 
 /// Seconds of processor time that the program has used.
 fn processor_seconds(runtime: &Runtime) -> f64 {
-    let stat = std::fs::read_to_string(format!("/proc/{}/stat", runtime.pid())).unwrap();
-    // Behind the name in brackets: state, then ten numbers, then user and system ticks of 10 ms.
-    let fields: Vec<&str> = stat[stat.rfind(')').unwrap()..]
-        .split_whitespace()
-        .collect();
-    (fields[12].parse::<f64>().unwrap() + fields[13].parse::<f64>().unwrap()) / 100.0
+    let (_, fields) = stat(format!("/proc/{}/stat", runtime.pid()));
+    // The 14th and 15th: ticks of 10 ms, the program's own and the system's.
+    (fields[11].parse::<f64>().unwrap() + fields[12].parse::<f64>().unwrap()) / 100.0
 }
 
 /// A client that is one too many: what it is told, and the end.

@@ -7,17 +7,16 @@ use std::collections::BTreeMap;
 
 use serde_json::json;
 
-use crate::common::Runtime;
+use crate::common::{Runtime, stat};
 
 /// How far the program's threads step back behind others, by their names.
 fn niceness(runtime: &Runtime) -> BTreeMap<String, i32> {
     let tasks = std::fs::read_dir(format!("/proc/{}/task", runtime.pid())).unwrap();
     tasks
         .map(|task| {
-            let stat = std::fs::read_to_string(task.unwrap().path().join("stat")).unwrap();
-            let (name, rest) = stat.split_once(") ").unwrap();
-            let name = name.split_once('(').unwrap().1.to_owned();
-            (name, rest.split(' ').nth(16).unwrap().parse().unwrap())
+            let (name, fields) = stat(task.unwrap().path().join("stat"));
+            // The 19th.
+            (name, fields[16].parse().unwrap())
         })
         .collect()
 }

@@ -1,5 +1,7 @@
 //! Requests of HTTP: heads that do not come, and answers that are not taken.
 
+use std::path::PathBuf;
+
 use super::*;
 use pendularm::actors::gateway::connection::admission::MAX_HEADS;
 use pendularm::web::access::Access;
@@ -69,24 +71,33 @@ fn a_request_that_is_not_even_begun_may_take_for_ever_and_one_that_is_may_not() 
     });
 }
 
+/// A report of one file, `a.csv`, that has a length, and no content on the disk: its folder, and the way to it.
+fn report_of(test: &str, length: u64) -> (PathBuf, Arc<Admission>) {
+    let folder = std::env::temp_dir().join(format!("pendularm-{test}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let file = std::fs::File::create(folder.join("a.csv")).unwrap();
+    file.set_len(length).unwrap();
+    let admission = Admission {
+        token: None,
+        site: Site::new(Access::default(), folder.clone()),
+        ..Admission::default()
+    };
+    (folder, Arc::new(admission))
+}
+
+fn file_request() -> String {
+    HEAD.replace("GET /", "GET /report/a.csv") + "\r\n"
+}
+
 /// The pipe takes all of it at once, as a system's buffer takes megabytes.
 #[test]
 fn a_file_of_a_report_is_sent_in_turns() {
     const LONG: usize = 4 << 20;
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let folder = std::env::temp_dir().join(format!("pendularm-turns-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
-        file.set_len(LONG as u64).unwrap();
-        let admission = Arc::new(Admission {
-            token: None,
-            site: Site::new(Access::default(), folder.clone()),
-            ..Admission::default()
-        });
+        let (folder, admission) = report_of("turns", LONG as u64);
         let mut stream = connect_through(&gateway, &admission, WIDE);
-        let request = HEAD.replace("GET /", "GET /report/a.csv") + "\r\n";
-        stream.write_all(request.as_bytes()).await.unwrap();
+        stream.write_all(file_request().as_bytes()).await.unwrap();
         assert_eq!(stream.read_u8().await.unwrap(), b'H');
         let mut rest = vec![0; LONG];
         let (turns, _) = turns_of_others(stream.read_exact(&mut rest)).await;
@@ -102,18 +113,8 @@ fn a_file_of_a_report_is_sent_in_turns() {
 fn files_of_a_report_that_are_being_sent_have_a_total() {
     in_virtual_time(async {
         let gateway = Gateway::bare().await;
-        let folder = std::env::temp_dir().join(format!("pendularm-files-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
-        // It has a length, and no content on the disk.
-        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
-        file.set_len(MAX_FILES_TOTAL / 2 - 100_000).unwrap();
-        let site = Site::new(Access::default(), folder.clone());
-        let admission = Arc::new(Admission {
-            token: None,
-            site,
-            ..Admission::default()
-        });
-        let request = HEAD.replace("GET /", "GET /report/a.csv") + "\r\n";
+        let (folder, admission) = report_of("files", MAX_FILES_TOTAL / 2 - 100_000);
+        let request = file_request();
         let mut deaf = Vec::new();
         for _ in 0..2 {
             let mut stream = connect_through(&gateway, &admission, 1024);
