@@ -70,13 +70,17 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
         })
     }
 
-    /// The next message; `None` once the connection is closed. All is received in turns. Those of a long one are
-    /// shared with other readers: with its last byte, whichever that is, the library unmasks and checks all of it.
+    /// The next message; `None` once the connection is closed. All is received in turns: what is read at a time may be
+    /// a thousand pings, each of which is answered. Those of a long message are shared with other readers: with its last
+    /// byte, whichever that is, the library unmasks and checks all of it.
     pub(super) async fn next(&self) -> Option<Result<Message, Error>> {
         loop {
-            let received = poll_fn(|cx| Poll::Ready(self.socket.borrow_mut().poll_next_unpin(cx)));
-            if let Poll::Ready(message) = received.await {
-                return message;
+            if !self.socket.borrow().get_ref().is_turn_over() {
+                let received =
+                    poll_fn(|cx| Poll::Ready(self.socket.borrow_mut().poll_next_unpin(cx)));
+                if let Poll::Ready(message) = received.await {
+                    return message;
+                }
             }
             let (is_turn_over, long) = {
                 let mut socket = self.socket.borrow_mut();

@@ -93,9 +93,14 @@ impl<S> Watched<S> {
 
     /// Begins another turn of reading. True if one was over: then whoever reads goes on without being woken.
     pub(super) const fn begin_turn(&mut self) -> bool {
-        let is_over = self.turn == 0;
+        let is_over = self.is_turn_over();
         self.turn = TURN;
         is_over
+    }
+
+    /// Whether others have a turn now, though there may be more to be read.
+    pub(super) const fn is_turn_over(&self) -> bool {
+        self.turn == 0
     }
 
     /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
@@ -149,7 +154,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         // Nobody is woken for it: who reads begins the next turn.
-        if self.turn == 0 {
+        if self.is_turn_over() {
             return Poll::Pending;
         }
         let before = buffer.filled().len();
