@@ -71,8 +71,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     }
 
     /// The next message; `None` once the connection is closed. All is received in turns: what is read at a time may be
-    /// a thousand pings, each of which is answered. Those of a long message are shared with other readers: with its last
-    /// byte, whichever that is, the library unmasks and checks all of it.
+    /// a thousand pings, each of which is answered. Those of a long message are shared with other readers: with its
+    /// last byte, whichever that is, the library unmasks and checks all of it.
     pub(super) async fn next(&self) -> Option<Result<Message, Error>> {
         loop {
             if !self.socket.borrow().get_ref().is_turn_over() {
