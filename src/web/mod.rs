@@ -30,20 +30,18 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use tokio::sync::Semaphore;
+use tokio::task::spawn_blocking;
 
 use self::access::Access;
 
 /// Requests that are answered at once, and as many for files of the report. A browser opens six connections; the rest
 /// is for other people's.
 pub const MAX_REQUESTS: usize = 64;
-/// Bytes of files of the report that are kept at once while they are sent: two of the longest, or the whole of one
-/// report.
-pub const MAX_FILES_TOTAL: u64 = 64 * 1024 * 1024;
 /// Folder of the report, unless another is named.
 pub const DEFAULT_REPORT: &str = "report";
 
-/// Bytes that room for files is counted in.
-pub(crate) const ROOM: u64 = 64 * 1024;
+/// Threads at once that look at the report's folder: a disk that takes long keeps no others.
+const DISK_PLACES: usize = 2;
 
 /// The files that are served over HTTP, and the rules for whom.
 #[derive(Debug)]
@@ -52,8 +50,8 @@ pub struct Site {
     pub access: Access,
     /// Folder of the last report.
     pub report: PathBuf,
-    /// Room for files, in [`ROOM`].
-    pub(crate) room: Arc<Semaphore>,
+    /// Places for those threads.
+    disk: Arc<Semaphore>,
 }
 
 impl Site {
@@ -63,10 +61,23 @@ impl Site {
         Self {
             access,
             report,
-            room: Arc::new(Semaphore::new(
-                usize::try_from(MAX_FILES_TOTAL / ROOM).unwrap_or(1),
-            )),
+            disk: Arc::new(Semaphore::new(DISK_PLACES)),
         }
+    }
+
+    /// Does `work`, which waits for a disk, on another thread, once there is a place for it; `None` if it panicked, or
+    /// if the runtime is ending.
+    pub(crate) async fn at_disk<T: Send + 'static>(
+        &self,
+        work: impl FnOnce() -> T + Send + 'static,
+    ) -> Option<T> {
+        let place = Arc::clone(&self.disk).acquire_owned().await.ok()?;
+        let work = move || {
+            let done = work();
+            drop(place);
+            done
+        };
+        spawn_blocking(work).await.ok()
     }
 }
 

@@ -7,7 +7,6 @@
 //! **Invariant:** every file of that folder is in the table, and nothing else is served as part of the page.
 
 use std::borrow::Cow;
-use std::path::Path;
 use std::sync::LazyLock;
 
 use tokio::sync::OnceCell;
@@ -15,8 +14,8 @@ use tokio::task::spawn_blocking;
 
 use super::authority::Authority;
 use super::bundle::{bundle, styles};
-use super::report;
 use super::response::HttpResponse;
+use super::{Site, report};
 
 /// A file of the page.
 #[derive(Debug)]
@@ -214,11 +213,11 @@ pub fn find(path: &str, own: &Authority, encodings: &str) -> Option<PageFile> {
 impl PageFile {
     /// The answer; the document shows the way to the report if there is one in the folder. Looking there may take as
     /// long as the disk does, and packing a file takes milliseconds, once: another thread does both.
-    pub async fn answer(self, report: &Path) -> HttpResponse {
+    pub async fn answer(self, site: &Site) -> HttpResponse {
         let Asset { kind, bytes, .. } = *self.asset;
         let body = if self.asset.is_document() {
-            let folder = report.to_owned();
-            let has_report = spawn_blocking(move || report::exists(&folder)).await;
+            let folder = site.report.clone();
+            let has_report = site.at_disk(move || report::exists(&folder)).await;
             Cow::Owned(document(bytes, has_report.unwrap_or(false)))
         } else {
             Cow::Borrowed(bytes)
@@ -310,7 +309,8 @@ mod tests {
         let own = Authority::parse("127.0.0.1:9095").unwrap();
         let path = versioned(SCRIPT);
         let file = || find(&path, &own, "gzip, deflate").unwrap();
-        let ask = || file().answer(Path::new("no report"));
+        let site = Site::default();
+        let ask = || file().answer(&site);
         let mut asked = pin!(ask());
         let first = tokio::select! {
             biased;

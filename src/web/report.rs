@@ -1,9 +1,10 @@
-//! The last report: files of one folder, by plain names.
+//! The last report: files of one folder, by plain names. They are read piece by piece: however long one is, it
+//! takes a piece's memory.
 //!
 //! **Invariant:** what is served lies in the folder, also where a link in it points elsewhere, and is of a kind that is
 //! listed.
 
-use std::io::Read;
+use std::io::{self, Read, Take};
 use std::path::{Path, PathBuf};
 
 /// Path under which it is served.
@@ -12,8 +13,6 @@ pub const PREFIX: &str = "/report/";
 const INDEX: &str = "index.html";
 /// Deepest file below the folder, in names.
 const MAX_DEPTH: usize = 8;
-/// Largest file: a report with all its figures has a few MiB.
-pub const MAX_FILE: u64 = 32 * 1024 * 1024;
 
 /// The policy of the report, which may show its own inline styles and figures. It runs no script and makes no request.
 pub const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; base-uri 'none'; \
@@ -39,13 +38,13 @@ pub struct FileName {
     pub kind: &'static str,
 }
 
-/// A file that was read.
+/// A file that is being read.
 #[derive(Debug)]
 pub struct File {
-    /// Its media type.
-    pub kind: &'static str,
-    /// Its bytes.
-    pub bytes: Vec<u8>,
+    /// Its length when it was opened \[bytes\].
+    pub length: u64,
+    /// The bytes of that length that have not been read.
+    rest: Take<std::fs::File>,
 }
 
 /// Whether there is a report in the folder: one look at the disk.
@@ -79,35 +78,45 @@ impl FileName {
         Some(Self { path, kind })
     }
 
-    /// The file in `folder`, and its length; `None` if there is none to be had, or it is longer than [`MAX_FILE`].
-    fn find(&self, folder: &Path) -> Option<(PathBuf, u64)> {
+    /// The file in `folder`; `None` if there is none to be had.
+    fn find(&self, folder: &Path) -> Option<PathBuf> {
         let folder = folder.canonicalize().ok()?;
         let path = folder.join(&self.path).canonicalize().ok()?;
         if !path.starts_with(&folder) {
             return None;
         }
         // Asked first: opening what is no file, a pipe say, could wait for ever.
-        let about = path.metadata().ok()?;
-        let fits = about.is_file() && about.len() <= MAX_FILE;
-        fits.then_some((path, about.len()))
+        path.metadata().ok()?.is_file().then_some(path)
     }
 
-    /// The length of the file in `folder`, as [`FileName::read`] would read it now.
-    #[must_use]
-    pub fn length(&self, folder: &Path) -> Option<u64> {
-        self.find(folder).map(|(_, length)| length)
+    /// Opens the file in `folder`; `None` if there is none to be had. It may block for as long as the disk takes.
+    ///
+    /// # Errors
+    ///
+    /// The system's, where the file can't be opened: too many are open, or it is not ours to read.
+    pub fn open(&self, folder: &Path) -> io::Result<Option<File>> {
+        let Some(path) = self.find(folder) else {
+            return Ok(None);
+        };
+        let file = std::fs::File::open(path)?;
+        let length = file.metadata()?.len();
+        let rest = file.take(length);
+        Ok(Some(File { length, rest }))
     }
+}
 
-    /// Reads the file from `folder`; `None` if there is none to be had. It may block for as long as the disk takes.
-    #[must_use]
-    pub fn read(&self, folder: &Path) -> Option<File> {
-        let (path, _) = self.find(folder)?;
-        let mut bytes = Vec::new();
-        let file = std::fs::File::open(path).ok()?;
-        file.take(MAX_FILE + 1).read_to_end(&mut bytes).ok()?;
-        let fits = u64::try_from(bytes.len()).is_ok_and(|length| length <= MAX_FILE);
-        let kind = self.kind;
-        fits.then_some(File { kind, bytes })
+impl File {
+    /// The next piece, of at most so many bytes: none at the end, which comes early if the file has become shorter. It
+    /// may block as [`FileName::open`] does.
+    ///
+    /// # Errors
+    ///
+    /// The system's, where the file can't be read.
+    pub fn next_piece(&mut self, most: usize) -> io::Result<Vec<u8>> {
+        let mut piece = Vec::with_capacity(most);
+        let most = u64::try_from(most).unwrap_or(u64::MAX);
+        self.rest.by_ref().take(most).read_to_end(&mut piece)?;
+        Ok(piece)
     }
 }
 
@@ -158,15 +167,22 @@ mod tests {
     }
 
     #[test]
-    fn a_file_may_be_so_long_and_no_longer() {
+    fn a_file_is_read_in_pieces_as_long_as_it_was_when_it_was_opened() {
         let folder = std::env::temp_dir().join(format!("pendularm-report-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();
-        let file = std::fs::File::create(folder.join("a.csv")).unwrap();
+        let path = folder.join("a.csv");
         let name = FileName::parse("a.csv").unwrap();
-        for (length, is_read) in [(MAX_FILE, true), (MAX_FILE + 1, false)] {
-            // Nothing is written: such a file has a length and no content on the disk.
-            file.set_len(length).unwrap();
-            assert_eq!(name.read(&folder).is_some(), is_read, "{length}");
+        assert!(name.open(&folder).unwrap().is_none());
+        for (later, pieces) in [
+            ("1234567890", ["1234", "5678", "9", ""]),
+            ("12345", ["1234", "5", "", ""]),
+        ] {
+            std::fs::write(&path, "123456789").unwrap();
+            let mut file = name.open(&folder).unwrap().unwrap();
+            std::fs::write(&path, later).unwrap();
+            assert_eq!(file.length, 9);
+            let read = pieces.map(|_| String::from_utf8(file.next_piece(4).unwrap()).unwrap());
+            assert_eq!(read, pieces);
         }
         std::fs::remove_dir_all(&folder).unwrap();
     }

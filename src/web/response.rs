@@ -130,21 +130,26 @@ impl HttpResponse {
     /// The head, which comes before the body; nothing comes after that, the connection is closed.
     #[must_use]
     pub fn head(&self) -> String {
+        self.head_of(self.body.len() as u64)
+    }
+
+    /// The head before another body, of so many bytes, that is sent instead of its own.
+    #[must_use]
+    pub fn head_of(&self, length: u64) -> String {
         let Self {
             status,
             kind,
             policy,
             cache,
             headers,
-            body,
+            body: _,
         } = self;
         let mut head = format!(
-            "HTTP/1.1 {}\r\nContent-Type: {kind}\r\nContent-Length: {}\r\nConnection: close\r\n\
+            "HTTP/1.1 {}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nConnection: close\r\n\
              Cache-Control: {cache}\r\nContent-Security-Policy: {policy}\r\nX-Content-Type-Options: nosniff\r\n\
              Referrer-Policy: no-referrer\r\nCross-Origin-Resource-Policy: same-origin\r\n\
              Cross-Origin-Opener-Policy: same-origin\r\nX-Frame-Options: DENY\r\n",
             status.line(),
-            body.len()
         );
         for (name, value) in headers {
             // Writing to a `String` cannot fail.

@@ -4,28 +4,23 @@
 //! bounded by whoever calls.
 
 use std::net::SocketAddr;
-use std::pin::pin;
-use std::sync::Arc;
 use std::time::Duration;
 
 use bytes::BytesMut;
 use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::task::{spawn_blocking, yield_now};
+use tokio::task::yield_now;
 use tokio::time::{Instant, timeout, timeout_at};
 
 use super::access::AccessError;
 use super::authority::Authority;
 use super::head::{self, HeadError, MAX_HEAD, RequestHead};
 use super::response::{HttpResponse, HttpStatus};
-use super::{ROOM, Site, page, report, upgrade};
+use super::{Site, page, report, upgrade};
 
 /// How long a client may take no byte of an answer.
 pub const TAKE_TIME: Duration = Duration::from_secs(10);
 /// How long an answer may take in all: the largest file over a slow line.
 pub const ANSWER_TIME: Duration = Duration::from_secs(120);
-/// How long room for a file is waited for before somebody gives way, and then the next.
-const ROOM_TIME: Duration = Duration::from_millis(20);
 /// Bytes of an answer that are offered at a time.
 const PIECE: usize = 64 * 1024;
 /// How long, and how many bytes, of what follows a request are swallowed so that the answer can still be read: closing
@@ -97,25 +92,26 @@ pub async fn receive<S: AsyncRead + Unpin>(
     }
 }
 
-/// Does what is to be done about a request. `make_room` has the oldest answer with a file of the report give way; false
-/// if there is none but this. True if the stream is a WebSocket now; else it has ended.
+/// Does what is to be done about a request. True if the stream is a WebSocket now; else it has ended.
 pub async fn respond<S: AsyncRead + AsyncWrite + Unpin>(
     stream: &mut S,
     outcome: Served,
     site: &Site,
-    make_room: impl Fn() -> bool,
 ) -> bool {
     let (resource, cookie) = match outcome {
         Served::Answer(resource, cookie) => (resource, cookie),
         Served::Upgrade(head) => return take(stream.write_all(&head)).await.is_some(),
     };
-    // The room of a file is given back once it has been sent.
-    let (response, _room) = match resource {
+    let (response, file) = match resource {
         Resource::Said(response) => (response, None),
-        Resource::Page(file) => (file.answer(&site.report).await, None),
-        Resource::Report(name) => read_report(name, site, make_room).await,
+        Resource::Page(file) => (file.answer(site).await, None),
+        Resource::Report(name) => open_report(name, site).await,
     };
-    answer(stream, &with_cookie(response, cookie)).await;
+    let response = with_cookie(response, cookie);
+    match file {
+        Some(file) => answer_with(stream, &response, file, site).await,
+        None => answer(stream, &response).await,
+    }
     false
 }
 
@@ -226,54 +222,22 @@ fn find(request: &RequestHead, own: &Authority) -> Resource {
     Resource::Said(HttpResponse::text(HttpStatus::NotFound, sentence))
 }
 
-const TOO_MANY_FILES: &str = "too many files of the report are being sent; try again";
 const NO_SUCH_FILE: &str = "there is no such file in the report; the report is at /report/, if there is one. It is \
      read from the folder that --report names";
 
-/// Reads a file where waiting for the disk holds up nobody, once there is room for it.
-async fn read_report(
-    name: report::FileName,
-    site: &Site,
-    make_room: impl Fn() -> bool,
-) -> (HttpResponse, Option<OwnedSemaphorePermit>) {
-    let not_found = || (HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE), None);
-    let (named, folder) = (name.clone(), site.report.clone());
-    let Ok(Some(length)) = spawn_blocking(move || named.length(&folder)).await else {
-        return not_found();
-    };
-    let Some(taken) = take_room(&site.room, length, make_room).await else {
-        return (
-            HttpResponse::text(HttpStatus::Unavailable, TOO_MANY_FILES),
-            None,
-        );
-    };
-    let folder = site.report.clone();
-    // The room goes with the reading, which goes on where nobody waits for it any more.
-    let read = spawn_blocking(move || name.read(&folder).map(|file| (file, taken)));
-    match read.await {
-        Ok(Some((file, taken))) => {
-            let response = HttpResponse::file(file.kind, report::POLICY, file.bytes);
-            (response, Some(taken))
+/// A file of the report, and the answer to be sent with it; or why there is none.
+async fn open_report(name: report::FileName, site: &Site) -> (HttpResponse, Option<report::File>) {
+    let (kind, folder) = (name.kind, site.report.clone());
+    match site.at_disk(move || name.open(&folder)).await {
+        Some(Ok(Some(file))) => (
+            HttpResponse::file(kind, report::POLICY, &[][..]),
+            Some(file),
+        ),
+        Some(Err(why)) => {
+            let sentence = format!("this file of the report can't be read now: {why}");
+            (HttpResponse::text(HttpStatus::Unavailable, &sentence), None)
         }
-        _ => not_found(),
-    }
-}
-
-/// Takes room for a file of that length; the oldest give way until there is.
-async fn take_room(
-    room: &Arc<Semaphore>,
-    length: u64,
-    make_room: impl Fn() -> bool,
-) -> Option<OwnedSemaphorePermit> {
-    let needed = u32::try_from(length / ROOM + 1).ok()?;
-    let mut taking = pin!(Arc::clone(room).acquire_many_owned(needed));
-    loop {
-        if let Ok(taken) = timeout(ROOM_TIME, &mut taking).await {
-            return taken.ok();
-        }
-        if !make_room() {
-            return None;
-        }
+        _ => (HttpResponse::text(HttpStatus::NotFound, NO_SUCH_FILE), None),
     }
 }
 
@@ -291,10 +255,41 @@ pub(crate) async fn answer<S: AsyncRead + AsyncWrite + Unpin>(
         }
         take(stream.shutdown()).await
     };
-    if !matches!(timeout(ANSWER_TIME, send).await, Ok(Some(()))) {
-        return;
+    if matches!(timeout(ANSWER_TIME, send).await, Ok(Some(()))) {
+        swallow(stream).await;
     }
-    let swallow = async {
+}
+
+/// The same with a file, each piece of which is read when the one before has been taken.
+async fn answer_with<S: AsyncRead + AsyncWrite + Unpin>(
+    stream: &mut S,
+    response: &HttpResponse,
+    mut file: report::File,
+    site: &Site,
+) {
+    let send = async {
+        let head = response.head_of(file.length);
+        take(stream.write_all(head.as_bytes())).await?;
+        loop {
+            let read = move || file.next_piece(PIECE).map(|piece| (piece, file));
+            let (piece, rest) = site.at_disk(read).await?.ok()?;
+            if piece.is_empty() {
+                break;
+            }
+            file = rest;
+            take(stream.write_all(&piece)).await?;
+            yield_now().await;
+        }
+        take(stream.shutdown()).await
+    };
+    if matches!(timeout(ANSWER_TIME, send).await, Ok(Some(()))) {
+        swallow(stream).await;
+    }
+}
+
+/// Reads some of what follows a request, so that its answer can still be read.
+async fn swallow<S: AsyncRead + Unpin>(stream: &mut S) {
+    let reading = async {
         let mut chunk = BytesMut::new();
         let mut swallowed = 0;
         while swallowed < DISCARD_BYTES {
@@ -306,7 +301,7 @@ pub(crate) async fn answer<S: AsyncRead + AsyncWrite + Unpin>(
             }
         }
     };
-    let _ = timeout(DISCARD_TIME, swallow).await;
+    let _ = timeout(DISCARD_TIME, reading).await;
 }
 
 /// Waits until a piece has been taken; `None` if the client does not take it.

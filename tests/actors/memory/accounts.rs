@@ -27,12 +27,8 @@ fn the_limits_are_as_the_papers_say_and_leave_room_for_every_client() {
     // A client that never gives way, times all that there may be.
     const { assert!(MAX_CONNECTIONS * MODEST <= MAX_HELD) };
     const { assert!(CONNECTION_BYTES + MESSAGES_LEFT < MODEST) };
-    // The memory that is counted, a quarter of it for the allocator, the files of the report, and the program itself.
-    #[cfg(feature = "web")]
-    let files = usize::try_from(pendularm::web::MAX_FILES_TOTAL).unwrap();
-    #[cfg(not(feature = "web"))]
-    let files = 0;
-    assert!(MAX_HELD / 4 * 5 + files + 64 * MIB <= MAX_MEMORY);
+    // The memory that is counted, a quarter of it for the allocator, and the program itself.
+    const { assert!(MAX_HELD / 4 * 5 + 64 * MIB <= MAX_MEMORY) };
     // While nobody else is there, whatever docs/protocol.md accepts fits: a frame and all that is made of it.
     const { assert!(10 * MAX_FRAME + MAX_TOPIC_BYTES < MAX_HELD) };
     // So do the longest messages that are put into another form at a time, with their trees: 12 bytes for one, and 4.

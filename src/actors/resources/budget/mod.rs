@@ -25,8 +25,8 @@ const MIB: usize = 1024 * 1024;
 
 /// Bytes that clients make the program hold, as they are counted: beyond it the client that holds most gives way.
 pub const MAX_HELD: usize = 384 * MIB;
-/// Bytes that the program has resident at most, whatever clients do: what is counted, what an allocator adds, files of
-/// the report that are being sent, and the program itself. What the system keeps for sockets is not in it.
+/// Bytes that the program has resident at most, whatever clients do: what is counted, what an allocator adds, and the
+/// program itself. What the system keeps for sockets is not in it.
 pub const MAX_MEMORY: usize = 640 * MIB;
 /// Who holds no more bytes never gives way: 1,024 such clients fit.
 pub const MODEST: usize = 256 * 1024;

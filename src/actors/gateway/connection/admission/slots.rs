@@ -3,8 +3,6 @@
 //! Where clients finish quickly, only slow ones become the oldest. To refuse the newcomer instead would shut out honest
 //! clients.
 //!
-//! A holder that needs room which is counted elsewhere may evict the oldest ones until there is enough.
-//!
 //! **Invariant:** never more slots are held than there are.
 
 use std::collections::VecDeque;
@@ -32,8 +30,10 @@ impl Slots {
     pub(crate) fn take(&self) -> HeldSlot<'_> {
         let notice = Arc::new(Notify::new());
         let mut taken = self.taken();
-        if taken.len() >= self.most {
-            evict(&mut taken);
+        if taken.len() >= self.most
+            && let Some(oldest) = taken.pop_front()
+        {
+            oldest.notify_one();
         }
         taken.push_back(Arc::clone(&notice));
         HeldSlot {
@@ -44,12 +44,6 @@ impl Slots {
 
     fn taken(&self) -> MutexGuard<'_, VecDeque<Arc<Notify>>> {
         self.taken.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-fn evict(taken: &mut VecDeque<Arc<Notify>>) {
-    if let Some(oldest) = taken.pop_front() {
-        oldest.notify_one();
     }
 }
 
@@ -64,20 +58,6 @@ impl HeldSlot<'_> {
     /// Ends when somebody else has the slot. To be awaited until then, not beyond.
     pub(crate) async fn evicted(&self) {
         self.notice.notified().await;
-    }
-
-    /// Evicts the oldest slot. Returns false if this is the oldest or has been evicted.
-    #[cfg(feature = "web")]
-    pub(crate) fn evict_oldest(&self) -> bool {
-        let mut taken = self.slots.taken();
-        let is_behind = taken
-            .iter()
-            .skip(1)
-            .any(|one| Arc::ptr_eq(one, &self.notice));
-        if is_behind {
-            evict(&mut taken);
-        }
-        is_behind
     }
 }
 

@@ -61,11 +61,10 @@ impl ClientSession {
             serve::Served::Answer(serve::Resource::Report(_), _) => files.take(),
             _ => answers.take(),
         };
-        let make_room = || slot.evict_oldest();
         let is_socket = tokio::select! {
             biased;
             () = self.shared.finished() => false,
-            is_socket = serve::respond(&mut stream, outcome, &self.admission.site, make_room) => is_socket,
+            is_socket = serve::respond(&mut stream, outcome, &self.admission.site) => is_socket,
             () = slot.evicted() => false,
         };
         drop(slot);
