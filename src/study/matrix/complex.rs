@@ -16,6 +16,7 @@ pub struct Complex {
 impl Complex {
     pub(in crate::study) const ZERO: Self = Self { re: 0.0, im: 0.0 };
 
+    #[inline]
     pub(in crate::study) const fn real(re: f64) -> Self {
         Self { re, im: 0.0 }
     }
@@ -26,6 +27,7 @@ impl Complex {
         self.re.hypot(self.im)
     }
 
+    #[inline]
     pub(super) fn conjugate(self) -> Self {
         Self {
             re: self.re,
@@ -33,6 +35,7 @@ impl Complex {
         }
     }
 
+    #[inline]
     pub(in crate::study) fn scaled(self, factor: f64) -> Self {
         Self {
             re: self.re * factor,
@@ -71,6 +74,7 @@ impl Complex {
 
 impl Add for Complex {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self {
             re: self.re + other.re,
@@ -81,6 +85,7 @@ impl Add for Complex {
 
 impl Sub for Complex {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self {
             re: self.re - other.re,
@@ -91,6 +96,7 @@ impl Sub for Complex {
 
 impl Mul for Complex {
     type Output = Self;
+    #[inline]
     fn mul(self, other: Self) -> Self {
         Self {
             re: self.re * other.re - self.im * other.im,

@@ -27,12 +27,14 @@ pub struct Matrix {
 
 impl Index<(usize, usize)> for Matrix {
     type Output = f64;
+    #[inline]
     fn index(&self, (row, column): (usize, usize)) -> &f64 {
         &self.entries[row * self.n + column]
     }
 }
 
 impl IndexMut<(usize, usize)> for Matrix {
+    #[inline]
     fn index_mut(&mut self, (row, column): (usize, usize)) -> &mut f64 {
         &mut self.entries[row * self.n + column]
     }
