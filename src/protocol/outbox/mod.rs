@@ -13,18 +13,19 @@
 //! wait, held back ones included.
 
 pub(crate) mod blocks;
+mod dropping;
 mod throttle;
 
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use bytes::{Buf, Bytes};
+use bytes::Bytes;
 
 use crate::protocol::limits::MAX_FRAME;
 use crate::protocol::outbox::blocks::Blocks;
 use crate::protocol::outbox::throttle::Throttles;
-use crate::protocol::wire::series::{first_message, first_messages, last_messages, messages};
+use crate::protocol::wire::series::{first_message, last_messages, messages};
 
 /// Most bytes of topic messages that wait for one connection: the longest message that a client may send (and the
 /// newline behind it), or minutes of the arm's own.
@@ -35,7 +36,6 @@ pub const FRAME_BYTES: usize = 192;
 /// Bytes of a place in the queue of topic messages, that of one that is held back or to be encoded included: the queue
 /// may be twice as long as what is in it, and three times while it grows.
 pub const PLACE_BYTES: usize = 128;
-
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
 pub struct Outbox {
@@ -57,6 +57,8 @@ pub struct Outbox {
     /// Responses that are queued or being written.
     response_count: usize,
     dropped: u64,
+    /// Topic messages that are wanted no more.
+    given_up: Vec<Bytes>,
 }
 
 /// A frame that is being written.
@@ -103,23 +105,6 @@ impl Outbox {
         self.keep_bounded();
     }
 
-    /// Whether there is room for it once all else has gone; if not, it counts as dropped.
-    fn may_fit(&mut self, frame: &Bytes) -> bool {
-        let fits = frame.len() <= MAX_TOPIC_BYTES;
-        self.dropped += u64::from(!fits);
-        fits
-    }
-
-    fn keep_bounded(&mut self) {
-        self.drop_oldest(|outbox| outbox.topic_bytes().saturating_sub(MAX_TOPIC_BYTES));
-    }
-
-    /// Drops topic messages, the oldest first, until those that are left take at most so many bytes, their places
-    /// included.
-    pub fn keep_topics(&mut self, bytes: usize) {
-        self.drop_oldest(|outbox| outbox.topic_cost().saturating_sub(bytes));
-    }
-
     /// Whether [`push`](Self::push) and [`take_frames`](Self::take_frames) look at the time that they are given.
     #[must_use]
     pub fn is_throttled(&self) -> bool {
@@ -130,7 +115,8 @@ impl Outbox {
     /// before.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         for topic in supersedes {
-            self.throttles.discard(topic);
+            let held = self.throttles.discard(topic);
+            self.give_up(held);
         }
         self.response_bytes += frame.len();
         self.response_count += 1;
@@ -141,16 +127,25 @@ impl Outbox {
     /// Sets the least time between deliveries on a topic and how many messages that may hold back, or lifts both
     /// (`None`, or no time at all). What is held back then counts as produced now.
     pub fn set_throttle(&mut self, topic: &Arc<str>, throttle: Option<(Duration, usize)>) {
-        for (_, frame) in self.throttles.set(topic, throttle) {
-            let number = self.number();
-            self.enqueue(number, frame);
+        match throttle.filter(|(interval, _)| !interval.is_zero()) {
+            Some((interval, queue_length)) => {
+                let given_up = &mut self.given_up;
+                self.throttles.set(topic, interval, queue_length, given_up);
+            }
+            None => {
+                for (_, frame) in self.throttles.forget(topic) {
+                    let number = self.number();
+                    self.enqueue(number, frame);
+                }
+            }
         }
     }
 
     /// After an unsubscription: discards what is held back of a topic, and its throttle. What is queued leaves as it
     /// would have.
     pub fn forget(&mut self, topic: &str) {
-        self.throttles.forget(topic);
+        let held = self.throttles.forget(topic);
+        self.give_up(held);
     }
 
     /// Moves the next frames into `frames`, at least one if any waits, as many as `max_frames` and `max_bytes` allow.
@@ -288,10 +283,6 @@ impl Outbox {
         self.writing_cost
     }
 
-    fn topic_cost(&self) -> usize {
-        self.topic_bytes() + self.topic_count() * (PLACE_BYTES + FRAME_BYTES)
-    }
-
     /// Bytes of topic messages that wait, those held back included; at most [`MAX_TOPIC_BYTES`].
     #[must_use]
     pub const fn topic_bytes(&self) -> usize {
@@ -354,34 +345,6 @@ impl Outbox {
         while let Some(frame) = self.throttles.release(now) {
             let number = self.number();
             self.enqueue(number, frame);
-        }
-    }
-
-    /// Drops topic messages, the oldest first, until `too_many` gives no excess in bytes. The oldest is the queue's
-    /// first or the one that was held back first. Of a series, as many messages go at once as have to.
-    fn drop_oldest(&mut self, too_many: impl Fn(&Self) -> usize) {
-        loop {
-            let excess = too_many(self);
-            if excess == 0 {
-                return;
-            }
-            let queued = self.topics.front().map(|(number, _)| *number);
-            let held = self.throttles.oldest();
-            if held.is_some_and(|held| queued.is_none_or(|queued| held < queued)) {
-                self.throttles.drop_oldest();
-                self.dropped += 1;
-            } else if let Some((_, frames)) = self.topics.front_mut() {
-                let (bytes, count) = first_messages(frames, excess);
-                frames.advance(bytes);
-                if frames.is_empty() {
-                    self.topics.pop_front();
-                }
-                self.topic_bytes -= bytes;
-                self.dropped += count as u64;
-            } else {
-                debug_assert!(false, "bytes are counted that no message has");
-                return;
-            }
         }
     }
 }

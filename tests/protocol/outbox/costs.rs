@@ -1,6 +1,6 @@
 //! Bytes and costs of frames until they have been written.
 
-use pendularm::protocol::outbox::FRAME_BYTES;
+use pendularm::protocol::outbox::{FRAME_BYTES, MAX_TOPIC_BYTES};
 
 use super::Bench;
 
@@ -73,4 +73,45 @@ fn responses_cost_their_bytes_and_their_places_until_they_have_been_written() {
     bench.take(1, usize::MAX);
     bench.outbox.written(7);
     assert_eq!(bench.outbox.response_cost(), 0);
+}
+
+/// Freeing 100,000 takes milliseconds, which whoever serves everybody does not have.
+#[test]
+fn many_messages_that_are_given_up_are_handed_out_to_be_freed() {
+    const MANY: usize = 1000;
+    type Deed = fn(&mut Bench);
+    let held: [(Deed, usize); 5] = [
+        (|bench| bench.throttle("/t", 1_000_000, 1), MANY - 1),
+        (|bench| bench.outbox.forget("/t"), MANY),
+        (|bench| bench.respond("r", &["/t"]), MANY),
+        (|bench| bench.outbox.keep_topics(0), MANY),
+        (|bench| bench.push("/u", vec![b'x'; MAX_TOPIC_BYTES]), MANY),
+    ];
+    for (number, (deed, given_up)) in held.into_iter().enumerate() {
+        let mut bench = Bench::new();
+        bench.throttle("/t", 1_000_000, MANY);
+        for _ in 0..=MANY {
+            bench.push("/t", "m");
+        }
+        assert_eq!(bench.outbox.take_given_up(), None);
+        // The first is not held back.
+        assert_eq!(bench.take_all(), ["m"]);
+        deed(&mut bench);
+        let many = bench.outbox.take_given_up().map(|many| many.len());
+        assert_eq!(many, Some(given_up), "{number}");
+        assert_eq!(bench.outbox.take_given_up(), None);
+    }
+    let queued: [Deed; 2] = [
+        |bench| bench.outbox.keep_topics(0),
+        |bench| bench.push("/t", vec![b'x'; MAX_TOPIC_BYTES]),
+    ];
+    for deed in queued {
+        let mut bench = Bench::new();
+        for _ in 0..MANY {
+            bench.push("/t", "m");
+        }
+        deed(&mut bench);
+        let many = bench.outbox.take_given_up().map(|many| many.len());
+        assert_eq!(many, Some(MANY));
+    }
 }

@@ -100,6 +100,14 @@ impl Outgoing {
         let before = outbox.dropped();
         push(&mut outbox);
         self.charge.count_dropped(outbox.dropped() - before);
+        self.free_given_up(&mut outbox);
+    }
+
+    /// Frees messages that the outbox has given up: elsewhere, where they are many.
+    fn free_given_up(&self, outbox: &mut Outbox) {
+        if let Some(many) = outbox.take_given_up() {
+            free_elsewhere((many, self.charge.account.freeing()));
+        }
     }
 
     /// Adds a response or a status. Discards held-back and unencoded messages on `superseded` topics: they are older.
@@ -109,6 +117,7 @@ impl Outgoing {
             self.patience.note_first_response();
         }
         outbox.push_response(frame, superseded);
+        self.free_given_up(&mut outbox);
         self.unencoded.borrow_mut().supersede(superseded);
     }
 
@@ -122,6 +131,7 @@ impl Outgoing {
             }) => outbox.set_throttle(topic, Some((interval, queue_length))),
             None => outbox.forget(topic),
         }
+        self.free_given_up(&mut outbox);
         self.wake_writer();
     }
 
@@ -275,6 +285,7 @@ impl Outgoing {
             outbox.keep_topics(MESSAGES_LEFT);
             let unencoded = self.unencoded.borrow_mut().keep(0);
             let dropped = outbox.dropped() - before + unencoded;
+            self.free_given_up(&mut outbox);
             drop(outbox);
             self.charge.count_dropped(dropped);
             self.update_charge();

@@ -81,16 +81,14 @@ impl Throttles {
         self.count
     }
 
-    /// Sets or lifts the throttle of a topic. Gives what was held back and now is not, oldest first.
+    /// Sets the throttle of a topic. Moves what is held back beyond `queue_length` into `given_up`.
     pub(super) fn set(
         &mut self,
         topic: &Arc<str>,
-        throttle: Option<(Duration, usize)>,
-    ) -> VecDeque<(u64, Bytes)> {
-        let Some((interval, queue_length)) = throttle.filter(|(interval, _)| !interval.is_zero())
-        else {
-            return self.forget(topic);
-        };
+        interval: Duration,
+        queue_length: usize,
+        given_up: &mut Vec<Bytes>,
+    ) {
         let queue_length = queue_length.max(1);
         let throttle = self
             .topics
@@ -103,12 +101,15 @@ impl Throttles {
             });
         throttle.interval = interval;
         throttle.queue_length = queue_length;
-        for _ in queue_length..throttle.held.len() {
-            self.pop(topic);
-        }
+        let mut surplus = throttle.held.len().saturating_sub(queue_length);
+        let goes = |_, _: &Bytes| {
+            let goes = surplus > 0;
+            surplus = surplus.saturating_sub(1);
+            goes
+        };
+        self.give_up(topic, goes, given_up);
         self.schedule(topic);
         self.tidy();
-        VecDeque::new()
     }
 
     /// Lifts the throttle of a topic and gives what was held back, oldest first.
@@ -195,10 +196,51 @@ impl Throttles {
         self.oldest.keys().next().copied()
     }
 
-    /// Drops the oldest message that is held back.
-    pub(super) fn drop_oldest(&mut self) {
-        if let Some(topic) = self.oldest.values().next().cloned() {
-            self.pop(&topic);
+    /// Moves the oldest messages of all, which are of one topic, into `given_up`, as long as `goes` says so of the next
+    /// one's bytes: those that were produced before the message with number `before`, and before any of another topic.
+    pub(super) fn give_up_oldest(
+        &mut self,
+        before: u64,
+        mut goes: impl FnMut(usize) -> bool,
+        given_up: &mut Vec<Bytes>,
+    ) {
+        let mut topics = self.oldest.iter();
+        let Some((_, topic)) = topics.next() else {
+            return;
+        };
+        let before = topics.next().map_or(before, |(next, _)| before.min(*next));
+        let topic = Arc::clone(topic);
+        let goes = |number, frame: &Bytes| number < before && goes(frame.len());
+        self.give_up(&topic, goes, given_up);
+    }
+
+    /// Moves messages of a topic that are held back into `given_up`, the oldest first, as long as `goes` says so of the
+    /// next.
+    fn give_up(
+        &mut self,
+        topic: &Arc<str>,
+        mut goes: impl FnMut(u64, &Bytes) -> bool,
+        given_up: &mut Vec<Bytes>,
+    ) {
+        let Some(TopicThrottle { held, .. }) = self.topics.get_mut(topic) else {
+            return;
+        };
+        let count = held
+            .iter()
+            .take_while(|(number, frame)| goes(*number, frame))
+            .count();
+        let Some((oldest, _)) = held.front().filter(|_| count > 0) else {
+            return;
+        };
+        self.oldest.remove(oldest);
+        self.count -= count;
+        given_up.extend(held.drain(..count).map(|(_, frame)| {
+            self.bytes -= frame.len();
+            frame
+        }));
+        fit(held);
+        if let Some((next, _)) = held.front() {
+            self.oldest.insert(*next, Arc::clone(topic));
         }
     }
 
@@ -253,148 +295,4 @@ const fn is_stale(entries: usize, valid: usize) -> bool {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn an_index_is_rebuilt_once_more_than_half_of_it_and_the_slack_is_out_of_date() {
-        for valid in [0, 1, 10] {
-            assert!(!is_stale(2 * valid + 32, valid));
-            assert!(is_stale(2 * valid + 33, valid));
-            assert!(is_stale(1000, valid));
-        }
-    }
-
-    impl Throttles {
-        fn check(&self) {
-            let held = || self.topics.values().flat_map(|throttle| &throttle.held);
-            assert_eq!(self.count, held().count());
-            let bytes: usize = held().map(|(_, frame)| frame.len()).sum();
-            assert_eq!(self.bytes, bytes);
-            let oldest = held().map(|(number, _)| *number).min();
-            assert_eq!(self.oldest(), oldest);
-            let places = |throttle: &TopicThrottle| throttle.held.capacity();
-            let places: usize = self.topics.values().map(places).sum();
-            assert!(places <= 2 * self.count + 4 * self.topics.len());
-        }
-    }
-
-    /// Setting one topic's throttle again and again has the index of dues rebuilt.
-    #[test]
-    fn what_is_due_is_known_after_its_index_was_rebuilt() {
-        let [calm, busy] = ["/calm", "/busy"].map(Arc::<str>::from);
-        let second = Duration::from_secs(1);
-        let now = Instant::now();
-        let mut throttles = Throttles::default();
-        for (first, topic) in [(0, &calm), (2, &busy)] {
-            throttles.set(topic, Some((second, 1)));
-            for number in first..first + 2 {
-                let _ = throttles.offer(topic, number, Bytes::from_static(b"x"), now);
-            }
-        }
-        for _ in 0..10 * SLACK {
-            throttles.set(&busy, Some((second, 1)));
-        }
-        throttles.discard(&busy);
-        assert_eq!(throttles.next_release(), Some(now + second));
-        assert!(throttles.release(now + second).is_some());
-        assert_eq!(throttles.next_release(), None);
-    }
-
-    /// Whichever way messages leave, what is counted is what is there.
-    #[test]
-    fn messages_and_their_bytes_are_counted_as_long_as_they_are_held_back() {
-        let topics = ["/a", "/b"].map(Arc::<str>::from);
-        let second = Duration::from_secs(1);
-        let mut now = Instant::now();
-        let mut throttles = Throttles::default();
-        let fill = |throttles: &mut Throttles, first: u64, now| {
-            for (number, topic) in (first..).zip((0..10).flat_map(|_| &topics)) {
-                let frame = Bytes::from("x".repeat(1 + throttles.count));
-                let _ = throttles.offer(topic, number, frame, now);
-                throttles.check();
-            }
-        };
-        for topic in &topics {
-            throttles.set(topic, Some((second, 5)));
-        }
-        fill(&mut throttles, 0, now);
-        assert_eq!(throttles.count, 10);
-        throttles.set(&topics[0], Some((second, 2)));
-        throttles.check();
-        assert_eq!(throttles.count, 7);
-        for _ in 0..3 {
-            throttles.drop_oldest();
-            throttles.check();
-        }
-        assert_eq!(throttles.count, 4);
-        now += second;
-        assert!(throttles.release(now).is_some());
-        throttles.check();
-        assert_eq!(throttles.count, 3);
-        fill(&mut throttles, 100, now);
-        throttles.discard(&topics[0]);
-        throttles.check();
-        assert_eq!(throttles.count, 5);
-        assert_eq!(throttles.forget(&topics[1]).len(), 5);
-        throttles.check();
-        assert_eq!(throttles.count, 0);
-    }
-
-    /// Many are held back of one topic after the other; whatever has them go, none leaves its places behind.
-    #[test]
-    fn no_topic_keeps_the_places_of_what_was_held_back() {
-        let topics: Vec<Arc<str>> = (0..100).map(|n| Arc::from(format!("/{n}"))).collect();
-        let year = Duration::from_secs(365 * 24 * 3600);
-        let now = Instant::now();
-        let mut throttles = Throttles::default();
-        for (n, topic) in (0..).zip(&topics) {
-            throttles.set(topic, Some((year, 10_000)));
-            for number in 1001 * n..1001 * (n + 1) {
-                let _ = throttles.offer(topic, number, Bytes::from_static(b"x"), now);
-            }
-            match n % 3 {
-                0 => (0..1000).for_each(|_| throttles.drop_oldest()),
-                1 => drop(throttles.discard(topic)),
-                _ => drop(throttles.set(topic, Some((year, 1)))),
-            }
-            throttles.check();
-        }
-        for topic in &topics {
-            throttles.forget(topic);
-        }
-        throttles.check();
-        assert!(throttles.topics.capacity() + throttles.releases.capacity() <= 3 * SLACK);
-    }
-
-    /// One message is held back for a year, in front of all that comes after it.
-    #[test]
-    fn the_index_stays_small_though_what_is_oldest_stays_for_long() {
-        let mut throttles = Throttles::default();
-        let (slow, fast) = (Arc::<str>::from("/slow"), Arc::<str>::from("/fast"));
-        let mut now = Instant::now();
-        let mut number = 0;
-        let mut offer = |throttles: &mut Throttles, topic, now| {
-            number += 1;
-            throttles.offer(topic, number, Bytes::from_static(b"x"), now)
-        };
-        throttles.set(&slow, Some((Duration::from_secs(365 * 24 * 3600), 1)));
-        throttles.set(&fast, Some((Duration::from_millis(1), 1)));
-        for _ in 0..2 {
-            offer(&mut throttles, &slow, now);
-        }
-        for round in 0..10_000 {
-            offer(&mut throttles, &fast, now);
-            offer(&mut throttles, &fast, now);
-            match round % 4 {
-                0 => drop(throttles.discard(&fast)),
-                1 => drop(throttles.set(&fast, Some((Duration::from_millis(1), 1)))),
-                2 => now += Duration::from_millis(2),
-                _ => {}
-            }
-            let _ = throttles.release(now);
-            assert!(throttles.releases.len() <= 2 * 2 + SLACK + 1);
-        }
-        assert_eq!(throttles.oldest(), Some(2));
-    }
-}
+mod tests;
