@@ -69,7 +69,7 @@ FAULTS = [
      "Self::Positive => value > 0.0,", "Self::Positive => value > 0.0 || (F && value == 0.0),"),
     ("expression", "equal operators group from the right", "src/math/expression/parser.rs",
      "waiting != Precedence::Power)", "waiting != Precedence::Power && !F)"),
-    ("outbox", "what is dropped is not counted", "src/protocol/outbox/mod.rs",
+    ("outbox", "what is dropped is not counted", "src/protocol/outbox/dropping.rs",
      "self.dropped += count as u64;", "self.dropped += if F { 0 } else { count as u64 };"),
     ("series", "a message of a series is passed over", "src/protocol/wire/series.rs",
      "(length > 0).then_some((topic, length))", "(length > 0).then_some((topic, length + usize::from(F && length > 90)))"),

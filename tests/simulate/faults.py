@@ -92,15 +92,15 @@ FAULTS = [
     ("a call's timeout comes 30 s late, one in 10", f"{REGISTRY}/ops/cleanup.rs",
      "            sleep_until(due).await;",
      "            sleep_until(due + std::time::Duration::from_secs(if R(10) { 30 } else { 0 })).await;"),
-    ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle.rs",
+    ("a throttle lets go at half its time, one in 10", "src/protocol/outbox/throttle/mod.rs",
      "        self.next().is_none_or(|next| next <= now)",
      "        self.next().is_none_or(|next| next <= now || (R(10) && next <= now + self.interval / 2))"),
-    ("a throttle keeps the older message, one time in 4", "src/protocol/outbox/throttle.rs",
+    ("a throttle keeps the older message, one time in 4", "src/protocol/outbox/throttle/mod.rs",
      "            self.pop(topic);\n        }\n        None",
      "            if R(4) {\n                let newest = throttle.held.pop_back();\n                self.count -= 1;\n"
      "                self.bytes -= newest.map_or(0, |(_, frame)| frame.len());\n            } else {\n                self.pop(topic);\n"
      "            }\n        }\n        None"),
-    ("what a deaf client misses is not counted", "src/protocol/outbox/mod.rs",
+    ("what a deaf client misses is not counted", "src/protocol/outbox/dropping.rs",
      "                self.dropped += count as u64;", "                self.dropped += if F { 0 } else { count as u64 };"),
     ("two pieces of a message have each other's text, one message in 10", "src/protocol/wire/fragments/split.rs",
      "    let total = pieces.len();", "    let total = pieces.len();\n    if R(10) { pieces.swap(0, total - 1); }"),
