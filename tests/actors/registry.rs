@@ -146,7 +146,7 @@ fn a_message_of_a_node_on_a_topic_that_the_runtime_listens_to_reaches_clients_an
         let log = Rc::clone(&heard);
         let node = Node {
             on_message: Box::new(move |message| {
-                log.borrow_mut().push(message.msg.get().to_owned());
+                log.borrow_mut().push(message.heard.msg.get().to_owned());
             }),
             ..Node::default()
         };

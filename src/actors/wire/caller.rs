@@ -17,6 +17,7 @@ use crate::actors::ConnectionId;
 use crate::actors::node::{Done, FrameOut, Respond, Unserved};
 use crate::actors::resources::budget::{Account, NoRoom, Promise};
 use crate::protocol::catalog::{Service, Topic};
+use crate::protocol::messages::trajectory::Heard;
 use crate::protocol::messages::{self, ErrorForm};
 use crate::protocol::op::Arguments;
 use crate::protocol::wire::payload::Payload;
@@ -39,8 +40,8 @@ pub struct ServiceCall {
 
 /// A client's message on a topic that the runtime subscribes to, as the registry has it.
 pub struct TopicMessage {
-    /// The message as it came.
-    pub msg: Payload,
+    /// The message, as far as the runtime needs it.
+    pub heard: Heard,
     /// The way back, for an error status.
     pub respond: Recipient<Respond>,
     /// The client.

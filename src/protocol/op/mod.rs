@@ -16,6 +16,7 @@ use std::time::Duration;
 
 use serde_json::value::RawValue;
 
+use super::messages::trajectory::Heard;
 use super::messages::{ErrorForm, Level};
 pub use crate::protocol::limits::MAX_NAME;
 use crate::protocol::wire::fragments::Piece;
@@ -76,7 +77,7 @@ pub enum Op {
         /// The message, an object.
         msg: Payload,
         /// The part of it that the runtime's own listener needs, where the message is long.
-        heard: Option<Payload>,
+        heard: Option<Heard>,
     },
     /// The same for messages that go out as they have come in.
     PublishLines(Series),
@@ -146,7 +147,7 @@ impl Op {
     fn allocated(&self) -> usize {
         match self {
             Self::Publish { msg, heard, .. } => {
-                msg.allocated() + heard.as_ref().map_or(0, Payload::allocated)
+                msg.allocated() + heard.as_ref().map_or(0, |heard| heard.msg.allocated())
             }
             Self::PublishLines(lines) => lines.frames.len(),
             Self::CallService(CallService { args, .. })

@@ -27,6 +27,7 @@ use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::op::Arguments;
+use pendularm::protocol::wire::payload::Payload;
 use serde_json::value::to_raw_value;
 use serde_json::{Value, json};
 use tokio::sync::oneshot;
@@ -196,7 +197,7 @@ where
     async fn trajectory(&self, msg: Value, id: Option<Value>) {
         let (done, ended) = oneshot::channel();
         self.routes.listeners[&Topic::JointTrajectory](TopicMessage {
-            msg: to_raw_value(&msg).unwrap().into(),
+            heard: Payload::from(to_raw_value(&msg).unwrap()).into(),
             respond: self.probe.clone().recipient(),
             connection: CALLER,
             id: id.map(|id| to_raw_value(&id).unwrap().into()),

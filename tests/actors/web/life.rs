@@ -84,3 +84,23 @@ fn while_the_client_is_not_read_it_need_not_show_life() {
         assert_eq!(gateway.gauges.connections(), 1);
     });
 }
+
+/// Its pieces of other messages grow old meanwhile, each at another moment, and are forgotten.
+#[test]
+fn a_message_has_its_minute_whatever_is_forgotten_meanwhile() {
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let mut socket = open(&gateway, WIDE).await;
+        for number in 0..8 {
+            let piece = json!({"op": "fragment", "id": number, "data": "{", "num": 0, "total": 2});
+            send(&mut socket, piece).await;
+            sleep(Duration::from_secs(7)).await;
+        }
+        let mut begins = Vec::new();
+        append(&mut begins, opcode::TEXT, [0; 4], b"{");
+        socket.stream().write_all(&begins).await.unwrap();
+        let began = Instant::now();
+        while let Ok(Event::Ping(_)) = socket.next_event().await {}
+        assert_elapsed(began, FRAME_TIME);
+    });
+}

@@ -1,6 +1,8 @@
 //! Messages over a WebSocket: what a long one costs, and the forms in which they come.
 
 use super::*;
+use crate::virtual_time::Held;
+use pendularm_client::websocket::handshake;
 
 const PAUSE: &str = Service::Pause.name();
 /// A gateway whose `/arm_sim/pause` answers at once.
@@ -29,6 +31,41 @@ fn the_longest_message_of_a_websocket_counts_while_it_is_open() {
         drop(socket);
         sleep(Duration::from_secs(60)).await;
         assert_eq!(memory.held(), 0);
+    });
+}
+
+/// They are charged until they have been read, and keep no memory after that.
+#[test]
+fn messages_that_come_with_the_request_count_until_they_have_been_read() {
+    const ROOM: usize = 64 * 1024;
+    in_virtual_time(async {
+        let held = Held::default();
+        let mut nodes = Nodes::default();
+        Node::holding(&held).attach(&mut nodes, &[Service::Pause], &[]);
+        let memory = Memory::default();
+        let gateway = Gateway::within(memory.clone(), nodes).await;
+        let idle = open(&gateway, WIDE).await;
+        settle().await;
+        let at_rest = memory.held();
+        let mut bytes = handshake("127.0.0.1:9095", "/", "").into_bytes();
+        let call = json!({"op": "call_service", "service": PAUSE, "id": 1}).to_string();
+        append(&mut bytes, LAST | opcode::TEXT, [0; 4], call.as_bytes());
+        let text = "x".repeat(1000);
+        let message = json!({"op": "publish", "topic": "/nobody", "msg": {"data": text}});
+        while bytes.len() < ROOM - 1100 {
+            let message = message.to_string();
+            append(&mut bytes, LAST | opcode::TEXT, [0; 4], message.as_bytes());
+        }
+        let mut stream = connect(&gateway, WIDE);
+        stream.write_all(&bytes).await.unwrap();
+        settle().await;
+        assert_eq!(held.count(), 1);
+        assert!(memory.held() >= 2 * at_rest + ROOM);
+        held.answer();
+        settle().await;
+        // The reader keeps a buffer that has grown with the messages of a thousand bytes.
+        assert!(memory.held() < 2 * at_rest + 4 * text.len());
+        drop((idle, stream));
     });
 }
 
@@ -128,5 +165,24 @@ fn a_message_comes_as_cbor_or_as_cdr_in_cbor_as_each_subscriber_wants_it() {
             "{plain:?}"
         );
         assert!(holds(&raw, as_cdr) && !holds(&raw, as_cbor), "{raw:?}");
+    });
+}
+
+/// The handshake has shown already that this is no request of a browser for another program.
+#[test]
+fn a_message_that_looks_like_a_head_is_malformed_and_no_more() {
+    in_virtual_time(async {
+        let gateway = pausing_gateway().await;
+        let mut socket = open(&gateway, WIDE).await;
+        let mut bytes = Vec::new();
+        append(&mut bytes, LAST | opcode::TEXT, [0; 4], b"Host: x");
+        socket.stream().write_all(&bytes).await.unwrap();
+        send(
+            &mut socket,
+            json!({"op": "call_service", "service": PAUSE, "id": 1}),
+        )
+        .await;
+        let answer = receive_text(&mut socket).await;
+        assert!(answer.contains("\"id\":1"), "{answer}");
     });
 }

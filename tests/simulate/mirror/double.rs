@@ -8,7 +8,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::Setpoint;
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::Service;
-use pendularm::protocol::messages::trajectory::joint_trajectory;
+use pendularm::protocol::messages::trajectory::Heard;
 use serde_json::{Value, json};
 use tokio::time::Instant;
 
@@ -97,8 +97,8 @@ impl<const N: usize> Mirror<N> {
     }
 
     /// A trajectory: its last point is the setpoint.
-    pub(super) fn point(&mut self, msg: &serde_json::value::RawValue) {
-        if let Ok(request) = joint_trajectory(msg, &joint_names::<N>())
+    pub(super) fn point(&mut self, heard: &Heard) {
+        if let Ok(request) = heard.setpoint(&joint_names::<N>())
             && let (Ok(position), Ok(velocity)) =
                 (request.position.try_into(), request.velocity.try_into())
         {

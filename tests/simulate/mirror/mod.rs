@@ -134,7 +134,7 @@ impl<const N: usize> Handler<Sent> for Tap<N> {
     type Result = ();
 
     fn handle(&mut self, Sent(message): Sent, ctx: &mut Context<Self>) {
-        let msg = message.msg.clone();
+        let heard = message.heard.clone();
         let Some(route) = self.routes.listeners.get(&Topic::JointTrajectory) else {
             return;
         };
@@ -143,7 +143,7 @@ impl<const N: usize> Handler<Sent> for Tap<N> {
         let after = self.snapshot().into_actor(self);
         let input = before.map(move |arm, tap: &mut Self, _: &mut Context<Self>| {
             tap.mirror.observe(arm.as_ref());
-            tap.mirror.point(msg.raw());
+            tap.mirror.point(&heard);
         });
         ctx.wait(input.then(|(), _, _| {
             after.map(|arm, tap: &mut Self, _: &mut Context<Self>| tap.mirror.observe(arm.as_ref()))

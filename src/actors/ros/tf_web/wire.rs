@@ -137,7 +137,7 @@ fn read_wish(arguments: &Arguments, links: usize) -> Result<ReadWish, Rejections
 
 /// Goals that are published; an error status for what is none.
 fn goals<const N: usize>(wish: Recipient<WishFrames>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_goal(message.msg.raw(), N) {
+    Box::new(move |message| match read_goal(message.heard.msg.raw(), N) {
         Ok(goal) => wish.do_send(goal),
         Err(rejections) => message.refuse(Topic::TfWebGoal, &rejections),
     })
@@ -161,7 +161,7 @@ fn read_goal(msg: &RawValue, links: usize) -> Result<WishFrames, Rejections> {
 
 /// Ends of such goals; an error status for what is none.
 fn cancellations(forget: Recipient<ForgetFrames>) -> Route<TopicMessage> {
-    Box::new(move |message| match read_cancel(message.msg.raw()) {
+    Box::new(move |message| match read_cancel(message.heard.msg.raw()) {
         Ok(id) => forget.do_send(ForgetFrames::Published(id)),
         Err(rejections) => message.refuse(Topic::TfWebCancel, &rejections),
     })

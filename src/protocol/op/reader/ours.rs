@@ -8,7 +8,7 @@ use serde_json::value::{RawValue, to_raw_value};
 
 use super::OpReader;
 use crate::protocol::catalog::{Field, Topic};
-use crate::protocol::messages::trajectory;
+use crate::protocol::messages::trajectory::{self, Heard};
 use crate::protocol::op::{Arguments, MAX_ARGS, Problem};
 use crate::protocol::wire::json;
 use crate::protocol::wire::payload::Payload;
@@ -39,15 +39,18 @@ impl OpReader<'_> {
     }
 
     /// Returns the part of a long message that the runtime itself needs, where it listens to the topic.
-    pub(super) fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<Payload>, Problem> {
+    pub(super) fn heard(&self, topic: &str, msg: &Payload) -> Result<Option<Heard>, Problem> {
         let is_ours = Topic::from_name(topic) == Some(Topic::JointTrajectory);
         if !is_ours || msg.get().len() <= USUAL {
             return Ok(None);
         }
-        let heard = trajectory::condensed(msg.raw());
-        self.within(MAX_ARGS, "msg", heard.as_deref().unwrap_or(msg.get()))?;
-        let heard = heard.and_then(|text| RawValue::from_string(text).ok());
-        Ok(heard.map(Payload::from))
+        let Some((text, left_out)) = trajectory::condensed(msg.raw()) else {
+            self.within(MAX_ARGS, "msg", msg.get())?;
+            return Ok(None);
+        };
+        self.within(MAX_ARGS, "msg", &text)?;
+        let msg = RawValue::from_string(text).ok().map(Payload::from);
+        Ok(msg.map(|msg| Heard { msg, left_out }))
     }
 }
 

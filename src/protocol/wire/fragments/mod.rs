@@ -161,7 +161,9 @@ impl Fragments {
             }
             _ => {}
         }
-        if self.bytes + bytes > MAX_FRAME {
+        let replaced = self.messages.get(id).and_then(|one| one.pieces.get(&num));
+        let replaced = replaced.map_or(0, String::len);
+        if self.bytes - replaced + bytes > MAX_FRAME {
             return Err(FragmentError::TooLong);
         }
         Ok(())
@@ -197,6 +199,18 @@ mod tests {
             num,
             total,
         }
+    }
+
+    #[test]
+    fn a_piece_that_comes_twice_takes_the_room_of_the_first() {
+        let half = "x".repeat(MAX_FRAME / 2);
+        let (mut fragments, now) = (Fragments::default(), Instant::now());
+        for _ in 0..3 {
+            assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
+        }
+        let whole = fragments.take(piece("a", 1, 2, &half), now);
+        assert_eq!(whole, Ok(Some(half.repeat(2))));
+        assert_eq!(fragments.bytes(), 0);
     }
 
     #[test]

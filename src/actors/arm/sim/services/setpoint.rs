@@ -10,7 +10,7 @@ use crate::actors::wire::{Nodes, Route, TopicMessage};
 use crate::math::pid::Setpoint;
 use crate::math::simulation::ArmInput;
 use crate::protocol::catalog::Topic;
-use crate::protocol::messages::trajectory::{TrajectoryError, joint_trajectory};
+use crate::protocol::messages::trajectory::TrajectoryError;
 
 /// Has the registry bring this file's setpoints.
 pub(super) fn attach<const N: usize>(arm: &Addr<ArmSim<N>>, nodes: &mut Nodes) {
@@ -49,7 +49,7 @@ fn setpoints<const N: usize>(arm: Recipient<SetSetpoint<N>>) -> Route<TopicMessa
 }
 
 fn read_setpoint<const N: usize>(message: &TopicMessage) -> Result<Setpoint<N>, TrajectoryError> {
-    let request = joint_trajectory(message.msg.raw(), &joint_names::<N>())?;
+    let request = message.heard.setpoint(&joint_names::<N>())?;
     // The reader has checked how many they are.
     let array = |values: &[f64]| std::array::from_fn(|i| values.get(i).copied().unwrap_or(0.0));
     Ok(Setpoint {

@@ -43,7 +43,7 @@ impl Reader {
                 return self.perform(None, Op::PublishLines(lines), share).await;
             }
             Cut::Error(FrameError::NotAnObject(start))
-                if !self.speaks_json && is_host_line(&start) =>
+                if !self.speaks_json && !self.takes_binary() && is_host_line(&start) =>
             {
                 return self.refuse(Foreign::Http.explanation());
             }

@@ -7,6 +7,7 @@ use std::future::poll_fn;
 use std::rc::Rc;
 use std::task::Poll;
 
+use bytes::Bytes;
 use futures_util::{SinkExt, StreamExt};
 use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::task::yield_now;
@@ -43,16 +44,16 @@ pub(super) struct Link<S> {
 
 impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
     /// Takes a stream on which the handshake has been made; `behind` came after it.
-    pub(super) async fn open(stream: S, behind: &[u8], shared: &Shared) -> Rc<Self> {
+    pub(super) async fn open(stream: S, behind: Bytes, shared: &Shared) -> Rc<Self> {
         let life = Rc::new(Cell::new(Instant::now()));
-        let mut watched = Watched::new(
+        let watched = Watched::new(
             stream,
+            behind,
             Rc::clone(&life),
             Rc::clone(&shared.outgoing),
             Unfinished::new(&shared.account),
             shared.account.take(0),
         );
-        watched.follow(behind);
         let config = WebSocketConfig::default()
             .read_buffer_size(READ_BUFFER)
             .write_buffer_size(FRAGMENT)
@@ -60,8 +61,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
             .max_message_size(Some(MAX_FRAME))
             .max_frame_size(Some(MAX_FRAME));
         let role = Role::Server;
-        let socket =
-            WebSocketStream::from_partially_read(watched, behind.to_vec(), role, Some(config));
+        let socket = WebSocketStream::from_raw_socket(watched, role, Some(config));
         Rc::new(Self {
             socket: RefCell::new(socket.await),
             life,

@@ -80,7 +80,7 @@ impl ClientSession {
             },
         };
         let _ = self.shared.registry.send(quiet).await;
-        let link = Link::open(stream, &behind.bytes, &self.shared).await;
+        let link = Link::open(stream, behind.bytes.freeze(), &self.shared).await;
         let input = Input::new(Rc::clone(&link), Rc::clone(&self.shared));
         let output = Output {
             link,
@@ -99,8 +99,8 @@ struct Input<S> {
     next_ping: Instant,
     /// Since when a sign of life has been waited for.
     asked: Option<Instant>,
-    /// When the last read ended.
-    read_until: Instant,
+    /// When the last read ended; none while one is under way, also one that was given up.
+    unread_since: Option<Instant>,
     /// The message that has come, while some of it has not been read.
     line: Option<OneLine>,
 }
@@ -113,7 +113,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
             shared,
             next_ping: now + PING_INTERVAL,
             asked: None,
-            read_until: now,
+            unread_since: Some(now),
             line: None,
         }
     }
@@ -175,8 +175,8 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Input<S> {
 impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
     async fn read(&mut self, chunk: &mut BytesMut) -> io::Result<usize> {
         // While nothing was read, no sign of life could be seen.
-        let unread = self.read_until.elapsed();
-        self.read_until = Instant::now();
+        let unread = self.unread_since.take();
+        let unread = unread.map_or(Duration::ZERO, |since| since.elapsed());
         self.asked = self.asked.map(|asked| asked + unread);
         self.link.socket.borrow_mut().get_mut().read_on(unread);
         let before = chunk.len();
@@ -202,7 +202,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Inbound for Input<S> {
                 }
             }
         }
-        self.read_until = Instant::now();
+        self.unread_since = Some(Instant::now());
         Ok(chunk.len() - before)
     }
 

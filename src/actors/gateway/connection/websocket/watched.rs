@@ -10,11 +10,13 @@ use std::rc::Rc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 
+use bytes::Bytes;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::Instant;
 
 use super::heads::FrameHeads;
 use crate::actors::gateway::connection::outgoing::Outgoing;
+use crate::actors::gateway::connection::transport::CHUNK;
 use crate::actors::gateway::connection::unfinished::Unfinished;
 use crate::actors::gateway::limits::FRAME_TIME;
 use crate::actors::resources::budget::Share;
@@ -29,6 +31,8 @@ const TURN: usize = 32 * 1024;
 /// none. And what it has sent of a message that is not complete yet.
 pub(super) struct Watched<S> {
     stream: S,
+    /// Bytes that have come before, and are read first.
+    behind: Bytes,
     life: Rc<Cell<Instant>>,
     /// Hears of every byte that the other side takes.
     outgoing: Rc<Outgoing>,
@@ -59,16 +63,18 @@ const CONTROL_HEAD: usize = 6;
 const CONTROL_COST: usize = 1024;
 
 impl<S> Watched<S> {
-    /// A stream on which nothing has come yet; `life` is when its other side last gave a sign of life.
+    /// A stream on which `behind` has come so far; `life` is when its other side last gave a sign of life.
     pub(super) fn new(
         stream: S,
+        behind: Bytes,
         life: Rc<Cell<Instant>>,
         outgoing: Rc<Outgoing>,
         unfinished: Unfinished,
         unsent: Share,
     ) -> Self {
-        Self {
+        let mut watched = Self {
             stream,
+            behind,
             life,
             outgoing,
             is_blocked: false,
@@ -80,11 +86,13 @@ impl<S> Watched<S> {
             is_complete: false,
             unsent,
             turn: TURN,
-        }
+        };
+        watched.settle(0);
+        watched
     }
 
     /// Bytes have come.
-    pub(super) fn follow(&mut self, bytes: &[u8]) {
+    fn follow(&mut self, bytes: &[u8]) {
         let frame = usize::try_from(self.heads.follow(bytes)).unwrap_or(MAX_FRAME);
         if frame > READ_BUFFER {
             self.longest = self.longest.max(frame.min(MAX_FRAME));
@@ -138,7 +146,8 @@ impl<S> Watched<S> {
         // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
         // kept.
         let unfinished = (2 * pending).min(3 * MAX_FRAME);
-        self.unfinished.keep(unfinished.max(self.longest));
+        let behind = if self.behind.is_empty() { 0 } else { CHUNK };
+        self.unfinished.keep(unfinished.max(self.longest) + behind);
     }
 
     /// When the message that has begun is late.
@@ -158,7 +167,17 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             return Poll::Pending;
         }
         let before = buffer.filled().len();
-        let polled = Pin::new(&mut self.stream).poll_read(cx, buffer);
+        let polled = if self.behind.is_empty() {
+            Pin::new(&mut self.stream).poll_read(cx, buffer)
+        } else {
+            let length = self.behind.len().min(buffer.remaining());
+            buffer.put_slice(&self.behind.split_to(length));
+            if self.behind.is_empty() {
+                // Its memory goes.
+                self.behind = Bytes::new();
+            }
+            Poll::Ready(Ok(()))
+        };
         let received = buffer.filled().len() - before;
         self.turn = self.turn.saturating_sub(received);
         if received > 0 {

@@ -23,6 +23,7 @@ use crate::actors::gateway::registry::tables::census::Use;
 use crate::actors::gateway::registry::tables::services::Provider;
 use crate::actors::wire::TopicMessage;
 use crate::protocol::catalog::{Direction, Service, Topic};
+use crate::protocol::messages::trajectory::Heard;
 use crate::protocol::messages::{self, Level};
 use crate::protocol::names;
 use crate::protocol::op::Op;
@@ -150,7 +151,7 @@ impl Registry {
         origin: FrameOrigin,
         topic: &str,
         msg: &Payload,
-        heard: Option<Payload>,
+        heard: Option<Heard>,
         ctx: &mut Context<Self>,
     ) -> Handled {
         if let Err(why) = refuse_runtime_topic(topic) {
@@ -184,7 +185,7 @@ impl Registry {
         }
         let (done, ended) = oneshot::channel();
         listener(TopicMessage {
-            msg: heard.unwrap_or_else(|| msg.clone()),
+            heard: heard.unwrap_or_else(|| msg.clone().into()),
             respond: ctx.address().recipient(),
             connection: origin.from,
             id: origin.id,
