@@ -1,10 +1,11 @@
 //! The last report: files of one folder, by plain names. They are read piece by piece: however long one is, it
-//! takes a piece's memory.
+//! takes a piece's memory, and it is open only while a piece is read.
 //!
 //! **Invariant:** what is served lies in the folder, also where a link in it points elsewhere, and is of a kind that is
 //! listed.
 
-use std::io::{self, Read, Take};
+use std::fs::{self, Metadata};
+use std::io::{self, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 /// Path under which it is served.
@@ -38,13 +39,13 @@ pub struct FileName {
     pub kind: &'static str,
 }
 
-/// A file that is being read.
+/// A file that is being read: as it was when it was found, or not at all.
 #[derive(Debug)]
 pub struct File {
-    /// Its length when it was opened \[bytes\].
-    pub length: u64,
-    /// The bytes of that length that have not been read.
-    rest: Take<std::fs::File>,
+    path: PathBuf,
+    found: Metadata,
+    /// Bytes of it that have been read.
+    read: u64,
 }
 
 /// Whether there is a report in the folder: one look at the disk.
@@ -78,44 +79,58 @@ impl FileName {
         Some(Self { path, kind })
     }
 
-    /// The file in `folder`; `None` if there is none to be had.
-    fn find(&self, folder: &Path) -> Option<PathBuf> {
-        let folder = folder.canonicalize().ok()?;
-        let path = folder.join(&self.path).canonicalize().ok()?;
-        if !path.starts_with(&folder) {
-            return None;
-        }
-        // Asked first: opening what is no file, a pipe say, could wait for ever.
-        path.metadata().ok()?.is_file().then_some(path)
-    }
-
-    /// Opens the file in `folder`; `None` if there is none to be had. It may block for as long as the disk takes.
+    /// The file in `folder`, to be read; `None` if there is none to be had. It may block for as long as the disk takes.
     ///
     /// # Errors
     ///
     /// The system's, where the file can't be opened: too many are open, or it is not ours to read.
-    pub fn open(&self, folder: &Path) -> io::Result<Option<File>> {
-        let Some(path) = self.find(folder) else {
+    pub fn find(&self, folder: &Path) -> io::Result<Option<File>> {
+        let Some((path, found)) = self.look(folder) else {
             return Ok(None);
         };
-        let file = std::fs::File::open(path)?;
-        let length = file.metadata()?.len();
-        let rest = file.take(length);
-        Ok(Some(File { length, rest }))
+        fs::File::open(&path)?;
+        Ok(Some(File {
+            path,
+            found,
+            read: 0,
+        }))
+    }
+
+    /// Where the file is, and what it is: `None` unless it is a file in `folder`.
+    fn look(&self, folder: &Path) -> Option<(PathBuf, Metadata)> {
+        let folder = folder.canonicalize().ok()?;
+        let path = folder.join(&self.path).canonicalize().ok()?;
+        let found = path.metadata().ok()?;
+        (path.starts_with(&folder) && found.is_file()).then_some((path, found))
     }
 }
 
 impl File {
-    /// The next piece, of at most so many bytes: none at the end, which comes early if the file has become shorter. It
-    /// may block as [`FileName::open`] does.
+    /// Its length \[bytes\].
+    #[must_use]
+    pub fn length(&self) -> u64 {
+        self.found.len()
+    }
+
+    /// The next piece, of at most so many bytes: none at the end. It may block as [`FileName::find`] does.
     ///
     /// # Errors
     ///
-    /// The system's, where the file can't be read.
+    /// The system's, where the file can't be read; and where it is no longer the one that was found.
     pub fn next_piece(&mut self, most: usize) -> io::Result<Vec<u8>> {
+        // Asked first: opening what is no file, a pipe say, could wait for ever.
+        let now = self.path.metadata()?;
+        let is_same = now.len() == self.length() && now.modified()? == self.found.modified()?;
+        if !now.is_file() || !is_same {
+            return Err(io::Error::other(
+                "the file has changed since its first piece",
+            ));
+        }
+        let mut file = fs::File::open(&self.path)?;
+        file.seek(SeekFrom::Start(self.read))?;
         let mut piece = Vec::with_capacity(most);
-        let most = u64::try_from(most).unwrap_or(u64::MAX);
-        self.rest.by_ref().take(most).read_to_end(&mut piece)?;
+        file.take(most as u64).read_to_end(&mut piece)?;
+        self.read += piece.len() as u64;
         Ok(piece)
     }
 }
@@ -167,23 +182,39 @@ mod tests {
     }
 
     #[test]
-    fn a_file_is_read_in_pieces_as_long_as_it_was_when_it_was_opened() {
+    fn a_file_is_read_in_pieces_as_long_as_it_stays_the_same() {
         let folder = std::env::temp_dir().join(format!("pendularm-report-{}", std::process::id()));
-        std::fs::create_dir_all(&folder).unwrap();
+        fs::create_dir_all(&folder).unwrap();
         let path = folder.join("a.csv");
         let name = FileName::parse("a.csv").unwrap();
-        assert!(name.open(&folder).unwrap().is_none());
-        for (later, pieces) in [
-            ("1234567890", ["1234", "5678", "9", ""]),
-            ("12345", ["1234", "5", "", ""]),
-        ] {
-            std::fs::write(&path, "123456789").unwrap();
-            let mut file = name.open(&folder).unwrap().unwrap();
-            std::fs::write(&path, later).unwrap();
-            assert_eq!(file.length, 9);
-            let read = pieces.map(|_| String::from_utf8(file.next_piece(4).unwrap()).unwrap());
-            assert_eq!(read, pieces);
-        }
-        std::fs::remove_dir_all(&folder).unwrap();
+        assert!(name.find(&folder).unwrap().is_none());
+        let begun = || {
+            fs::write(&path, "123456789").unwrap();
+            let mut file = name.find(&folder).unwrap().unwrap();
+            assert_eq!(file.length(), 9);
+            assert_eq!(file.next_piece(4).unwrap(), b"1234");
+            file
+        };
+        let mut file = begun();
+        assert_eq!(file.next_piece(4).unwrap(), b"5678");
+        assert_eq!(file.next_piece(4).unwrap(), b"9");
+        assert_eq!(file.next_piece(4).unwrap(), b"");
+        let mut longer = begun();
+        fs::write(&path, "1234567890").unwrap();
+        longer.next_piece(4).unwrap_err();
+        let mut newer = begun();
+        fs::write(&path, "abcdefghi").unwrap();
+        let later = newer.found.modified().unwrap() + std::time::Duration::from_secs(1);
+        let opened = fs::File::options().write(true).open(&path).unwrap();
+        opened.set_modified(later).unwrap();
+        newer.next_piece(4).unwrap_err();
+        let mut gone = begun();
+        fs::remove_file(&path).unwrap();
+        gone.next_piece(4).unwrap_err();
+        let mut folder_now = begun();
+        fs::remove_file(&path).unwrap();
+        fs::create_dir(&path).unwrap();
+        folder_now.next_piece(4).unwrap_err();
+        fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -19,8 +19,10 @@ use super::{Site, page, report, upgrade};
 
 /// How long a client may take no byte of an answer.
 pub const TAKE_TIME: Duration = Duration::from_secs(10);
-/// How long an answer may take in all: the largest file over a slow line.
+/// How long an answer may take for each stretch of [`STRETCH`] bytes that it begins: 280 kB/s.
 pub const ANSWER_TIME: Duration = Duration::from_secs(120);
+/// Bytes of an answer that may take [`ANSWER_TIME`].
+pub const STRETCH: u64 = 32 * 1024 * 1024;
 /// Bytes of an answer that are offered at a time.
 const PIECE: usize = 64 * 1024;
 /// How long, and how many bytes, of what follows a request are swallowed so that the answer can still be read: closing
@@ -228,7 +230,7 @@ const NO_SUCH_FILE: &str = "there is no such file in the report; the report is a
 /// A file of the report, and the answer to be sent with it; or why there is none.
 async fn open_report(name: report::FileName, site: &Site) -> (HttpResponse, Option<report::File>) {
     let (kind, folder) = (name.kind, site.report.clone());
-    match site.at_disk(move || name.open(&folder)).await {
+    match site.at_disk(move || name.find(&folder)).await {
         Some(Ok(Some(file))) => (
             HttpResponse::file(kind, report::POLICY, &[][..]),
             Some(file),
@@ -267,8 +269,9 @@ async fn answer_with<S: AsyncRead + AsyncWrite + Unpin>(
     mut file: report::File,
     site: &Site,
 ) {
+    let length = file.length();
     let send = async {
-        let head = response.head_of(file.length);
+        let head = response.head_of(length);
         take(stream.write_all(head.as_bytes())).await?;
         loop {
             let read = move || file.next_piece(PIECE).map(|piece| (piece, file));
@@ -282,9 +285,15 @@ async fn answer_with<S: AsyncRead + AsyncWrite + Unpin>(
         }
         take(stream.shutdown()).await
     };
-    if matches!(timeout(ANSWER_TIME, send).await, Ok(Some(()))) {
+    if matches!(timeout(answer_time(length), send).await, Ok(Some(()))) {
         swallow(stream).await;
     }
+}
+
+/// How long an answer of so many bytes may take in all.
+fn answer_time(length: u64) -> Duration {
+    let stretches = length / STRETCH + 1;
+    ANSWER_TIME.saturating_mul(u32::try_from(stretches).unwrap_or(u32::MAX))
 }
 
 /// Reads some of what follows a request, so that its answer can still be read.

@@ -1,10 +1,11 @@
 //! Requests of HTTP: heads that do not come, and answers that are not taken.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::*;
 use pendularm::actors::gateway::connection::admission::MAX_HEADS;
 use pendularm::web::access::Access;
+use pendularm::web::serve::{ANSWER_TIME, STRETCH, TAKE_TIME};
 use pendularm::web::{MAX_REQUESTS, Site};
 
 const HEAD: &str = "GET / HTTP/1.1\r\nHost: 127.0.0.1:9095\r\n";
@@ -122,6 +123,9 @@ fn a_file_of_a_report_may_have_any_length_and_is_sent_to_everybody() {
             assert_eq!(stream.read_u8().await.unwrap(), b'H');
             deaf.push(stream);
         }
+        settle().await;
+        #[cfg(target_os = "linux")]
+        assert_eq!(open_files_in(&folder), 0, "all wait for their clients");
         let mut late = connect_through(&gateway, &admission, WIDE);
         late.write_all(request.as_bytes()).await.unwrap();
         let mut begins = vec![0; 4 << 20];
@@ -136,6 +140,53 @@ fn a_file_of_a_report_may_have_any_length_and_is_sent_to_everybody() {
             stream.read_exact(&mut more).await.unwrap();
         }
         std::fs::remove_dir_all(&folder).unwrap();
+    });
+}
+
+/// How many files of a folder this process has open.
+#[cfg(target_os = "linux")]
+fn open_files_in(folder: &Path) -> usize {
+    let open = std::fs::read_dir("/proc/self/fd").unwrap();
+    open.filter_map(|entry| std::fs::read_link(entry.unwrap().path()).ok())
+        .filter(|path| path.starts_with(folder))
+        .count()
+}
+
+/// A client that takes 320 KiB a second gets 48 MiB, in two stretches of time; one that takes a piece just before it
+/// would be given up for taking none gets a short file's time.
+#[test]
+fn a_file_of_a_report_has_time_for_its_length() {
+    const PIECE: usize = 64 * 1024;
+    in_virtual_time(async {
+        let gateway = Gateway::bare().await;
+        let long = STRETCH + STRETCH / 2;
+        for (length, pause, arrives) in [
+            (long, Duration::from_millis(200), true),
+            (STRETCH / 2, TAKE_TIME - Duration::from_secs(1), false),
+        ] {
+            let (folder, admission) = report_of("time", length);
+            let mut stream = connect_through(&gateway, &admission, PIECE);
+            let began = Instant::now();
+            let request = file_request();
+            stream.write_all(request.as_bytes()).await.unwrap();
+            let (mut piece, mut taken) = (vec![0; PIECE], 0);
+            loop {
+                let read = stream.read(&mut piece).await.unwrap();
+                if read == 0 {
+                    break;
+                }
+                taken += read as u64;
+                sleep(pause).await;
+            }
+            assert_eq!(taken > length, arrives, "{taken} bytes of {length}");
+            if arrives {
+                assert!(began.elapsed() > ANSWER_TIME);
+            } else {
+                let late = began.elapsed() - ANSWER_TIME;
+                assert!(late <= 2 * pause, "{late:?}");
+            }
+            std::fs::remove_dir_all(&folder).unwrap();
+        }
     });
 }
 
