@@ -100,7 +100,11 @@ fn check(op: &Op, json: &Json, id: Option<&Payload>) {
                 if let Some(heard) = heard {
                     let joints = ["joint1", "joint2"];
                     let whole = joint_trajectory(msg.raw(), &joints);
-                    assert_eq!(heard.setpoint(&joints), whole, "what is left out does not count");
+                    assert_eq!(
+                        heard.setpoint(&joints),
+                        whole,
+                        "what is left out does not count"
+                    );
                 }
             }
         }

@@ -36,6 +36,7 @@ pub const FRAME_BYTES: usize = 192;
 /// Bytes of a place in the queue of topic messages, that of one that is held back or to be encoded included: the queue
 /// may be twice as long as what is in it, and three times while it grows.
 pub const PLACE_BYTES: usize = 128;
+
 /// The outgoing queue of one connection.
 #[derive(Debug, Default)]
 pub struct Outbox {
