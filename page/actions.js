@@ -18,7 +18,10 @@ let applying = false;
 export function remember() {
   if (applying) return;
   undo.remember(presentSettings(state), performance.now());
-  byId("undo").disabled = undo.past.length === 0;
+}
+
+function showUndo() {
+  byId("undo").disabled = !undo.leadsBackFrom(presentSettings(state));
 }
 
 export function startActions() {
@@ -31,15 +34,16 @@ export function startActions() {
   });
   watch("links", () => {
     undo.past.length = 0;
-    byId("undo").disabled = true;
+    showUndo();
   });
+  for (const key of ["integrator", "params", "gains", "enabled", "setpoint"]) watch(key, showUndo);
 }
 
 export async function takeBack() {
-  const settings = undo.take();
+  const settings = undo.take(presentSettings(state));
+  showUndo();
   if (!settings) return;
   await apply(settings);
-  byId("undo").disabled = undo.past.length === 0;
   announce("Undone.");
 }
 

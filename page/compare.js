@@ -19,6 +19,8 @@ const MOST_RUNS = 6;
 const REFERENCE_PART = 1 / 8;
 const PARTED = 0.1; // rad: from there on it is another motion
 
+const SECONDS = 5; // where no duration is given
+
 let view;
 let said;
 let rows = [];
@@ -29,7 +31,7 @@ let go;
 let add;
 
 export function startCompare() {
-  seconds = option({ label: "duration", unit: "s", value: 5 });
+  seconds = option({ label: "duration", unit: "s", value: SECONDS, placeholder: String(SECONDS) });
   from = select("start", [["now", "as it is"], ["rest", "stretched out"]]);
   servo = select("servo", [["off", "off"], ["on", "on"]]);
   go = el("button", { type: "submit", class: "primary" }, "Compare");
@@ -44,7 +46,6 @@ export function startCompare() {
   byId("compare-form").addEventListener("submit", (event) => { event.preventDefault(); compare(); });
   view = new CompareView();
   watch("links", () => { byId("compare-result").hidden = true; });
-  watch("connection", (now) => { if (now === "open") said.show(""); });
   watch("lesson", (lesson) => { if (lesson?.runs) showLesson(lesson); });
 }
 
@@ -96,7 +97,7 @@ function request(method, timestep, samples) {
   return {
     q0: still ? zero : Array.from(state.position.subarray(0, n)),
     qdot0: still ? zero : Array.from(state.velocity.subarray(0, n)),
-    duration: seconds.number(),
+    duration: lasting(),
     timestep,
     integrator: method,
     params: state.params,
@@ -104,6 +105,9 @@ function request(method, timestep, samples) {
     ...(servo.input.value === "on" ? { gains: state.gains, setpoint: Array.from(state.setpoint.subarray(0, n)) } : {}),
   };
 }
+
+/** How long the runs last [s]. */
+const lasting = () => seconds.number() ?? SECONDS;
 
 async function compare() {
   if (state.links === 0 || !state.params) {
@@ -115,7 +119,7 @@ async function compare() {
   const wanted = rows.map(({ choice, step }) => [choice.value, step.value === "" ? state.integrator?.timestep : Number(step.value)]);
   const finest = Math.min(...wanted.map(([, timestep]) => timestep)) * REFERENCE_PART;
   wanted.push(["rk4", finest]);
-  const samples = commonSamples(seconds.number(), wanted.map(([, timestep]) => timestep));
+  const samples = commonSamples(lasting(), wanted.map(([, timestep]) => timestep));
   const requests = wanted.map(([method, timestep]) => request(method, timestep, samples));
   const answers = await Promise.all(requests.map((args) => rollout(args)));
   go.disabled = false;
@@ -132,12 +136,12 @@ async function compare() {
   const reference = runs.pop();
   const away = runs.map((run) => distances(run, reference));
   byId("compare-result").hidden = false;
-  view.show(runs, away, reference, state.params.lengths, state.links, seconds.number());
+  view.show(runs, away, reference, state.params.lengths, state.links, lasting());
   showTable(runs, away, reference);
 }
 
 function showTable(runs, away, reference) {
-  const lasted = seconds.number();
+  const lasted = lasting();
   const columns = [["outcome", "outcome"], ["energy", "energy gained"], ["error", "largest error"], ["evaluations", "evaluations"], ["time", "run time"]];
   const lines = runs.map((run, i) => describeRun(run, away[i], lasted));
   byId("compare-table").replaceChildren(

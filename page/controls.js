@@ -2,6 +2,7 @@
 // The settings: integrator and timestep, servo and gains, gravity, masses, lengths, setpoint and pushes.
 // Invariant: a control changes only by what the runtime accepted; what it refused is said beside it.
 
+import { warn } from "./announce.js";
 import { byId, el, setText } from "./dom.js";
 import { numberField, option, refusal } from "./field.js";
 import { METHODS, shortName } from "./format.js";
@@ -137,7 +138,8 @@ export function nudgeSetpoint(angle) {
   if (state.links === 0) return;
   const positions = presentSetpoint();
   positions[state.joint] = Number((positions[state.joint] + angle).toFixed(6));
-  place(positions);
+  const answer = place(positions);
+  if (!answer.result) warn(answer.status);
 }
 
 /** The setpoint, or the one just sent: a held key is faster than the way to the runtime and back. */
@@ -147,9 +149,12 @@ function presentSetpoint() {
 }
 
 function place(positions) {
+  if (state.connection !== "open") return { result: false, status: "not connected" };
+  if (state.replay) return { result: false, status: "a record is replayed: it has no setpoint to be changed" };
   placed = positions;
   placedAt = performance.now();
   sendSetpoint(positions);
+  return { result: true, status: "" };
 }
 
 export function chooseJoint(joint) {
@@ -202,8 +207,7 @@ function fillSetpoint(links) {
     commit: (value) => {
       const positions = presentSetpoint();
       positions[joint] = value;
-      place(positions);
-      return Promise.resolve({ result: true, status: "" });
+      return Promise.resolve(place(positions));
     },
   }));
   byId("setpoint-fields").replaceChildren(...fields.map((one) => one.element));

@@ -6,27 +6,29 @@ import { warn } from "./announce.js";
 import { el, setText } from "./dom.js";
 import { plain } from "./format.js";
 import { latestOnly } from "./latest.js";
+import { watch } from "./store.js";
 
 const SLIDER_STEPS = 400;
 const SEND_MS = 70;
 let nextId = 1;
 
-/** Where a refusal is shown; `describes` are the controls that it is about. */
+/** Where a refusal is shown, until its cause is gone; `describes` are the controls that it is about. */
 export function refusal(...describes) {
   const text = el("p", { class: "refusal", id: `refusal-${nextId}` });
   nextId += 1;
   for (const one of describes) one.setAttribute("aria-describedby", text.id);
-  return {
-    element: text,
-    show(status) {
-      setText(text, status);
-      for (const one of describes) {
-        if (status) one.setAttribute("aria-invalid", "true");
-        else one.removeAttribute("aria-invalid");
-      }
-      if (status) warn(status);
-    },
+  const show = (status) => {
+    setText(text, status);
+    for (const one of describes) {
+      if (status) one.setAttribute("aria-invalid", "true");
+      else one.removeAttribute("aria-invalid");
+    }
+    if (status) warn(status);
   };
+  // There is a connection again, or all settings are set anew.
+  watch("connection", (now) => { if (now === "open") show(""); });
+  watch("lesson", () => show(""));
+  return { element: text, show };
 }
 
 /**
@@ -88,6 +90,7 @@ export function numberField({ label, short = label, unit, low, high, log = false
       submit(Number(input.value));
     }
   };
+  input.addEventListener("input", () => said.show(""));
   input.addEventListener("change", typed);
   input.addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;
@@ -105,7 +108,9 @@ export function numberField({ label, short = label, unit, low, high, log = false
       if (value === accepted) return;
       const typing = document.activeElement === input && input.value !== plain(accepted);
       accepted = value;
-      if (!typing) show();
+      if (typing) return;
+      said.show("");
+      show();
     },
     value: () => accepted,
     refuse: said.show,

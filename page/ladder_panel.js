@@ -10,7 +10,7 @@ import { wake } from "./frames.js";
 import { TIMESTEPS, cheapest, errorText, read, rungs, uncertaintyOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { LogScale } from "./scale.js";
-import { state, watch } from "./store.js";
+import { state } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
@@ -38,7 +38,6 @@ export function startLadder() {
   said = refusal(go);
   byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, el("label", { class: "option" }, el("span", {}, "servo"), servo), go), said.element);
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
-  watch("connection", (now) => { if (now === "open") said.show(""); });
   setText(byId("ladder-text"), "Runs this arm from its present state with every method at eight timesteps, and compares each with a reference: what does accuracy cost?");
 }
 

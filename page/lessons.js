@@ -29,6 +29,10 @@ function first(links, values) {
 
 /** Mass of the last link [kg]: as heavy as the usual gains still hold in every pose. @type {Record<number, number>} */
 const HEAVY = { 2: 5, 3: 3 };
+/** Timestep that is a fifth to a quarter beyond what the stretched arm bears: it shakes, and stays finite [s]. @type {Record<number, number>} */
+const BEYOND = { 2: 0.0055, 3: 0.0038 };
+/** Gains that let the arm sag, and bear an integral gain of 300 on any of its joints. @type {Record<number, { kp: number[], kd: number[] }>} */
+const SOFT = { 2: { kp: [60, 30], kd: [25, 8] }, 3: { kp: [200, 80, 40], kd: [60, 20, 8] } };
 const FOLDED = [0.9, -1.3, 0.8];
 
 /** @type {Lesson[]} */
@@ -43,9 +47,9 @@ export const LESSONS = [
   {
     id: "limit",
     name: "Beyond the limit",
-    text: "The servo steps at 5.5 ms, longer than the arm bears when stretched out: each step overcorrects the one before, so that the shaking grows by the same factor every time, until it throws the arm about and begins anew. Press the button that resets it with a smaller timestep, then drag the timestep up until it shakes again.",
+    text: "The servo steps a good fifth longer than the arm bears when stretched out: each step overcorrects the one before, so that the shaking grows by the same factor every time, until it throws the arm about and begins anew. Press the button that resets it with a smaller timestep, then drag the timestep up until it shakes again.",
     panel: "plots",
-    settings: (links) => from(links, { integrator: { method: "rk4", timestep: 0.0055 }, servo: true }),
+    settings: (links) => from(links, { integrator: { method: "rk4", timestep: BEYOND[links] }, servo: true }),
   },
   {
     id: "held",
@@ -86,7 +90,7 @@ export const LESSONS = [
     text: "Without integral gain the arm rests below its setpoint, where the position error times the gain carries its weight. Raise the integral gain (300 will do): the error is summed up until nothing is left of it.",
     panel: "plots",
     settings: (links) => from(links, {
-      gains: { kp: first(links, [60, 30, 15]), ki: new Array(links).fill(0), kd: first(links, [25, 8, 2]) }, servo: true, setpoint: first(links, [0.6, -0.4, 0.2]),
+      gains: { ...structuredClone(SOFT[links]), ki: new Array(links).fill(0) }, servo: true, setpoint: first(links, [0.6, -0.4, 0.2]),
     }),
   },
   {

@@ -27,7 +27,7 @@ export function question(/** @type {any} */ { links, integrator, gains, params, 
     integrator: integrator.method,
     params,
     gains: enabled ? gains : noGains(links),
-    ...(setpointKnown ? { setpoint: Array.from(setpoint.subarray(0, links)) } : {}),
+    ...(enabled && setpointKnown ? { setpoint: Array.from(setpoint.subarray(0, links)) } : {}),
   };
 }
 

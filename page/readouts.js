@@ -29,7 +29,7 @@ export function startReadouts() {
     pill.className = `pill ${now}`;
     setText(byId("connection-text"), { open: "connected", connecting: "connecting…", lost: "reconnecting…" }[now]);
   });
-  const causes = ["stability", "stabilityMissing", "integrator", "gains", "params", "setpoint", "enabled", "diagnostics"];
+  const causes = ["connection", "stability", "stabilityMissing", "integrator", "gains", "params", "setpoint", "enabled", "diagnostics"];
   for (const key of causes) watch(key, showLimit);
   watch("integrator", () => estimates.clear());
   watch("estimate", (estimate) => {
@@ -40,7 +40,7 @@ export function startReadouts() {
 
 /** Called a few times a second. */
 export function showReadouts() {
-  const { diagnostics } = state;
+  const diagnostics = state.connection === "open" ? state.diagnostics : null;
   setText(byId("sim-time"), fixed(shown.time, 2));
   setText(byId("run-state"), runState());
   setAttribute(byId("run-state"), "class", `state ${!shown.live ? "recorded" : diagnostics?.state === "diverged" ? "diverged" : ""}`);
@@ -72,7 +72,8 @@ function showLimit() {
   const said = verdict(state);
   const { limit, everyPose } = limitInForce(state);
   const pill = byId("verdict-pill");
-  pill.hidden = said.kind === "offline" || said.kind === "diverged"; // the other pill says so
+  pill.hidden = said.kind === "offline" || said.kind === "diverged" // the other pill says so
+    || (said.kind === "unknown" && !state.stabilityMissing); // the answer is on its way
   pill.className = `state ${said.kind}`;
   setText(pill, said.pill);
   setText(byId("verdict"), said.kind === "never" ? `${said.sentence} ${growthOf(state)}` : said.sentence);

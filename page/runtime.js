@@ -255,6 +255,13 @@ async function settings(service, args, keep) {
   return answer;
 }
 
+/** No setting, so nothing to undo. */
+export async function pause(data) {
+  const answer = await bridge.call("/arm_sim/pause", data === undefined ? {} : { data });
+  if ("data" in answer.values) keep("paused", answer.values.data);
+  return answer;
+}
+
 /** Stores `value` under `key`, and tells of it only where it differs. */
 function keep(key, value) {
   if (JSON.stringify(state[key]) !== JSON.stringify(value)) set(key, value);
@@ -263,7 +270,6 @@ function keep(key, value) {
 export const setParams = (args) => settings("/arm_sim/set_params", args, (values) => keep("params", values));
 export const setIntegrator = (args) => settings("/arm_sim/set_integrator", args, (values) => keep("integrator", values));
 export const setGains = (args) => settings("/pid_controller/set_gains", args, (values) => keep("gains", values));
-export const pause = (data) => settings("/arm_sim/pause", data === undefined ? {} : { data }, (values) => keep("paused", values.data));
 export const enable = (data) => settings("/pid_controller/enable", data === undefined ? {} : { data }, (values) => keep("enabled", values.data));
 export const disturb = (effort, seconds) => bridge.call("/arm_sim/disturb", { effort, duration: seconds });
 export const solve = (target) => bridge.call("/ik/solve", target);

@@ -82,6 +82,10 @@ export function fromFragment(/** @type {string} */ hash) {
   };
 }
 
+function isSame(/** @type {Settings} */ one, /** @type {Settings | null} */ other) {
+  return JSON.stringify(one) === JSON.stringify(other);
+}
+
 /** Settings as they were before each change, newest last. */
 export class Undo {
   constructor() {
@@ -99,9 +103,16 @@ export class Undo {
     if (this.past.length > MOST_STEPS) this.past.shift();
   }
 
-  /** The settings to go back to; undefined if there is nothing. */
-  take() {
+  /** Whether there are settings to go back to: others than those in force. What was refused has changed nothing. */
+  leadsBackFrom(/** @type {Settings | null} */ present) {
+    return this.past.some((settings) => !isSame(settings, present));
+  }
+
+  /** The settings to go back to; undefined if there are none. */
+  take(/** @type {Settings | null} */ present) {
     this.lastTime = -Infinity;
-    return this.past.pop();
+    let settings = this.past.pop();
+    while (settings && isSame(settings, present)) settings = this.past.pop();
+    return settings;
   }
 }

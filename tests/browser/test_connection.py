@@ -59,6 +59,24 @@ class Reconnecting(PageTest):
         self.connected()
         self.page.until("document.querySelector('#compare-form .refusal').textContent === ''")
 
+    def test_without_a_connection_nothing_is_said_of_the_timestep_and_no_setpoint_is_lost_in_silence(self):
+        setpoint = "#setpoint-fields input[type=number]"
+        self.page.until("!document.querySelector('#verdict-pill').hidden")
+        self.page.expect_network_errors = True
+        self.runtime.stop()
+        self.page.until("document.querySelector('#run-state').textContent === 'no connection'")
+        self.assertTrue(self.page.run("document.querySelector('#verdict-pill').hidden"))
+        self.assertEqual(self.page.text("#verdict"), "")
+        self.page.until("document.querySelector('#out-rtf').textContent.startsWith('–')")
+        for field, typed in ((setpoint, "1"), ("#timestep-field input[type=number]", "0.002")):
+            self.page.fill(field, typed)
+        refused = "[...document.querySelectorAll('#setpoint-fields .refusal, #timestep-field .refusal')].map((one) => one.textContent).filter(Boolean)"
+        self.page.until(f"{refused}.length === 2")
+        self.assertEqual(self.page.run(refused), ["not connected"] * 2)
+        self.runtime.start()
+        self.connected()
+        self.page.until(f"{refused}.length === 0")
+
     def test_it_takes_another_number_of_links(self):
         self.page.expect_network_errors = True
         self.runtime.restart(links=3)

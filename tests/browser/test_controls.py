@@ -115,6 +115,12 @@ class Controls(PageTest):
         self.keep("refusals", whole=True)
         self.page.fill(self.field("masses-fields"), "2")
         self.page.until("document.querySelector('#masses-fields .refusal').textContent === ''")
+        self.page.fill(self.field("timestep-field"), "0.001")
+        self.page.until("document.querySelector('#timestep-field .refusal').textContent === ''", why="it is in force already")
+        self.runtime.call("/arm_sim/set_params", gravity=3)
+        self.page.until("document.querySelector('#gravity-field .refusal').textContent === ''", why="somebody else has changed it")
+        self.page.click("#defaults")
+        self.page.until("[...document.querySelectorAll('#controls .refusal')].every((one) => one.textContent === '')")
 
     def test_pause_steps_and_reset(self):
         self.page.click("#pause")
@@ -201,6 +207,14 @@ class Controls(PageTest):
         self.page.until("document.querySelector('#trial-body .refusal').textContent.includes('duration')", why="refusal of a duration")
 
     # Comparison
+
+    def test_a_comparison_without_a_duration_takes_five_seconds(self):
+        self.tab("compare")
+        self.page.fill("#compare-form .compare-row input", "")
+        self.page.click("#compare-form button[type=submit]")
+        self.page.until("document.querySelector('#compare-play').textContent === 'Play'", 60, "played to its end")
+        run = self.color("run1")
+        self.assertTrue(self.image("#compare-angle").count(run) > 20, "a line")
 
     def test_any_number_of_runs_is_compared_with_a_reference(self):
         self.tab("compare")

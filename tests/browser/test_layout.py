@@ -107,6 +107,17 @@ class Laptop(Free, Steady, PageTest):
         self.assertEqual(clipped, [])
 
 
+class Narrow(PageTest):
+    view = {"width": 320, "height": 700, "density": 2, "touch": True}
+
+    def test_captions_are_whole(self):
+        for panel, figure in (("plots", "legend-drift"), ("stability", "map-value")):
+            self.tab(panel)
+            self.page.until(f"document.querySelector('#{figure}').textContent.length > 3")
+            clipped = self.page.run(f"[...document.querySelectorAll('#{panel} figcaption')].filter((one) => one.scrollWidth > one.clientWidth || one.scrollHeight > one.clientHeight).map((one) => one.textContent)")
+            self.assertEqual(clipped, [])
+
+
 class Phone(Free, Steady, Access, PageTest):
     view = PHONE
 

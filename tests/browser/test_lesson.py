@@ -48,6 +48,21 @@ class Ways(Lesson):
         self.page.click("#defaults")
         self.wait(lambda: self.values("/arm_sim/set_params") == {"gravity": 9.81, "masses": [1, 1], "lengths": [1, 1]}, "defaults")
 
+    def test_what_was_refused_and_a_pause_are_nothing_to_undo(self):
+        self.page.until("own('store.js').then(({ state }) => state.setpointKnown)")
+        self.page.click("#pause")
+        self.page.until("document.querySelector('#run-state').textContent === 'paused'")
+        self.page.click("#pause")
+        self.page.until("document.querySelector('#run-state').textContent === 'running'")
+        self.page.fill(f"#timestep-field {NUMBER}", "-1")
+        self.page.until("document.querySelector('#timestep-field .refusal').textContent.includes('got -1')")
+        self.assertTrue(self.page.run("document.querySelector('#undo').disabled"))
+        self.page.fill(f"#timestep-field {NUMBER}", "0.002")
+        self.page.until("!document.querySelector('#undo').disabled")
+        self.page.click("#undo")
+        self.wait(lambda: self.values("/arm_sim/set_integrator")["timestep"] == 0.001, "undone")
+        self.page.until("document.querySelector('#undo').disabled")
+
     def test_the_recording_is_looked_at_while_the_arm_goes_on(self):
         self.page.until("own('history.js').then(({ record }) => record.length > 90)")
         self.page.click("#history-back")
@@ -94,6 +109,41 @@ class Ways(Lesson):
         time.sleep(0.5)
         self.page.click("#watch")
         self.assertRegex(self.page.text("#watch-hud"), r"^⏱ [\d.]+ s$")
+
+
+class Scenes:
+    """What a lesson's text says comes about, with any number of links."""
+
+    def test_the_integral_gain_takes_the_arm_to_where_it_sagged_from(self):
+        setpoint = [0.6, -0.4, 0.2][:self.links]
+        self.page.click("#lesson-sag")
+        self.shows_setpoint(setpoint)
+        state = lambda: self.runtime.next("/joint_states")
+        away = lambda: max(abs(q - p) for q, p in zip(state()["position"], setpoint))
+        self.wait(lambda: max(map(abs, state()["velocity"])) < 1e-3 and away() > 0.1, "it sags")
+        for joint in range(self.links):
+            self.page.fill(f"#ki-fields .field:nth-child({joint + 1}) {NUMBER}", "300")
+            # A field sends its whole array: the page has to have heard of the one before.
+            self.page.until(f"own('store.js').then(({{ state }}) => state.gains.ki[{joint}] === 300)")
+        self.wait(lambda: away() < 0.01, "nothing is left of the error")
+        self.page.until("document.querySelector('#verdict-pill').textContent.startsWith('stable')")
+
+    def test_beyond_the_limit_the_arm_is_thrown_about_and_goes_on(self):
+        self.page.click("#lesson-limit")
+        self.page.until("document.querySelector('#verdict-pill').textContent === 'beyond the limit'")
+        thrown = lambda: max(map(abs, self.runtime.next("/joint_states")["position"])) > 0.3
+        self.wait(thrown, "it is thrown about")
+        began = self.runtime.next("/joint_states")["header"]["stamp"]["sec"]
+        self.wait(lambda: self.runtime.next("/joint_states")["header"]["stamp"]["sec"] >= began + 5, "five seconds later")
+        self.wait(thrown, "again")
+
+
+class ScenesTwoLinks(Scenes, Lesson):
+    pass
+
+
+class ScenesThreeLinks(Scenes, Lesson):
+    links = 3
 
 
 class Defaults(Lesson):

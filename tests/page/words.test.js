@@ -96,8 +96,22 @@ test("a slider that is dragged is one change to undo", () => {
   undo.remember(DEFAULTS[2], 0);
   undo.remember({ ...DEFAULTS[2], servo: true }, 300);
   undo.remember({ ...DEFAULTS[2], servo: true }, 900);
-  assert.deepEqual(undo.take(), DEFAULTS[2]);
-  assert.equal(undo.take(), undefined);
+  const present = { ...DEFAULTS[2], integrator: null };
+  assert.deepEqual(undo.take(present), DEFAULTS[2]);
+  assert.equal(undo.take(present), undefined);
+});
+
+test("a change that was refused is none to undo", () => {
+  const undo = new Undo();
+  const before = { ...DEFAULTS[2], servo: true };
+  undo.remember(before, 0);
+  undo.remember(DEFAULTS[2], 2000);
+  undo.remember(structuredClone(DEFAULTS[2]), 4000);
+  assert.ok(undo.leadsBackFrom(DEFAULTS[2]));
+  assert.deepEqual(undo.take(DEFAULTS[2]), before);
+  undo.remember(DEFAULTS[2], 6000);
+  assert.ok(!undo.leadsBackFrom(DEFAULTS[2]));
+  assert.equal(undo.take(DEFAULTS[2]), undefined);
 });
 
 test("every lesson has two sentences and whole settings for any arm", () => {
