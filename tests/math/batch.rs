@@ -169,6 +169,7 @@ fn an_observer_sees_what_it_sees_of_an_arm_that_is_stepped_alone_and_may_end_it(
         assert!(ended > 100, "only {ended} ended");
     }
 }
+
 #[test]
 fn an_arm_that_diverges_leaves_its_neighbours_alone() {
     let mut arms = vec![Simulation::<3>::new(Arm::default(), Gains::default()); 16];
@@ -182,6 +183,23 @@ fn an_arm_that_diverges_leaves_its_neighbours_alone() {
         assert_eq!(arm.divergence().is_some(), index == 5, "arm {index}");
         assert_eq!(arm.steps() == 5000, index != 5, "arm {index}");
         assert!(arm.state().is_finite());
+    }
+}
+
+#[test]
+fn a_lane_ends_where_time_ends_too() {
+    let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
+    let mut arms = vec![Simulation::<2>::new(weightless, Gains::default()); 16];
+    arms[3].set_timestep(1e308);
+    arms[5].set_timestep(1e18);
+    arms[5].advance(1);
+    arms[5].set_timestep(0.001);
+    let mut alone = arms.clone();
+    batch::advance(arms.iter_mut().map(|arm| (arm, 100)));
+    for (index, (arm, alone)) in arms.iter().zip(&mut alone).enumerate() {
+        alone.advance(100);
+        assert_eq!(shown(arm), shown(alone), "arm {index}");
+        assert_eq!(arm.divergence().is_some(), [3, 5].contains(&index));
     }
 }
 

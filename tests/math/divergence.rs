@@ -97,3 +97,54 @@ fn an_observer_is_not_shown_a_step_that_is_not_taken() {
     assert_eq!(shown, taken);
     assert!(simulation.divergence().is_some());
 }
+
+/// A weightless arm at rest, whose state stays finite whatever the timestep is.
+fn resting(timestep: f64) -> Simulation<2> {
+    let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
+    let mut simulation = Simulation::new(arm, Gains::default());
+    simulation.set_timestep(timestep);
+    simulation
+}
+
+#[test]
+fn a_step_beyond_the_last_finite_time_is_not_taken() {
+    let mut simulation = resting(1e308);
+    assert_eq!(simulation.advance(5), 1);
+    let divergence = Divergence {
+        step: 2,
+        time: 1e308,
+    };
+    assert_eq!(simulation.divergence(), Some(divergence));
+    simulation.set_timestep(0.001);
+    assert_eq!(simulation.time(), 1e308);
+    assert!(!simulation.step());
+    simulation.reset();
+    assert_eq!(simulation.advance(1000), 1000);
+}
+
+#[test]
+fn a_step_that_rounding_would_lose_is_not_taken() {
+    // Doubles around 1e18 are 128 apart: the third step of 100 ends at 300, which rounds to 256 as 200 does.
+    for (timestep, taken) in [(0.001, 0), (50.0, 0), (100.0, 2), (150.0, 3)] {
+        let mut simulation = resting(1e18);
+        assert!(simulation.step());
+        simulation.set_timestep(timestep);
+        let mut times = vec![simulation.time()];
+        let advanced = simulation.advance_with(3, |now| {
+            times.push(now.time());
+            std::ops::ControlFlow::Continue(())
+        });
+        assert_eq!(advanced, taken, "{timestep} s");
+        assert!(times.is_sorted_by(|before, after| before < after));
+        assert_eq!(simulation.divergence().is_some(), taken < 3);
+    }
+}
+
+#[test]
+fn an_observer_ends_an_advance_near_the_end_of_time_too() {
+    let mut simulation = resting(1e18);
+    assert!(simulation.step());
+    simulation.set_timestep(150.0);
+    let advanced = simulation.advance_with(3, |_| std::ops::ControlFlow::Break(()));
+    assert_eq!((advanced, simulation.steps()), (1, 2));
+}

@@ -180,6 +180,9 @@ impl<const N: usize> Player<N> {
         let soon = u64::try_from(SOON.as_nanos()).unwrap_or(u64::MAX);
         if self.position < soon {
             for _ in 0..MAX_AT_ONCE {
+                if missing.is_empty() {
+                    break;
+                }
                 let Some(moment) = self.tape.reel.forward(soon)? else {
                     break;
                 };

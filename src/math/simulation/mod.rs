@@ -10,8 +10,8 @@
 //! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
 //! studied, bit for bit. May use the rest of `math`; told no time, it is stepped.
 //!
-//! **Invariant:** the state is finite. A step whose result is not finite is not taken, in whole or in part, and
-//! nothing steps after it until [`Simulation::reset`]; time is `base + k timestep`, never a running sum.
+//! **Invariant:** state and time are finite. A step whose result is not, or which leads to no later time, is not taken,
+//! in whole or in part, and nothing steps after it until [`Simulation::reset`].
 
 #![allow(
     clippy::indexing_slicing,
@@ -21,6 +21,7 @@
 #[cfg(feature = "batch")]
 pub mod batch;
 mod checkpoint;
+mod clock;
 mod increments;
 mod input;
 
@@ -31,7 +32,6 @@ use self::increments::{leaves_out_first_angle, stepped};
 pub use self::increments::{state_after, step_under};
 pub use self::input::ArmInput;
 use super::arm::{Arm, State};
-use super::count::in_f64;
 use super::dynamics::{forward_dynamics, weightless_dynamics};
 use super::integrator::Method;
 use super::pid::{Control, Gains, Pid, Setpoint};
@@ -39,10 +39,10 @@ use super::pid::{Control, Gains, Pid, Setpoint};
 /// Timestep until another is set \[s\]. A third of what the default gains are stable to.
 pub const DEFAULT_TIMESTEP: f64 = 0.001;
 
-/// When and where a simulation left the finite numbers.
+/// The step that a simulation did not take, since its result was not finite or led to no later time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divergence {
-    /// Number of the step, since the reset, whose result was not finite; the first step is 1.
+    /// Number of the step, since the reset, that was not taken; the first step is 1.
     pub step: u64,
     /// Simulation time at which that step began, and at which the clock stands \[s\].
     pub time: f64,
@@ -147,15 +147,23 @@ impl<const N: usize> Simulation<N> {
         if self.divergence.is_some() {
             return 0;
         }
-        // Asked once for all steps.
-        if leaves_out_first_angle(&self.arm) {
-            self.take_steps::<false>(steps, observe)
+        if self.has_time_for(steps) {
+            self.take_steps(steps, observe)
         } else {
-            self.take_steps::<true>(steps, observe)
+            self.take_last_steps(steps, observe)
         }
     }
 
-    fn take_steps<const WEIGHS: bool>(
+    fn take_steps(&mut self, steps: u64, observe: impl FnMut(&Self) -> ControlFlow<()>) -> u64 {
+        // Asked once for all steps.
+        if leaves_out_first_angle(&self.arm) {
+            self.take_steps_of::<false>(steps, observe)
+        } else {
+            self.take_steps_of::<true>(steps, observe)
+        }
+    }
+
+    fn take_steps_of<const WEIGHS: bool>(
         &mut self,
         steps: u64,
         mut observe: impl FnMut(&Self) -> ControlFlow<()>,
@@ -163,10 +171,7 @@ impl<const N: usize> Simulation<N> {
         // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
         for taken in 0..steps {
             if !self.take_step::<WEIGHS>() {
-                self.divergence = Some(Divergence {
-                    step: self.steps + 1,
-                    time: self.time(),
-                });
+                self.diverge();
                 return taken;
             }
             if observe(self).is_break() {
@@ -174,6 +179,14 @@ impl<const N: usize> Simulation<N> {
             }
         }
         steps
+    }
+
+    /// Notes that the next step is not taken, nor any after it.
+    fn diverge(&mut self) {
+        self.divergence = Some(Divergence {
+            step: self.steps + 1,
+            time: self.time(),
+        });
     }
 
     /// One step, unless its result is not finite: then nothing changes, and `false`.
@@ -282,12 +295,6 @@ impl<const N: usize> Simulation<N> {
         &self.effort
     }
 
-    /// Simulation time since the reset \[s\].
-    #[must_use]
-    pub fn time(&self) -> f64 {
-        self.base + in_f64(self.steps_since_base) * self.timestep
-    }
-
     /// Steps taken since the reset.
     #[must_use]
     pub fn steps(&self) -> u64 {
@@ -309,16 +316,6 @@ impl<const N: usize> Simulation<N> {
     #[must_use]
     pub fn timestep(&self) -> f64 {
         self.timestep
-    }
-
-    /// Changes the length of a step \[s\], greater than 0, from the next step on; time goes on from where it is. The
-    /// timestep already in force changes nothing, so that repeating it does not turn time into a running sum.
-    pub fn set_timestep(&mut self, timestep: f64) {
-        if timestep.to_bits() != self.timestep.to_bits() {
-            self.base = self.time();
-            self.steps_since_base = 0;
-            self.timestep = timestep;
-        }
     }
 
     /// The arm's parameters.
@@ -356,7 +353,7 @@ impl<const N: usize> Simulation<N> {
         self.pid.set_setpoint(setpoint);
     }
 
-    /// The step at which the simulation left the finite numbers, if it did since the reset.
+    /// The first step since the reset that was not taken because its result was not finite or led to no later time.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.divergence

@@ -66,8 +66,10 @@ impl Registers {
             }
             let evaluations = steps.saturating_mul(arm.method.evaluations().into());
             let kind = StepKind::of(arm);
+            // A lane has no clock.
+            let alone = evaluations < WORTH_A_LANE || !arm.has_time_for(steps);
             let seat = Seat::new(arm, steps, observer);
-            if evaluations < WORTH_A_LANE {
+            if alone {
                 seat.alone();
                 continue;
             }

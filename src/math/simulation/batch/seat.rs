@@ -5,10 +5,9 @@
 use std::ops::ControlFlow;
 
 use crate::math::arm::State;
-use crate::math::count::in_f64;
 use crate::math::integrator::Method;
+use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::leaves_out_first_angle;
-use crate::math::simulation::{Divergence, Simulation};
 
 /// How a step is taken, the same in all lanes of a register.
 #[derive(Debug, Clone, Copy)]
@@ -132,10 +131,7 @@ impl<'a, const N: usize> Seat<'a, N> {
         self.arm.steps += self.taken;
         self.arm.steps_since_base += self.taken;
         if diverged {
-            self.arm.divergence = Some(Divergence {
-                step: self.arm.steps + 1,
-                time: self.arm.time(),
-            });
+            self.arm.diverge();
         }
         if self.taken + u64::from(diverged) > self.pushes {
             self.arm.disturbance = None;
@@ -148,9 +144,7 @@ fn pushes<const N: usize>(arm: &Simulation<N>, steps: u64) -> u64 {
     let Some(disturbance) = arm.disturbance else {
         return 0;
     };
-    let acts = |step: u64| {
-        arm.base + in_f64(arm.steps_since_base + step) * arm.timestep < disturbance.ends
-    };
+    let acts = |step: u64| arm.time_after(step) < disturbance.ends;
     if acts(steps - 1) {
         return steps;
     }
