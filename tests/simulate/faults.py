@@ -26,10 +26,10 @@ REGISTRY, CONNECTION = "src/actors/gateway/registry", "src/actors/gateway/connec
 
 # Each fault, its file, the text there, and the text there when the fault holds (plant.py says how).
 FAULTS = [
-    ("two messages of one topic are swapped in an outbox, one time in 4", "src/protocol/outbox/mod.rs",
-     "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));",
-     "        self.topic_bytes += frame.len();\n        self.topics.push_back((number, frame));\n"
-     "        let last = self.topics.len() - 1;\n        if last > 1 && R(4) { self.topics.swap(last - 1, last); }"),
+    ("two messages of one topic are swapped in an outbox, one time in 4", "src/protocol/outbox/blocks.rs",
+     "            return last.push_back(item);",
+     "            last.push_back(item);\n            let end = last.len() - 1;\n"
+     "            if end > 1 && R(4) { last.swap(end - 1, end); }\n            return;"),
     ("two messages of a client's are swapped before anybody has them, one in 20", f"{REGISTRY}/ops/fan_out.rs",
      "            let plain = self.count(encode(spelling));",
      "            let mut plain = encode(spelling);\n"
