@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import pendularm
+from pendularm._code import fingerprint
 
 GRID = {"kp": [100.0, [400.0, 90.0], 900.0], "kd": np.geomspace(5, 80, 7), "method": ["verlet", "rk4"]}
 FIXED = {"setpoint": [0.6, -0.4], "duration": 1.0, "samples": 51, "timestep": 0.002}
@@ -248,6 +249,9 @@ def test_a_folder_knows_the_code_of_a_metric(tmp_path):
     for other in [last(2.0), last(1.0, "first"), first, second]:
         with pytest.raises(ValueError, match="holds another sweep: it differs in metric"):
             pendularm.sweep(metric=other, **ask)
+    # Of a masked array NumPy gives the bytes of what it would fill in: True, in one of truths.
+    hidden = [last(np.ma.array([True], mask=mask)) for mask in (True, False)]
+    assert len({fingerprint("metric", one) for one in hidden}) == 2
     kept = json.loads((tmp_path / "sweep.json").read_text())
     assert kept["version"] == pendularm.__version__
     (tmp_path / "sweep.json").write_text(json.dumps({**kept, "version": "0.0.1"}))

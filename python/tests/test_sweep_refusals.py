@@ -5,6 +5,15 @@ import pytest
 
 import pendularm
 
+HIDDEN = np.ma.array([1.0, 2.0], mask=[True, False])
+
+
+def among_objects(*values):
+    """The values as they are, in an array."""
+    array = np.empty(len(values), object)
+    array[:] = values
+    return array
+
 
 @pytest.mark.parametrize(
     ("wrong", "said"),
@@ -25,6 +34,25 @@ import pendularm
         (lambda: pendularm.sweep({"masses": [1, np.array(1j)]}), "every masses must be a number or an array of 2, got"),
         (lambda: pendularm.sweep({"gravity": ["9"]}), "every gravity must be a number, got ['9']"),
         (lambda: pendularm.sweep({"kp": ["9"]}), "every kp must be a number or an array of 2, got ['9']"),
+        (lambda: pendularm.sweep({"kp": HIDDEN}), "every kp must have no masked numbers, got [masked, "),
+        (lambda: pendularm.sweep({"kp": [HIDDEN]}), "every kp must have no masked numbers, got [masked_array(data=[--"),
+        (lambda: pendularm.sweep({"q0": [[0, np.ma.masked]]}), "every q0 must have no masked numbers, got [[0, masked]"),
+        (lambda: pendularm.sweep({"kp": [1]}, gravity=np.ma.masked), "every gravity must have no masked numbers, got [m"),
+        (lambda: pendularm.sweep({"kp": [1]}, masses=HIDDEN), "every masses must have no masked numbers, got [masked_a"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, masses=HIDDEN.astype(object)),
+            "every masses must have no masked numbers, got [masked_a",
+        ),
+        (lambda: pendularm.sweep({"kp": [1]}, masses=among_objects(np.ma.masked, 1)), "every masses must have no masked"),
+        (lambda: pendularm.sweep({"kp": [1]}, duration=np.ma.masked), "duration must have no masked numbers, got masked"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, samples=np.ma.array(5, mask=True)),
+            "samples must be a whole number, got masked_array(data=--",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, lambda run: {"a": [np.ma.masked]}, duration=0.1),
+            "metric must answer no masked numbers, got a of them",
+        ),
         (lambda: pendularm.sweep([1]), "grid must be a mapping from settings to their values, got [1]"),
         (lambda: pendularm.sweep({"kp": 5}), "grid['kp'] must be a sequence of values, got 5"),
         (lambda: pendularm.sweep({"kp": [1]}, links=-1), "links must be 2 or 3, got -1"),

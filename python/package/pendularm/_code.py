@@ -43,6 +43,8 @@ def _told(name: str, value: Any, around: tuple[int, ...]) -> str:
             return f"{type(value).__name__} ({', '.join(sorted(_told(name, one, around) for one in value))})"
         case dict():
             return f"dict ({each(value.items())})"
+        case np.ma.MaskedArray():
+            return f"masked ({each([value.data, np.ma.getmaskarray(value)])})"
         case np.ndarray() if not value.dtype.hasobject:
             return f"array {value.dtype.str} {value.shape} {value.tobytes().hex()}"
         case ModuleType():

@@ -2,7 +2,7 @@
 
 import operator
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,11 @@ SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
 
 def whole_number(name: str, value: Any) -> int:
     try:
-        return operator.index(value)
+        if not is_masked(value):
+            return operator.index(value)
     except TypeError:
-        raise ValueError(f"{name} must be a whole number, got {value!r:.60}") from None
+        pass
+    raise ValueError(f"{name} must be a whole number, got {value!r:.60}")
 
 
 def flag(name: str, value: Any) -> bool:
@@ -33,7 +35,18 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
+def is_masked(value: Any) -> bool:
+    """Whether some of the numbers are not to be looked at; NumPy reads them where they stand in a list."""
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    if isinstance(value, np.ndarray) and value.dtype.hasobject:
+        return any(is_masked(one) for one in value.flat)
+    return isinstance(value, list | tuple) and any(is_masked(one) for one in value)
+
+
 def number(name: str, value: Any) -> float:
+    if is_masked(value):
+        raise ValueError(f"{name} must have no masked numbers, got {value!r:.60}")
     try:
         return float(numbers(value))
     except OverflowError:
@@ -50,12 +63,14 @@ def numbers(value: Any) -> Floats:
     return array.astype(np.float64, casting="same_kind")
 
 
-def column(name: str, values: Sequence[Any], links: int) -> Any:
+def column(name: str, values: list[Any], links: int) -> Any:
     """Values of a setting, a row for each."""
     if name not in SETTINGS:
         raise ValueError(f"there is no setting {name!r}; there are {', '.join(SETTINGS)}")
     if name == "method":
         return np.array([str(value) for value in values])
+    if is_masked(values):
+        raise ValueError(f"every {name} must have no masked numbers, got {values!r:.60}")
     try:
         if name in PER_JOINT:
             array = np.array([np.broadcast_to(numbers(value), (links,)) for value in values])

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ._code import fingerprint
 from ._native import Batch
 from ._pieces import Folder, Numbers, hand_out
-from ._settings import Floats, begin, column, flag, number, try_values, whole_number
+from ._settings import Floats, begin, column, flag, is_masked, number, try_values, whole_number
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
@@ -314,7 +314,10 @@ def _solve(question: _Question, start: int, stop: int, stopped: threading.Event 
     metric = METRICS[question.metric] if isinstance(question.metric, str) else question.metric
     name = question.metric if isinstance(question.metric, str) else "metric"
     found = metric(run)
-    values = {key: np.asarray(one) for key, one in (found if isinstance(found, Mapping) else {name: found}).items()}
+    named = found if isinstance(found, Mapping) else {name: found}
+    if hidden := [key for key, one in named.items() if is_masked(one)]:
+        raise ValueError(f"metric must answer no masked numbers, got {hidden[0]} of them")
+    values = {key: np.asarray(one) for key, one in named.items()}
     for key, one in values.items():
         if not isinstance(key, str):
             raise ValueError(f"metric must name its numbers by text, got {key!r}")
