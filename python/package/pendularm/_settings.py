@@ -56,9 +56,12 @@ def number(name: str, value: Any) -> float:
 
 
 def numbers(value: Any) -> Floats:
-    """The value as doubles; text and complex numbers are none."""
+    """The value as doubles; texts, `None` and complex numbers are none."""
     array = np.asarray(value)
     if array.dtype.kind == "O":
+        # NumPy would read texts, make a NaN of None, and drop imaginary parts.
+        if any(one is None or isinstance(one, str | bytes | np.complexfloating) for one in array.flat):
+            raise TypeError
         return array.astype(np.float64)
     return array.astype(np.float64, casting="same_kind")
 

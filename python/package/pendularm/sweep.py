@@ -162,6 +162,9 @@ def sweep(
     axes = {}
     for name, values in grid.items():
         try:
+            # The parts of a text are characters, or numbers.
+            if isinstance(values, str | bytes | bytearray):
+                raise TypeError
             axes[name] = list(values)
         except TypeError:
             raise ValueError(f"grid[{name!r}] must be a sequence of values, got {values!r:.60}") from None
