@@ -60,12 +60,7 @@ impl<'py> Numbers<'py> {
     }
 
     /// The numbers as one row of `width` for each of `arms`, or one row for all of them.
-    pub(crate) fn rows(
-        &self,
-        arms: usize,
-        width: usize,
-        bound: Option<Bound>,
-    ) -> PyResult<Rows<'_>> {
+    pub(crate) fn rows(&self, arms: usize, width: usize, bound: Bound) -> PyResult<Rows<'_>> {
         let field = &self.field;
         let shape = self.shape();
         if shape != [width] && shape != [arms, width] {
@@ -75,12 +70,10 @@ impl<'py> Numbers<'py> {
         }
         let is_one = shape.len() == 1;
         let values = self.values()?;
-        if let Some(bound) = bound {
-            held(field, values, bound, |at| match is_one {
-                true => format!("[{at}]"),
-                false => format!("[{}][{}]", at / width, at % width),
-            })?;
-        }
+        held(field, values, bound, |at| match is_one {
+            true => format!("[{at}]"),
+            false => format!("[{}][{}]", at / width, at % width),
+        })?;
         Ok(Rows {
             values: Cow::Borrowed(values),
             width,

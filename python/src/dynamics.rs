@@ -9,7 +9,7 @@ use pyo3::prelude::{PyResult, Python, pyfunction};
 
 use crate::arm::{Chain, Given, for_either};
 use crate::arrays::{Numbers, Rows, joints_or};
-use crate::fields::{Bound, Held, Object, Real, refused};
+use crate::fields::{self, Bound, Held, Object, Real, refused};
 
 /// The form of a function's answer for one state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +70,7 @@ fn all_rows<'py, const K: usize>(
             [1, _] => 1,
             _ => count.unwrap_or(1),
         };
-        rows.push(numbers.rows(each, links, None)?.of_one_for_all());
+        rows.push(numbers.rows(each, links, Bound::Finite)?.of_one_for_all());
     }
     let rows: [Rows<'_>; K] = rows
         .try_into()
@@ -273,11 +273,16 @@ pub(crate) fn inverse_kinematics<'py>(
     phi: Option<Real>,
     present: Option<Object<'py>>,
 ) -> PyResult<Held<'py, numpy::PyArray1<f64>>> {
-    let target = kinematics::Target {
-        position: [x.read("x")?, y.read("y")?].into(),
-        orientation: phi.map(|phi| phi.read("phi")).transpose()?,
-    };
+    let (x, y) = (
+        fields::number("x", x, Bound::Finite)?,
+        fields::number("y", y, Bound::Finite)?,
+    );
+    let phi = phi.map(|phi| phi.read("phi")).transpose()?;
     for_either!(Chain, &arm.chain()?, arm => {
+        if let (3, Some(phi)) = (arm.lengths().len(), phi) {
+            fields::number("phi", Real::Is(phi), Bound::Finite)?;
+        }
+        let target = kinematics::Target { position: [x, y].into(), orientation: phi };
         let present = joints_or("present", present.as_ref(), Bound::Finite, [0.0; _])?;
         let positions = kinematics::solve(arm.lengths(), &present, &target).map_err(refused)?;
         Ok(positions.to_pyarray(py))

@@ -100,3 +100,26 @@ def test_shapes_are_checked():
         dynamics.gravity_load(arm, 1.0)
     with pytest.raises(ValueError, match="q must be an array of numbers, got None"):
         dynamics.gravity_load(arm, None)
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_what_is_not_finite_is_refused_by_its_place(links, bad):
+    arm, good, one, many = pendularm.Arm(links), np.zeros(links), np.zeros(links), np.zeros((4, links))
+    one[1] = many[2, 1] = bad
+    shown = "NaN" if np.isnan(bad) else str(bad)
+    for function, fields in [
+        (dynamics.mass_matrix, ["q"]),
+        (dynamics.coriolis, ["q", "qd"]),
+        (dynamics.gravity_load, ["q"]),
+        (dynamics.forward_dynamics, ["q", "qd", "effort"]),
+        (dynamics.inverse_dynamics, ["q", "qd", "qdd"]),
+        (dynamics.kinetic_energy, ["q", "qd"]),
+        (dynamics.potential_energy, ["q"]),
+        (pendularm.end_effector, ["q"]),
+    ]:
+        for field in fields:
+            for value, place in [(one, "[1]"), (many, "[2][1]")]:
+                given = {name: value if name == field else good for name in fields}
+                with pytest.raises(ValueError) as refusal:
+                    function(arm, **given)
+                assert str(refusal.value) == f"{field}{place} must be finite, got {shown}"

@@ -18,7 +18,7 @@ impl Batch {
         bound: Bound,
     ) -> PyResult<Option<Rows<'a>>> {
         given
-            .map(|given| given.rows(self.arms, self.links(), Some(bound)))
+            .map(|given| given.rows(self.arms, self.links(), bound))
             .transpose()
     }
 

@@ -166,11 +166,11 @@ impl Batch {
     ) -> PyResult<()> {
         let chosen = chosen(arms, self.arms)?;
         let position = Numbers::read("position", position)?;
-        let position = position.rows(chosen.len(), self.links(), Some(Bound::Finite))?;
+        let position = position.rows(chosen.len(), self.links(), Bound::Finite)?;
         let velocity = read("velocity", velocity)?;
         let velocity = velocity
             .as_ref()
-            .map(|given| given.rows(chosen.len(), self.links(), Some(Bound::Finite)))
+            .map(|given| given.rows(chosen.len(), self.links(), Bound::Finite))
             .transpose()?;
         let _turn = self.turns.take(py)?;
         for_either!(Either, &self.own, lanes => {
@@ -199,7 +199,7 @@ impl Batch {
         velocities: Option<&Object<'_>>,
     ) -> PyResult<()> {
         let positions = Numbers::read("positions", positions)?;
-        let positions = positions.rows(self.arms, self.links(), Some(Bound::Finite))?;
+        let positions = positions.rows(self.arms, self.links(), Bound::Finite)?;
         let velocities = read("velocities", velocities)?;
         let velocities = self.rows(velocities.as_ref(), Bound::Finite)?;
         let _turn = self.turns.take(py)?;
