@@ -4,8 +4,8 @@
 
 use numpy::{PyArray1, ToPyArray};
 use pendularm::math::arm::Arm as Rods;
-use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
-use pyo3::types::PyDict;
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
+use pyo3::types::{PyDict, PyTuple};
 
 use crate::arrays::joints_or;
 use crate::fields::{self, Bound, Handed, Held, Meant, Object, Real, Whole, refused};
@@ -95,6 +95,13 @@ impl Arm {
             "Arm({}, lengths={:?}, masses={:?}, gravity={:?})",
             self.links(), arm.lengths(), arm.masses(), arm.gravity()
         ))
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        let numbers = for_either!(Chain, &self.chain, arm => {
+            [arm.lengths().as_slice(), arm.masses(), &[arm.gravity()]].concat()
+        });
+        PyTuple::new(py, numbers)?.hash()
     }
 
     fn __getnewargs_ex__<'py>(&self, py: Python<'py>) -> PyResult<((usize,), Held<'py, PyDict>)> {

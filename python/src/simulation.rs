@@ -11,7 +11,8 @@ use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation as Loop;
-use pyo3::prelude::{PyDictMethods, PyResult, Python, pyclass, pymethods};
+use pyo3::IntoPyObject;
+use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyclass, pymethods};
 use pyo3::types::PyDict;
 
 use crate::arm::{Arm, Chain, Given, for_either, or_default};
@@ -44,6 +45,22 @@ pub(crate) struct Divergence {
 
 #[pymethods]
 impl Divergence {
+    #[new]
+    fn new(step: Whole, time: Real) -> PyResult<Self> {
+        Ok(Self {
+            step: step.read("step")?,
+            time: fields::number("time", time, Bound::NotNegative)?,
+        })
+    }
+
+    fn __hash__(&self, py: Python<'_>) -> PyResult<isize> {
+        self.__getnewargs__().into_pyobject(py)?.hash()
+    }
+
+    fn __getnewargs__(&self) -> (u64, f64) {
+        (self.step, self.time)
+    }
+
     fn __repr__(&self) -> String {
         format!("Divergence(step={}, time={:?})", self.step, self.time)
     }

@@ -1,5 +1,6 @@
 """One arm is the live arm, bit for bit, and refuses what the services refuse."""
 
+import copy
 import decimal
 import fractions
 import math
@@ -98,6 +99,24 @@ def test_divergence_is_told_and_reset_clears_it():
     assert arm.step() == 1
 
 
+def test_divergences_are_values():
+    arm = pendularm.Simulation(method="euler", timestep=0.1)
+    arm.enable()
+    arm.set_setpoint([1.0, 1.0])
+    arm.step(10_000)
+    found = arm.divergence
+    assert repr(found) == f"Divergence(step={found.step}, time={found.time!r})"
+    for again in [pickle.loads(pickle.dumps(found)), copy.copy(found), copy.deepcopy(found)]:
+        assert again == found
+        assert (again.step, again.time) == (found.step, found.time)
+    assert len({found, pendularm.Divergence(found.step, found.time), pendularm.Divergence(1, time=0.0)}) == 2
+    assert hash(pendularm.Divergence(1, 0.0)) == hash(pendularm.Divergence(1, -0.0))
+    with pytest.raises(ValueError, match=r"^step must be a whole number, at least 0 and less than 2\^64, got -1$"):
+        pendularm.Divergence(-1, 0.0)
+    with pytest.raises(ValueError, match=r"^time must be finite and at least 0, got NaN$"):
+        pendularm.Divergence(1, math.nan)
+
+
 def test_a_state_can_be_set_and_energy_is_kept():
     arm = pendularm.Simulation()
     arm.set_state([0.4, -0.3], [0.1, 0.2])
@@ -115,7 +134,12 @@ def test_arms_are_values():
     arm = pendularm.Arm(3, lengths=[1, 2, 0.5], gravity=1.6)
     assert arm == pendularm.Arm(3, lengths=np.array([1.0, 2.0, 0.5]), masses=(1, 1, 1), gravity=1.6)
     assert arm != pendularm.Arm(3)
-    assert pickle.loads(pickle.dumps(arm)) == arm
+    assert len({arm, pendularm.Arm(3, lengths=[1, 2, 0.5], gravity=1.6), pendularm.Arm(3), pendularm.Arm(2)}) == 3
+    # Two zeros that are equal, though their bits are not.
+    assert len({pendularm.Arm(gravity=0.0), pendularm.Arm(gravity=-0.0)}) == 1
+    for again in [pickle.loads(pickle.dumps(arm)), copy.copy(arm), copy.deepcopy(arm)]:
+        assert again == arm
+        assert hash(again) == hash(arm)
     assert arm.reach == 3.5
     assert repr(arm) == "Arm(3, lengths=[1.0, 2.0, 0.5], masses=[1.0, 1.0, 1.0], gravity=1.6)"
 
