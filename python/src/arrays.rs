@@ -9,11 +9,12 @@ use numpy::{
     Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
     PyUntypedArrayMethods,
 };
+use pyo3::exceptions::PyOverflowError;
 use pyo3::intern;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult};
 use pyo3::types::PyDict;
 
-use crate::fields::{Bound, Held, Object, Real, held, refused, shown};
+use crate::fields::{Bound, Held, Object, Real, beyond, held, refused, shown};
 
 /// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side, row by
 /// row.
@@ -32,7 +33,10 @@ impl<'py> Numbers<'py> {
         }
         let array = match value.cast::<PyArrayDyn<f64>>() {
             Ok(array) => array.clone(),
-            Err(_) => converted(value).map_err(|_| {
+            Err(_) => converted(value).map_err(|why| {
+                if why.is_instance_of::<PyOverflowError>(value.py()) {
+                    return beyond(field);
+                }
                 refused(format_args!(
                     "{field} must be an array of numbers, got {}",
                     shown(value)
@@ -142,10 +146,14 @@ fn converted<'py>(value: &Object<'py>) -> PyResult<Held<'py, PyArrayDyn<f64>>> {
     let array = numpy.call_method1("asarray", (value,))?;
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     let array = if kind == "O" {
-        // NumPy would read texts, and make a NaN of None.
+        // NumPy would read texts, and make a NaN of None. It refuses by itself what no double holds.
         for one in array.getattr("flat")?.try_iter()? {
             let Ok(one) = one?.extract::<Real>();
-            one.read("each")?;
+            if let Real::Other(one) = one
+                && !one.is_beyond
+            {
+                return Err(refused(one));
+            }
         }
         numpy.call_method1("asarray", (array, "float64"))?
     } else {

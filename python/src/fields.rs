@@ -3,11 +3,11 @@
 //! **Invariant:** a value that is refused is a `ValueError` that names its field, what it must be, and what it was.
 
 use std::convert::Infallible;
-use std::fmt::Display;
+use std::fmt::{self, Display, Formatter};
 
 use pendularm::math::integrator::{Method, UnknownMethod};
 use pyo3::Borrowed;
-use pyo3::exceptions::PyValueError;
+use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
 use pyo3::types::PyFloat;
 
@@ -51,15 +51,23 @@ pub(crate) type Object<'py> = pyo3::Bound<'py, PyAny>;
 
 /// An object as an error shows it: not all of a long array.
 pub(crate) fn shown(value: &Object<'_>) -> String {
-    let text = value
-        .repr()
-        .map(|text| text.to_string())
-        .unwrap_or_default();
+    // Python writes out no whole number of thousands of digits.
+    let text = value.repr().map_or_else(
+        |_| format!("an object of {}", value.get_type()),
+        |text| text.to_string(),
+    );
     if text.chars().count() > 60 {
         format!("{}...", text.chars().take(60).collect::<String>())
     } else {
         text
     }
+}
+
+/// The refusal of a number that is too large, as a whole number of Python's may be.
+pub(crate) fn beyond(field: &str) -> PyErr {
+    refused(format_args!(
+        "{field} must be finite, got a number that no double holds"
+    ))
 }
 
 /// Holds numbers to a bound; `place` says which of them it is.
@@ -84,7 +92,21 @@ pub(crate) fn held(
 #[derive(Debug)]
 pub(crate) enum Handed<T> {
     Is(T),
-    Other(String),
+    Other(Other),
+}
+
+/// A value that is none of the type that is meant, as an error shows it.
+#[derive(Debug)]
+pub(crate) struct Other {
+    shown: String,
+    /// Whether it is one but for its size.
+    pub(crate) is_beyond: bool,
+}
+
+impl Display for Other {
+    fn fmt(&self, text: &mut Formatter<'_>) -> fmt::Result {
+        text.write_str(&self.shown)
+    }
 }
 
 /// Any number.
@@ -100,12 +122,15 @@ impl<'a, 'py, T: Meant<'a, 'py>> FromPyObject<'a, 'py> for Handed<T> {
     type Error = Infallible;
 
     fn extract(value: Borrowed<'a, 'py, PyAny>) -> Result<Self, Infallible> {
-        if T::is_meant(value)
-            && let Ok(found) = value.extract()
-        {
-            return Ok(Self::Is(found));
-        }
-        Ok(Self::Other(shown(&value)))
+        let is_beyond = match T::is_meant(value).then(|| value.extract::<T>()) {
+            Some(Ok(found)) => return Ok(Self::Is(found)),
+            Some(Err(why)) => why.into().is_instance_of::<PyOverflowError>(value.py()),
+            None => false,
+        };
+        Ok(Self::Other(Other {
+            shown: shown(&value),
+            is_beyond,
+        }))
     }
 }
 
@@ -139,6 +164,7 @@ impl Real {
     pub(crate) fn read(self, field: &str) -> PyResult<f64> {
         match self {
             Self::Is(value) => Ok(value),
+            Self::Other(value) if value.is_beyond => Err(beyond(field)),
             Self::Other(value) => Err(refused(format_args!(
                 "{field} must be a number, got {value}"
             ))),

@@ -201,6 +201,16 @@ def test_arms_are_values():
         (lambda arm: setattr(arm, "method", b"rk4"), "method must be one of euler, midpoint, verlet, rk4, got b'rk4'"),
         (lambda arm: arm.enable("yes"), "data must be True or False, got 'yes'"),
         (lambda arm: arm.enable(1), "data must be True or False, got 1"),
+        (lambda arm: pendularm.Arm(gravity=10**400), "gravity must be finite, got a number that no double holds"),
+        (lambda arm: arm.set_state([10**400, 1]), "position must be finite, got a number that no double holds"),
+        (
+            lambda arm: arm.disturb([0, 0], fractions.Fraction(10**400)),
+            "duration must be finite, got a number that no double holds",
+        ),
+        (
+            lambda arm: arm.step(10**5000),
+            "steps must be a whole number, at least 0 and less than 2^64, got an object of <class 'int'>",
+        ),
         (lambda arm: pendularm.inverse_kinematics(arm.arm, math.nan, 1), "x must be finite, got NaN"),
         (lambda arm: pendularm.inverse_kinematics(arm.arm, 1, -math.inf), "y must be finite, got -inf"),
         (lambda arm: pendularm.inverse_kinematics(pendularm.Arm(3), 1, 1, math.nan), "phi must be finite, got NaN"),
