@@ -6,7 +6,7 @@ use numpy::ToPyArray;
 use pendularm::math::pid::Gains;
 use pyo3::PyTypeInfo;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult, Python, pyfunction};
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyMapping};
 
 use crate::arrays::joints;
 use crate::fields::{self, Bound, Held, Object, Whole, refused, shown};
@@ -38,9 +38,10 @@ pub(crate) fn read<const N: usize>(
     let Some(value) = value else {
         return Ok(missing);
     };
-    let gains = PyDict::type_object(value.py())
-        .call1((value,))
+    let gains = value
+        .cast::<PyMapping>()
         .ok()
+        .and_then(|mapping| PyDict::type_object(value.py()).call1((mapping,)).ok())
         .and_then(|gains| gains.cast_into::<PyDict>().ok())
         .ok_or_else(|| {
             refused(format_args!(
@@ -49,7 +50,8 @@ pub(crate) fn read<const N: usize>(
             ))
         })?;
     for name in gains.keys() {
-        if !["kp", "ki", "kd"].contains(&name.to_string().as_str()) {
+        let is_one = |name: String| ["kp", "ki", "kd"].contains(&name.as_str());
+        if !name.extract().is_ok_and(is_one) {
             return Err(refused(format_args!(
                 "gains has kp, ki and kd, got {}",
                 shown(&name)

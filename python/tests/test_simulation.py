@@ -166,6 +166,12 @@ def test_arms_are_values():
         (lambda arm: pendularm.Simulation(gains={"kx": [1, 1]}), "gains has kp, ki and kd, got 'kx'"),
         (lambda arm: pendularm.Simulation(gains={"kp": [1]}), "gains.kp must be an array of 2 numbers, got [1]"),
         (lambda arm: pendularm.Simulation(gains=5), "gains must be a mapping with kp, ki and kd, got 5"),
+        (lambda arm: pendularm.Simulation(gains=""), "gains must be a mapping with kp, ki and kd, got ''"),
+        (lambda arm: pendularm.Simulation(gains=[]), "gains must be a mapping with kp, ki and kd, got []"),
+        (
+            lambda arm: pendularm.Simulation(gains={pathlib.PurePosixPath("kp"): [1, 1]}),
+            "gains has kp, ki and kd, got PurePosixPath('kp')",
+        ),
         (lambda arm: pendularm.Arm(-1), "links must be 2 or 3, got -1"),
         (lambda arm: pendularm.Arm(2.5), "links must be 2 or 3, got 2.5"),
         (lambda arm: pendularm.default_gains(-1), "links must be 2 or 3, got -1"),
