@@ -6,15 +6,14 @@ use std::borrow::Cow;
 
 use numpy::ndarray::Dimension;
 use numpy::{
-    Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, PyArray, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::PyOverflowError;
 use pyo3::intern;
 use pyo3::prelude::{PyAnyMethods, PyDictMethods, PyResult};
 use pyo3::types::PyDict;
 
-use crate::fields::{Bound, Held, Object, Real, beyond, held, refused, shown};
+use crate::fields::{Bound, Held, Object, Real, beyond, held, is_masked, refused, shown};
 
 /// Numbers in an array of any shape, the caller's own memory where they are doubles that lie side by side, row by
 /// row.
@@ -128,15 +127,6 @@ fn is_writeable(array: &Object<'_>) -> PyResult<bool> {
     let py = array.py();
     let flags = array.getattr(intern!(py, "flags"))?;
     flags.getattr(intern!(py, "writeable"))?.is_truthy()
-}
-
-/// Whether this is a masked array some of whose numbers are not to be looked at.
-fn is_masked(value: &Object<'_>) -> PyResult<bool> {
-    if !value.is_instance_of::<PyUntypedArray>() || value.is_exact_instance_of::<PyUntypedArray>() {
-        return Ok(false);
-    }
-    let masked = value.py().import("numpy.ma")?;
-    masked.call_method1("is_masked", (value,))?.is_truthy()
 }
 
 /// Converts whatever NumPy can make doubles of; complex numbers, text and `None` are none.

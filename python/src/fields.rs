@@ -5,11 +5,15 @@
 use std::convert::Infallible;
 use std::fmt::{self, Display, Formatter};
 
+use numpy::PyUntypedArray;
 use pendularm::math::integrator::{Method, UnknownMethod};
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
-use pyo3::types::PyFloat;
+use pyo3::types::{PyFloat, PyList, PyTuple};
+
+/// Dimensions that an array has at most, and so the depth of lists that may stand for one.
+const MOST_DIMENSIONS: usize = 2;
 
 /// The numbers that a field may be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -68,6 +72,41 @@ pub(crate) fn beyond(field: &str) -> PyErr {
     refused(format_args!(
         "{field} must be finite, got a number that no double holds"
     ))
+}
+
+/// Whether some of these numbers are not to be looked at; NumPy reads them where they stand in a list.
+pub(crate) fn is_masked(value: &Object<'_>) -> PyResult<bool> {
+    is_masked_within(value, MOST_DIMENSIONS)
+}
+
+fn is_masked_within(value: &Object<'_>, depth: usize) -> PyResult<bool> {
+    if value.is_exact_instance_of::<PyFloat>() {
+        return Ok(false);
+    }
+    let parts = if value.is_instance_of::<PyUntypedArray>() {
+        if !value.is_exact_instance_of::<PyUntypedArray>() {
+            let masked = value.py().import("numpy.ma")?;
+            if masked.call_method1("is_masked", (value,))?.is_truthy()? {
+                return Ok(true);
+            }
+        }
+        if !value.getattr("dtype")?.getattr("hasobject")?.is_truthy()? {
+            return Ok(false);
+        }
+        value.getattr("flat")?
+    } else if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        value.clone()
+    } else {
+        return Ok(false);
+    };
+    if depth > 0 {
+        for one in parts.try_iter()? {
+            if is_masked_within(&one?, depth - 1)? {
+                return Ok(true);
+            }
+        }
+    }
+    Ok(false)
 }
 
 /// Holds numbers to a bound; `place` says which of them it is.
@@ -143,19 +182,24 @@ pub(crate) trait Meant<'a, 'py>: FromPyObject<'a, 'py> {
 }
 
 impl Meant<'_, '_> for f64 {
-    /// NumPy's complex numbers would lose their imaginary parts.
+    /// NumPy's complex numbers would lose their imaginary parts, and masked ones their masks.
     fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
-        let is_complex = || {
+        let is_real = || {
             let numpy = value.py().import("numpy")?;
-            numpy
-                .call_method1("iscomplexobj", (value,))?
-                .extract::<bool>()
+            let is_complex = numpy.call_method1("iscomplexobj", (value,))?;
+            PyResult::Ok(!is_complex.is_truthy()? && !is_masked(&value)?)
         };
-        value.is_instance_of::<PyFloat>() || is_complex().is_ok_and(|is_complex| !is_complex)
+        value.is_instance_of::<PyFloat>() || is_real().unwrap_or(false)
     }
 }
 
-impl Meant<'_, '_> for u64 {}
+impl Meant<'_, '_> for u64 {
+    /// Masked numbers would lose their masks.
+    fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
+        is_masked(&value).is_ok_and(|is_masked| !is_masked)
+    }
+}
+
 impl Meant<'_, '_> for bool {}
 impl Meant<'_, '_> for String {}
 

@@ -206,6 +206,7 @@ def test_a_mask_may_be_a_view_or_of_objects():
         (lambda batch: pendularm.Batch(2, threads=-1), "threads must be between 1 and 1024, got -1"),
         (lambda batch: pendularm.Batch(2, threads=2000), "threads must be between 1 and 1024, got 2000"),
         (lambda batch: pendularm.Batch(2, threads=0), "threads must be between 1 and 1024, got 0"),
+        (lambda batch: batch.step(np.ma.array(5, mask=True)), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step([1, 2]), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(-1), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(1, [[1, 2]]), "effort must have the shape (2,) or (3, 2), got [1, 2]"),
@@ -225,6 +226,19 @@ def test_a_mask_may_be_a_view_or_of_objects():
         (lambda batch: batch.set_integrator(["rk4"]), "method must be a name, or one for each of 3 arms"),
         (lambda batch: batch.enable("yes"), "data must be True or False, got 'yes'"),
         (lambda batch: batch.reset([3]), "arms must be a mask of 3 or indices below that"),
+        (
+            lambda batch: batch.reset(np.ma.array([True, True, False], mask=[True, False, False])),
+            "arms must have no masked entries, got masked_array(data=[--, True, False],\n             mask=[ Tru...",
+        ),
+        (
+            lambda batch: batch.set_state([0, 0], arms=np.ma.array([0, 1], mask=[True, False])),
+            "arms must have no masked entries, got masked_array(data=[--, 1],\n             mask=[ True, False],...",
+        ),
+        (lambda batch: batch.reset([np.ma.masked, 1]), "arms must have no masked entries, got [masked, 1]"),
+        (
+            lambda batch: batch.set_setpoint([[0, 0], np.ma.array([1, 1], mask=[0, 1]), [0, 0]]),
+            "positions must have no masked numbers, got [[0, 0], masked_array(data=[1, --],\n             mask=[False...",
+        ),
         (lambda batch: batch.reset([True]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.set_state([0, "a"]), "position must be an array of numbers, got [0, 'a']"),
     ],

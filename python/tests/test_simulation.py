@@ -196,6 +196,17 @@ def test_arms_are_values():
             lambda arm: arm.set_state(np.ma.masked_array([1, 2], [True, False])),
             "position must have no masked numbers, got masked_array(data=[--, 2],\n             mask=[ True, False],...",
         ),
+        (lambda arm: arm.set_state([np.ma.masked, 1]), "position must have no masked numbers, got [masked, 1]"),
+        (
+            lambda arm: arm.set_state(np.array([1, np.ma.masked], object)),
+            "position must have no masked numbers, got array([1, masked], dtype=object)",
+        ),
+        (lambda arm: pendularm.Arm(gravity=np.ma.masked), "gravity must be a number, got masked"),
+        (
+            lambda arm: arm.step(np.ma.array(5, mask=True)),
+            "steps must be a whole number, at least 0 and less than 2^64, "
+            "got masked_array(data=--,\n             mask=True,\n       fill_va...",
+        ),
         (
             lambda arm: pendularm.Simulation(timestep=np.complex128(0.1 + 1j)),
             f"timestep must be a number, got {np.complex128(0.1 + 1j)!r}",

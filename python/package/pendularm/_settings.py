@@ -2,7 +2,7 @@
 
 import operator
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -35,13 +35,16 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
-def is_masked(value: Any) -> bool:
-    """Whether some of the numbers are not to be looked at; NumPy reads them where they stand in a list."""
+def is_masked(value: Any, depth: int = 2) -> bool:
+    """Whether some of the numbers are not to be looked at; NumPy reads them where they stand in lists, so deep."""
     if isinstance(value, np.ma.MaskedArray):
         return bool(np.ma.is_masked(value))
-    if isinstance(value, np.ndarray) and value.dtype.hasobject:
-        return any(is_masked(one) for one in value.flat)
-    return isinstance(value, list | tuple) and any(is_masked(one) for one in value)
+    parts: Iterable[Any] = ()
+    if isinstance(value, list | tuple):
+        parts = value
+    elif isinstance(value, np.ndarray) and value.dtype.hasobject:
+        parts = value.flat
+    return depth > 0 and any(is_masked(one, depth - 1) for one in parts)
 
 
 def number(name: str, value: Any) -> float:

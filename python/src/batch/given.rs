@@ -8,7 +8,7 @@ use pyo3::prelude::{PyAnyMethods, PyResult};
 
 use super::Batch;
 use crate::arrays::{Numbers, Rows, laid_out};
-use crate::fields::{self, Bound, Object, refused};
+use crate::fields::{self, Bound, Object, is_masked, refused, shown};
 
 impl Batch {
     /// A row for each arm, or one for all, where something was handed in.
@@ -44,15 +44,21 @@ pub(super) fn read<'py>(
 
 /// One number of steps for all arms, or one for each.
 pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> {
+    let expected = || {
+        refused(format_args!(
+            "steps must be a whole number, or one for each of {arms} arms"
+        ))
+    };
+    if is_masked(steps)? {
+        return Err(expected());
+    }
     if let Ok(alike) = steps.extract::<u64>() {
         return Ok(vec![alike]);
     }
-    match steps.extract::<Vec<u64>>() {
-        Ok(each) if each.len() == arms => Ok(each),
-        _ => Err(refused(format_args!(
-            "steps must be a whole number, or one for each of {arms} arms"
-        ))),
-    }
+    let each: Vec<u64> = steps.extract().map_err(|_| expected())?;
+    Some(each)
+        .filter(|each| each.len() == arms)
+        .ok_or_else(expected)
 }
 
 /// One method for all arms, or one for each.
@@ -76,6 +82,12 @@ pub(super) fn chosen(arms: Option<&Object<'_>>, count: usize) -> PyResult<Vec<us
     let Some(arms) = arms else {
         return Ok((0..count).collect());
     };
+    if is_masked(arms)? {
+        return Err(refused(format_args!(
+            "arms must have no masked entries, got {}",
+            shown(arms)
+        )));
+    }
     let expected = || {
         refused(format_args!(
             "arms must be a mask of {count} or indices below that"
