@@ -10,7 +10,7 @@ use pendularm::math::integrator::{Method, UnknownMethod};
 use pyo3::Borrowed;
 use pyo3::exceptions::{PyOverflowError, PyValueError};
 use pyo3::prelude::{FromPyObject, PyAny, PyAnyMethods, PyErr, PyResult};
-use pyo3::types::{PyFloat, PyList, PyTuple};
+use pyo3::types::{PyBool, PyFloat, PyList, PyTuple};
 
 /// Dimensions that an array has at most, and so the depth of lists that may stand for one.
 const MOST_DIMENSIONS: usize = 2;
@@ -194,9 +194,9 @@ impl Meant<'_, '_> for f64 {
 }
 
 impl Meant<'_, '_> for u64 {
-    /// Masked numbers would lose their masks.
+    /// Truths would be counts of 0 and 1, and masked numbers lose their masks.
     fn is_meant(value: Borrowed<'_, '_, PyAny>) -> bool {
-        is_masked(&value).is_ok_and(|is_masked| !is_masked)
+        !value.is_instance_of::<PyBool>() && is_masked(&value).is_ok_and(|is_masked| !is_masked)
     }
 }
 
@@ -266,6 +266,15 @@ impl Whole {
             Self::Other(value) => Err(refusal(&value)),
         }
     }
+}
+
+/// A count, if this is one, which is known not to be masked.
+pub(crate) fn count(value: &Object<'_>) -> Option<u64> {
+    // Truths would be counts of 0 and 1.
+    if value.is_instance_of::<PyBool>() {
+        return None;
+    }
+    value.extract().ok()
 }
 
 /// One number.

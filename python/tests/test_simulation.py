@@ -4,6 +4,7 @@ import copy
 import decimal
 import fractions
 import math
+import pathlib
 import pickle
 import signal
 import threading
@@ -172,6 +173,8 @@ def test_arms_are_values():
             lambda arm: pendularm.Simulation(gains={pathlib.PurePosixPath("kp"): [1, 1]}),
             "gains has kp, ki and kd, got PurePosixPath('kp')",
         ),
+        (lambda arm: arm.step(True), "steps must be a whole number, at least 0 and less than 2^64, got True"),
+        (lambda arm: pendularm.default_gains(True), "links must be 2 or 3, got True"),
         (lambda arm: pendularm.Arm(-1), "links must be 2 or 3, got -1"),
         (lambda arm: pendularm.Arm(2.5), "links must be 2 or 3, got 2.5"),
         (lambda arm: pendularm.default_gains(-1), "links must be 2 or 3, got -1"),

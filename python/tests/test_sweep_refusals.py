@@ -69,6 +69,8 @@ def among_objects(*values):
         (lambda: pendularm.sweep({"kp": [1]}, links=-1), "links must be 2 or 3, got -1"),
         (lambda: pendularm.sweep({"kp": [1]}, links="2"), "links must be a whole number, got '2'"),
         (lambda: pendularm.sweep({"kp": [1]}, samples=11.0), "samples must be a whole number, got 11.0"),
+        (lambda: pendularm.sweep({"kp": [1]}, samples=True), "samples must be a whole number, got True"),
+        (lambda: pendularm.sweep({"kp": [1]}, piece=True, samples=2), "piece must be a whole number, got True"),
         (lambda: pendularm.sweep({"kp": [1]}, piece="1"), "piece must be a whole number, got '1'"),
         (lambda: pendularm.sweep({"kp": [1]}, duration="1"), "duration must be a number, got '1'"),
         (lambda: pendularm.sweep({"kp": [1]}, duration=10**400), "duration must be finite, got a number that no"),

@@ -22,7 +22,7 @@ SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
 
 def whole_number(name: str, value: Any) -> int:
     try:
-        if not is_masked(value):
+        if not isinstance(value, bool) and not is_masked(value):
             return operator.index(value)
     except TypeError:
         pass

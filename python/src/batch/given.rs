@@ -5,6 +5,7 @@
 use numpy::{PyArray1, PyArrayMethods};
 use pendularm::math::integrator::Method;
 use pyo3::prelude::{PyAnyMethods, PyResult};
+use pyo3::types::{PyByteArray, PyBytes};
 
 use super::Batch;
 use crate::arrays::{Numbers, Rows, laid_out};
@@ -49,16 +50,17 @@ pub(super) fn read_steps(steps: &Object<'_>, arms: usize) -> PyResult<Vec<u64>> 
             "steps must be a whole number, or one for each of {arms} arms"
         ))
     };
-    if is_masked(steps)? {
+    // Bytes are a sequence of numbers to Python.
+    let is_text = steps.is_instance_of::<PyBytes>() || steps.is_instance_of::<PyByteArray>();
+    if is_text || is_masked(steps)? {
         return Err(expected());
     }
-    if let Ok(alike) = steps.extract::<u64>() {
+    if let Some(alike) = fields::count(steps) {
         return Ok(vec![alike]);
     }
-    let each: Vec<u64> = steps.extract().map_err(|_| expected())?;
-    Some(each)
-        .filter(|each| each.len() == arms)
-        .ok_or_else(expected)
+    let each: Vec<Object<'_>> = steps.extract().map_err(|_| expected())?;
+    let each: Option<Vec<u64>> = each.iter().map(fields::count).collect();
+    each.filter(|each| each.len() == arms).ok_or_else(expected)
 }
 
 /// One method for all arms, or one for each.
