@@ -126,3 +126,9 @@ def test_a_byte_order_mark_is_no_part_of_a_name(tmp_path):
 def test_no_report_is_said_so(tmp_path):
     with pytest.raises(FileNotFoundError, match="holds no report"):
         pendularm.read_report(tmp_path)
+
+
+@pytest.mark.parametrize("folder", [5, None, b"report", "re\0port"])
+def test_a_folder_that_is_no_path_is_refused_by_its_name(folder):
+    with pytest.raises(ValueError, match="^folder must be a path, got "):
+        pendularm.read_report(folder)

@@ -1,5 +1,7 @@
 """Sweeps: a bad value is refused by the name of its field."""
 
+import pathlib
+
 import numpy as np
 import pytest
 
@@ -26,6 +28,8 @@ def among_objects(*values):
         (lambda: pendularm.sweep({"kp": [[1, 2, 3]]}), "every kp must be a number or an array of 2, got [[1, 2, 3]]"),
         (lambda: pendularm.sweep({"timestep": ["x"]}), "every timestep must be a number, got ['x']"),
         (lambda: pendularm.sweep({"method": ["leapfrog"]}), "method must be one of euler, midpoint, verlet, rk4"),
+        (lambda: pendularm.sweep({"method": [None]}), "every method must be a name, got [None]"),
+        (lambda: pendularm.sweep({"kp": [1]}, method=pathlib.PurePosixPath("rk4")), "every method must be a name, got ["),
         (lambda: pendularm.sweep({"kp": [1]}, "speed"), "metric must be one of final_error, settling_time"),
         (lambda: pendularm.sweep({"kp": [1]}, 5), "metric must be one of final_error, settling_time"),
         (lambda: pendularm.sweep({"q0": [[0, 0], [np.nan, 0]]}), "q0[1][0] must be finite, got nan"),
@@ -69,6 +73,20 @@ def among_objects(*values):
         (lambda: pendularm.sweep({"kp": [1]}, links=-1), "links must be 2 or 3, got -1"),
         (lambda: pendularm.sweep({"kp": [1]}, links="2"), "links must be a whole number, got '2'"),
         (lambda: pendularm.sweep({"kp": [1]}, samples=11.0), "samples must be a whole number, got 11.0"),
+        (lambda: pendularm.sweep({"kp": [1]}, executor=5), "executor must have submit, as those of concurrent.futures"),
+        (lambda: pendularm.sweep({"kp": [1]}, folder=5), "folder must be a path, got 5"),
+        (lambda: pendularm.sweep({"kp": [1]}, folder=b"a"), "folder must be a path, got b'a'"),
+        (lambda: pendularm.sweep({"kp": [1]}, folder="a\0b"), "folder must be a path, got 'a\\x00b'"),
+        (lambda: pendularm.sweep({"kp": [1]}, progress="no"), "progress must be True or False, got 'no'"),
+        (lambda: pendularm.sweep({"kp": [1]}, links=10**5000), "links must be 2 or 3, got an object of <class 'int'>"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, samples=10**5000),
+            "samples must be between 2 and 100000, got an object of <class 'int'>",
+        ),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, piece=10**5000),
+            "piece must be between 1 and 24937 with 401 samples, got an object of <class 'int'>",
+        ),
         (lambda: pendularm.sweep({"kp": [1]}, samples=True), "samples must be a whole number, got True"),
         (lambda: pendularm.sweep({"kp": [1]}, piece=True, samples=2), "piece must be a whole number, got True"),
         (lambda: pendularm.sweep({"kp": [1]}, piece="1"), "piece must be a whole number, got '1'"),

@@ -1,16 +1,13 @@
 """The settings of a sweep: their names, their values as arrays, and arms that have them."""
 
-import operator
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ._fields import Floats, is_masked, numbers, shown
 from ._native import Batch
-
-Floats = NDArray[np.float64]
 
 TRIED_AT_ONCE = 16_384
 """Values of a setting that one `Batch` tries before the sweep begins."""
@@ -20,63 +17,16 @@ STATES = ("setpoint", "q0", "qdot0")
 SETTINGS = (*PER_JOINT, "gravity", "timestep", "method")
 
 
-def whole_number(name: str, value: Any) -> int:
-    try:
-        if not isinstance(value, bool) and not is_masked(value):
-            return operator.index(value)
-    except TypeError:
-        pass
-    raise ValueError(f"{name} must be a whole number, got {value!r:.60}")
-
-
-def flag(name: str, value: Any) -> bool:
-    if not isinstance(value, bool | np.bool_):
-        raise ValueError(f"{name} must be True or False, got {value!r:.60}")
-    return bool(value)
-
-
-def is_masked(value: Any, depth: int = 2) -> bool:
-    """Whether some of the numbers are not to be looked at; NumPy reads them where they stand in lists, so deep."""
-    if isinstance(value, np.ma.MaskedArray):
-        return bool(np.ma.is_masked(value))
-    parts: Iterable[Any] = ()
-    if isinstance(value, list | tuple):
-        parts = value
-    elif isinstance(value, np.ndarray) and value.dtype.hasobject:
-        parts = value.flat
-    return depth > 0 and any(is_masked(one, depth - 1) for one in parts)
-
-
-def number(name: str, value: Any) -> float:
-    if is_masked(value):
-        raise ValueError(f"{name} must have no masked numbers, got {value!r:.60}")
-    try:
-        return float(numbers(value))
-    except OverflowError:
-        raise ValueError(f"{name} must be finite, got a number that no double holds") from None
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number, got {value!r:.60}") from None
-
-
-def numbers(value: Any) -> Floats:
-    """The value as doubles; texts, `None` and complex numbers are none."""
-    array = np.asarray(value)
-    if array.dtype.kind == "O":
-        # NumPy would read texts, make a NaN of None, and drop imaginary parts.
-        if any(one is None or isinstance(one, str | bytes | np.complexfloating) for one in array.flat):
-            raise TypeError
-        return array.astype(np.float64)
-    return array.astype(np.float64, casting="same_kind")
-
-
 def column(name: str, values: list[Any], links: int) -> Any:
     """Values of a setting, a row for each."""
     if name not in SETTINGS:
         raise ValueError(f"there is no setting {name!r}; there are {', '.join(SETTINGS)}")
     if name == "method":
+        if not all(isinstance(value, str) for value in values):
+            raise ValueError(f"every method must be a name, got {shown(values)}")
         return np.array([str(value) for value in values])
     if is_masked(values):
-        raise ValueError(f"every {name} must have no masked numbers, got {values!r:.60}")
+        raise ValueError(f"every {name} must have no masked numbers, got {shown(values)}")
     try:
         if name in PER_JOINT:
             array = np.array([np.broadcast_to(numbers(value), (links,)) for value in values])
@@ -86,7 +36,7 @@ def column(name: str, values: list[Any], links: int) -> Any:
         raise ValueError(f"every {name} must be finite, got a number that no double holds") from None
     except (TypeError, ValueError):
         each = f" or an array of {links}" if name in PER_JOINT else ""
-        raise ValueError(f"every {name} must be a number{each}, got {values!r:.60}") from None
+        raise ValueError(f"every {name} must be a number{each}, got {shown(values)}") from None
     # The other ones are refused by these names where they are tried.
     if name in STATES and not np.isfinite(array).all():
         row, joint = np.argwhere(~np.isfinite(array))[0]

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ._fields import path
+
 __all__ = ["read_report"]
 
 Column = NDArray[np.float64] | NDArray[np.str_]
@@ -20,7 +22,7 @@ def read_report(folder: str | os.PathLike[str] = "report") -> dict[str, dict[str
     `pandas.DataFrame` takes a table as it is. Raises `FileNotFoundError` where there is no report, and `ValueError`,
     with the file's name, for a table that cannot be read, ends amid a line, or has a row of too few or too many cells.
     """
-    files = sorted(Path(folder).glob("*.csv"))
+    files = sorted(path("folder", folder).glob("*.csv"))
     if not files:
         name = os.fspath(folder)
         raise FileNotFoundError(f"{name} holds no report: `pendularm report --out {name}` makes one")

@@ -13,16 +13,16 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._code import fingerprint
+from ._fields import Floats, flag, is_masked, number, path, shown, whole_number
 from ._native import Batch
 from ._pieces import Folder, Numbers, hand_out
-from ._settings import Floats, begin, column, flag, is_masked, number, try_values, whole_number
+from ._settings import begin, column, try_values
 
 __all__ = ["Executor", "Metric", "Run", "Sweep", "sweep"]
 
@@ -158,7 +158,7 @@ def sweep(
     sweep.
     """
     if not isinstance(grid, Mapping):
-        raise ValueError(f"grid must be a mapping from settings to their values, got {grid!r:.60}")
+        raise ValueError(f"grid must be a mapping from settings to their values, got {shown(grid)}")
     axes = {}
     for name, values in grid.items():
         try:
@@ -167,7 +167,7 @@ def sweep(
                 raise TypeError
             axes[name] = list(values)
         except TypeError:
-            raise ValueError(f"grid[{name!r}] must be a sequence of values, got {values!r:.60}") from None
+            raise ValueError(f"grid[{name!r}] must be a sequence of values, got {shown(values)}") from None
     for name, choices in axes.items():
         if name in settings:
             raise ValueError(f"{name} is both in the grid and fixed")
@@ -181,18 +181,22 @@ def sweep(
     links, samples = whole_number("links", links), whole_number("samples", samples)
     duration = number("duration", duration)
     if links not in (2, 3):
-        raise ValueError(f"links must be 2 or 3, got {links}")
+        raise ValueError(f"links must be 2 or 3, got {shown(links)}")
     if not 2 <= samples <= MOST_SAMPLES:
-        raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {samples}")
+        raise ValueError(f"samples must be between 2 and {MOST_SAMPLES}, got {shown(samples)}")
     if piece is None:
         piece = max(1, min(1024, MOST_ROWS // 10 // samples))
     piece, most = whole_number("piece", piece), min(MOST_ARMS, MOST_ROWS // samples)
     if not 1 <= piece <= most:
-        raise ValueError(f"piece must be between 1 and {most} with {samples} samples, got {piece}")
+        raise ValueError(f"piece must be between 1 and {most} with {samples} samples, got {shown(piece)}")
     if not (np.isfinite(duration) and duration > 0):
         raise ValueError(f"duration must be finite and greater than 0, got {duration}")
     if metric not in METRICS if isinstance(metric, str) else not callable(metric):
         raise ValueError(f"metric must be one of {', '.join(METRICS)} or a function, got {metric!r}")
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise ValueError(f"executor must have submit, as those of concurrent.futures have, got {shown(executor)}")
+    folder = None if folder is None else path("folder", folder)
+    progress = flag("progress", progress)
     question = _Question(
         axes={name: column(name, values, links) for name, values in axes.items()},
         fixed={name: column(name, [value], links) for name, value in settings.items()},
@@ -205,7 +209,7 @@ def sweep(
     question.check()
     kept = None
     if folder is not None:
-        kept = Folder(Path(folder), question.to_keep(), total, piece, metric if isinstance(metric, str) else None)
+        kept = Folder(folder, question.to_keep(), total, piece, metric if isinstance(metric, str) else None)
     starts = range(0, total, piece)
     done = {} if kept is None else kept.read(starts)
     left = [start for start in starts if start not in done]

@@ -1,0 +1,81 @@
+"""Reading what is handed in, under the name of its field: what cannot be is a `ValueError` that says so."""
+
+import operator
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Floats", "flag", "is_masked", "number", "numbers", "path", "shown", "whole_number"]
+
+Floats = NDArray[np.float64]
+
+
+def shown(value: Any) -> str:
+    """A value as an error shows it; Python writes out no whole number of thousands of digits."""
+    try:
+        return f"{value!r:.60}"
+    except ValueError:
+        return f"an object of {type(value)}"
+
+
+def whole_number(name: str, value: Any) -> int:
+    try:
+        if not isinstance(value, bool) and not is_masked(value):
+            return operator.index(value)
+    except TypeError:
+        pass
+    raise ValueError(f"{name} must be a whole number, got {shown(value)}")
+
+
+def flag(name: str, value: Any) -> bool:
+    if not isinstance(value, bool | np.bool_):
+        raise ValueError(f"{name} must be True or False, got {shown(value)}")
+    return bool(value)
+
+
+def is_masked(value: Any, depth: int = 2) -> bool:
+    """Whether some of the numbers are not to be looked at; NumPy reads them where they stand in lists, so deep."""
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ma.is_masked(value))
+    parts: Iterable[Any] = ()
+    if isinstance(value, list | tuple):
+        parts = value
+    elif isinstance(value, np.ndarray) and value.dtype.hasobject:
+        parts = value.flat
+    return depth > 0 and any(is_masked(one, depth - 1) for one in parts)
+
+
+def number(name: str, value: Any) -> float:
+    if is_masked(value):
+        raise ValueError(f"{name} must have no masked numbers, got {shown(value)}")
+    try:
+        return float(numbers(value))
+    except OverflowError:
+        raise ValueError(f"{name} must be finite, got a number that no double holds") from None
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {shown(value)}") from None
+
+
+def numbers(value: Any) -> Floats:
+    """The value as doubles; texts, `None` and complex numbers are none."""
+    array = np.asarray(value)
+    if array.dtype.kind == "O":
+        # NumPy would read texts, make a NaN of None, and drop imaginary parts.
+        if any(one is None or isinstance(one, str | bytes | np.complexfloating) for one in array.flat):
+            raise TypeError
+        return array.astype(np.float64)
+    return array.astype(np.float64, casting="same_kind")
+
+
+def path(name: str, value: str | os.PathLike[str]) -> Path:
+    try:
+        found = Path(value)
+    except TypeError:
+        raise ValueError(f"{name} must be a path, got {shown(value)}") from None
+    if "\0" in str(found):
+        raise ValueError(f"{name} must be a path, got {shown(value)}")
+    return found
