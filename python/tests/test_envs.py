@@ -97,6 +97,8 @@ def test_some_of_the_arms_can_be_reset_alone(name):
     assert not np.array_equal(after[1], before[1])
     with pytest.raises(ValueError, match="reset_mask must be"):
         env.reset(options={"reset_mask": [True]})
+    with pytest.raises(ValueError, match=r"^reset_mask must have no masked entries, got masked_array\(data=\[True, --"):
+        env.reset(options={"reset_mask": np.ma.array([True, False, True], mask=[False, True, False])})
     with pytest.raises(ValueError, match="seed must be one number, or one for each of 3, got 2"):
         env.reset(seed=[1, 2])
 
@@ -143,6 +145,16 @@ def test_actions_have_a_row_for_each_arm(actions):
     one.reset(seed=0)
     with pytest.raises(ValueError, match=r"action must have the shape \(2,\)"):
         one.step(actions)
+
+
+def test_masked_actions_are_refused():
+    env, one = pendularm.envs.PendularmVectorEnv(3), pendularm.envs.PendularmEnv()
+    env.reset(seed=0)
+    one.reset(seed=0)
+    with pytest.raises(ValueError, match=r"^actions must have no masked numbers, got masked_array\("):
+        env.step(np.ma.masked_equal(np.eye(3, 2, dtype=np.float32), 1))
+    with pytest.raises(ValueError, match=r"^action must have no masked numbers, got masked_array\("):
+        one.step(np.ma.masked_equal(np.eye(2, dtype=np.float32)[0], 1))
 
 
 def test_what_the_batch_refuses_has_the_callers_name(name):

@@ -21,6 +21,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import dynamics
+from ._fields import is_masked, shown
 from ._native import Arm, Batch
 
 __all__ = [
@@ -146,6 +147,8 @@ def _check_render_mode(render_mode: str | None) -> None:
 
 def _checked(name: str, actions: Action, space: spaces.Space[Action]) -> Action:
     """Actions of the space's shape; which numbers they are is left to who clips them."""
+    if is_masked(actions):
+        raise ValueError(f"{name} must have no masked numbers, got {shown(actions)}")
     array = np.asarray(actions)
     if array.shape != space.shape or array.dtype.kind not in "biuf":
         raise ValueError(f"{name} must have the shape {space.shape}, of numbers, got {array.shape} of {array.dtype}")
@@ -225,7 +228,10 @@ class _Vector(VectorEnv[Observation, Action, Any]):
     ) -> tuple[Observation, dict[str, Any]]:
         mask = np.ones(self.num_envs, np.bool_)
         if options is not None and "reset_mask" in options:
-            mask = np.asarray(options["reset_mask"])
+            given = options["reset_mask"]
+            if is_masked(given):
+                raise ValueError(f"reset_mask must have no masked entries, got {shown(given)}")
+            mask = np.asarray(given)
             if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
                 raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, one of them true, got {mask!r}")
         if seed is None or isinstance(seed, int):
