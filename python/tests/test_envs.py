@@ -103,6 +103,16 @@ def test_some_of_the_arms_can_be_reset_alone(name):
         env.reset(seed=[1, 2])
 
 
+def test_the_first_reset_is_of_all_arms(name):
+    env = gymnasium.make_vec(name, 3)
+    with pytest.raises(ValueError, match=r"^reset_mask must be true of all 3 at the first reset, got array\("):
+        env.reset(seed=1, options={"reset_mask": np.array([True, False, True])})
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(np.zeros((3, 2), np.float32))
+    found = env.reset(seed=1, options={"reset_mask": np.ones(3, bool)})[0]
+    assert np.array_equal(found, gymnasium.make_vec(name, 3).reset(seed=1)[0])
+
+
 def test_an_arm_that_turns_too_fast_is_lost():
     env = gymnasium.make("PendularmReach-v0")
     env.reset(seed=0)

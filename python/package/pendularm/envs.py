@@ -234,6 +234,8 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             mask = np.asarray(given)
             if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
                 raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, one of them true, got {mask!r}")
+            if not self._random and not mask.all():
+                raise ValueError(f"reset_mask must be true of all {self.num_envs} at the first reset, got {mask!r}")
         if seed is None or isinstance(seed, int):
             seeds: Sequence[int | None] = [None if seed is None else seed + arm for arm in range(self.num_envs)]
         else:
