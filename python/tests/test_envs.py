@@ -177,11 +177,21 @@ def test_what_the_batch_refuses_has_the_callers_name(name):
         one.step(np.array([0, np.nan], np.float32))
 
 
-@pytest.mark.parametrize("steps", [0, -1, 2.0, "2", np.float64(3)])
+@pytest.mark.parametrize("steps", [0, -2, 2.0, "2", np.float64(3), True])
 def test_an_episode_has_a_whole_number_of_steps(steps):
-    with pytest.raises(ValueError, match=r"^max_episode_steps must be a whole number, at least 1, got "):
+    with pytest.raises(ValueError, match=r"^max_episode_steps must be (a whole number|at least 1, or -1 for no limit), got "):
         pendularm.envs.PendularmVectorEnv(2, max_episode_steps=steps)
     pendularm.envs.PendularmVectorEnv(2, max_episode_steps=np.int64(1))
+
+
+@pytest.mark.parametrize("steps", [-1, 10**30])
+def test_an_episode_may_have_no_limit(name, steps):
+    env = gymnasium.make_vec(name, 2, max_episode_steps=steps)
+    env.reset(seed=0)
+    for _ in range(300):
+        truncated = env.step(np.zeros((2, 2), np.float32))[3]
+        assert truncated.dtype == np.bool_
+        assert not truncated.any()
 
 
 def test_a_step_needs_a_reset():

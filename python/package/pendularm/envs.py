@@ -8,7 +8,7 @@ They truncate themselves, and reset an arm in the call after its end, whose acti
 pickled, and a process that is forked while another thread steps it must not use it.
 """
 
-import operator
+import sys
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
@@ -21,7 +21,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import dynamics
-from ._fields import is_masked, shown
+from ._fields import is_masked, shown, whole_number
 from ._native import Arm, Batch
 
 __all__ = [
@@ -202,17 +202,15 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         _check_render_mode(render_mode)
         if max_episode_steps is None:
             max_episode_steps = self.task_of.most_steps
-        try:
-            is_number = operator.index(max_episode_steps) >= 1
-        except TypeError:
-            is_number = False
-        if not is_number:
-            raise ValueError(f"max_episode_steps must be a whole number, at least 1, got {max_episode_steps!r}")
+        most_steps = whole_number("max_episode_steps", max_episode_steps)
+        if most_steps < 1 and most_steps != -1:
+            raise ValueError(f"max_episode_steps must be at least 1, or -1 for no limit, got {shown(most_steps)}")
         try:
             self._task = self.task_of(num_envs, links, threads)
         except ValueError as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
-        self._most_steps = max_episode_steps
+        # What no arm comes to in a lifetime is no limit.
+        self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.single_observation_space = self._task.observation_space
@@ -303,7 +301,7 @@ _SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as s
     rad/s; truncated after 200 steps (10 s).
 
     ## Arguments
-    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
+    `links`, 2 or 3; `max_episode_steps`, -1 for no limit. The vector environment has `threads` too, those of `Batch`.
 
     ## Versions
     v0: the first.
@@ -334,7 +332,7 @@ _REACH = """The end effector is to come to a target and stay, with efforts twice
     faster than 25 rad/s; truncated after 100 steps (5 s).
 
     ## Arguments
-    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`.
+    `links`, 2 or 3; `max_episode_steps`, -1 for no limit. The vector environment has `threads` too, those of `Batch`.
 
     ## Versions
     v0: the first.
