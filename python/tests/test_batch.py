@@ -212,7 +212,7 @@ def test_a_mask_may_be_a_view_or_of_objects():
         (lambda batch: batch.step([1, True, 1]), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(b"abc"), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(bytearray(3)), "steps must be a whole number, or one for each of 3 arms"),
-        (lambda batch: batch.step(np.ma.array(5, mask=True)), "steps must be a whole number, or one for each of 3 arms"),
+        (lambda batch: batch.step(np.ma.array(5, mask=1)), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step([1, 2]), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(-1), "steps must be a whole number, or one for each of 3 arms"),
         (lambda batch: batch.step(1, [[1, 2]]), "effort must have the shape (2,) or (3, 2), got [1, 2]"),

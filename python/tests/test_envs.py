@@ -99,8 +99,6 @@ def test_some_of_the_arms_can_be_reset_alone(name):
         env.reset(options={"reset_mask": [True]})
     with pytest.raises(ValueError, match=r"^reset_mask must have no masked entries, got masked_array\(data=\[True, --"):
         env.reset(options={"reset_mask": np.ma.array([True, False, True], mask=[False, True, False])})
-    with pytest.raises(ValueError, match="seed must be one number, or one for each of 3, got 2"):
-        env.reset(seed=[1, 2])
 
 
 def test_the_first_reset_is_of_all_arms(name):
@@ -111,6 +109,56 @@ def test_the_first_reset_is_of_all_arms(name):
         env.step(np.zeros((3, 2), np.float32))
     found = env.reset(seed=1, options={"reset_mask": np.ones(3, bool)})[0]
     assert np.array_equal(found, gymnasium.make_vec(name, 3).reset(seed=1)[0])
+
+
+def test_the_seeds_are_those_of_as_many_single_environments(name):
+    ours = gymnasium.make_vec(name, 3)
+    theirs = gymnasium.make_vec(name, 3, vectorization_mode="sync")
+    for seed in [7, [1, 2, 3], None, [4, None, 5]]:
+        found, expected = ours.reset(seed=seed), theirs.reset(seed=seed)
+        if seed is not None:
+            assert ours.np_random_seed == theirs.np_random_seed
+            assert np.array_equal(found[0], expected[0])
+    assert ours.np_random_seed == (4, 2, 5)
+    ours.reset(seed=9, options={"reset_mask": np.array([False, True, False])})
+    assert ours.np_random_seed == (4, 10, 5)
+    # Who asks for the seeds before the first reset has those that it goes on with.
+    one, other = gymnasium.make_vec(name, 3), gymnasium.make_vec(name, 3)
+    seeds = one.np_random_seed
+    assert len(set(seeds)) == 3
+    assert np.array_equal(one.reset()[0], other.reset(seed=list(seeds))[0])
+    assert [stream.random() for stream in one.np_random] == [stream.random() for stream in other.np_random]
+
+
+def test_a_seed_may_be_any_whole_number(name):
+    env = gymnasium.make_vec(name, 3)
+    expected = env.reset(seed=3)[0]
+    for seed in [np.int64(3), np.array(3), [3, np.int8(4), 5], np.arange(3, 6), range(3, 6), (3, 4, 5)]:
+        assert np.array_equal(env.reset(seed=seed)[0], expected)
+        assert env.np_random_seed == (3, 4, 5)
+
+
+@pytest.mark.parametrize(
+    ("seed", "said"),
+    [
+        ([1, 2], "seed must be one number, or one for each of 3, got 2"),
+        (-1, "seed must be at least 0, got -1"),
+        ([1, -2, 3], "seed[1] must be at least 0, got -2"),
+        (2.0, "seed must be a whole number, got 2.0"),
+        ("abc", "seed must be a whole number, got 'abc'"),
+        (b"abc", "seed must be a whole number, got b'abc'"),
+        ([1, 2, "3"], "seed[2] must be a whole number, got '3'"),
+        (np.ones(3), "seed[0] must be a whole number, got "),
+        (np.ma.array([1, 2, 3], mask=[0, 0, 1]), "seed[2] must be a whole number, got masked"),
+    ],
+)
+def test_a_seed_that_is_none_is_refused_and_changes_nothing(seed, said):
+    env = pendularm.envs.PendularmVectorEnv(3)
+    env.reset(seed=1)
+    with pytest.raises(ValueError) as refusal:
+        env.reset(seed=seed)
+    assert str(refusal.value).startswith(said)
+    assert env.np_random_seed == (1, 2, 3)
 
 
 def test_an_arm_that_turns_too_fast_is_lost():
@@ -179,7 +227,7 @@ def test_what_the_batch_refuses_has_the_callers_name(name):
 
 @pytest.mark.parametrize("steps", [0, -2, 2.0, "2", np.float64(3), True])
 def test_an_episode_has_a_whole_number_of_steps(steps):
-    with pytest.raises(ValueError, match=r"^max_episode_steps must be (a whole number|at least 1, or -1 for no limit), got "):
+    with pytest.raises(ValueError, match="^max_episode_steps must be (a whole number|at least 1, or -1 for no limit)"):
         pendularm.envs.PendularmVectorEnv(2, max_episode_steps=steps)
     pendularm.envs.PendularmVectorEnv(2, max_episode_steps=np.int64(1))
 

@@ -2,14 +2,14 @@
 
 import operator
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Floats", "flag", "is_masked", "number", "numbers", "path", "shown", "whole_number"]
+__all__ = ["Floats", "flag", "is_masked", "number", "numbers", "path", "read_seeds", "shown", "whole_number"]
 
 Floats = NDArray[np.float64]
 
@@ -29,6 +29,26 @@ def whole_number(name: str, value: Any) -> int:
     except TypeError:
         pass
     raise ValueError(f"{name} must be a whole number, got {shown(value)}")
+
+
+def read_seeds(name: str, value: Any, arms: int) -> list[int | None]:
+    """One seed for each arm; of a single one the first arm has it, and those of the others follow."""
+
+    def seed(part: str, one: Any) -> int:
+        found = whole_number(part, one)
+        if found < 0:
+            raise ValueError(f"{part} must be at least 0, got {shown(found)}")
+        return found
+
+    if value is None:
+        return [None] * arms
+    is_one = value.ndim == 0 if isinstance(value, np.ndarray) else not isinstance(value, Sequence)
+    if is_one or isinstance(value, str | bytes | bytearray):
+        first = seed(name, value)
+        return [first + arm for arm in range(arms)]
+    if len(value) != arms:
+        raise ValueError(f"{name} must be one number, or one for each of {arms}, got {len(value)}")
+    return [None if one is None else seed(f"{name}[{arm}]", one) for arm, one in enumerate(value)]
 
 
 def flag(name: str, value: Any) -> bool:

@@ -21,7 +21,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from . import dynamics
-from ._fields import is_masked, shown, whole_number
+from ._fields import is_masked, read_seeds, shown, whole_number
 from ._native import Arm, Batch
 
 __all__ = [
@@ -217,9 +217,26 @@ class _Vector(VectorEnv[Observation, Action, Any]):
         self.single_action_space = self._task.action_space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._random: list[np.random.Generator] = []
+        self._streams: list[tuple[np.random.Generator, int]] = []
+        self._has_begun = False
         self._elapsed = np.zeros(num_envs, np.int64)
         self._ended = np.zeros(num_envs, np.bool_)
+
+    @property  # type: ignore[misc]
+    def np_random(self) -> tuple[np.random.Generator, ...]:  # type: ignore[override]
+        """The arms' random streams."""
+        return tuple(stream for stream, _ in self._drawn())
+
+    @property
+    def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The seeds of the arms' random streams."""
+        return tuple(seed for _, seed in self._drawn())
+
+    def _drawn(self) -> list[tuple[np.random.Generator, int]]:
+        """The streams with their seeds, which chance has where nobody has given any."""
+        if not self._streams:
+            self._streams = [seeding.np_random() for _ in range(self.num_envs)]
+        return self._streams
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -232,27 +249,23 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             mask = np.asarray(given)
             if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
                 raise ValueError(f"reset_mask must be ({self.num_envs},) of bool, one of them true, got {mask!r}")
-            if not self._random and not mask.all():
+            if not self._has_begun and not mask.all():
                 raise ValueError(f"reset_mask must be true of all {self.num_envs} at the first reset, got {mask!r}")
-        if seed is None or isinstance(seed, int):
-            seeds: Sequence[int | None] = [None if seed is None else seed + arm for arm in range(self.num_envs)]
-        else:
-            seeds = seed
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed must be one number, or one for each of {self.num_envs}, got {len(seeds)}")
-        if not self._random:
-            self._random = [seeding.np_random(one)[0] for one in seeds]
+        seeds = read_seeds("seed", seed, self.num_envs)
+        if not self._streams:
+            self._streams = [seeding.np_random(one) for one in seeds]
         else:
             for arm in np.flatnonzero(mask).tolist():
                 if seeds[arm] is not None:
-                    self._random[arm] = seeding.np_random(seeds[arm])[0]
+                    self._streams[arm] = seeding.np_random(seeds[arm])
+        self._has_begun = True
         self._begin(mask)
         return self._task.observe(), {}
 
     def step(
         self, actions: Action
     ) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        if not self._random:
+        if not self._has_begun:
             raise gymnasium.error.ResetNeeded("reset has to come before the first step")
         # Arms that have ended are stepped with the others, by no effort, and begin anew wherever that leads.
         again = self._ended
@@ -273,7 +286,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
 
     def _begin(self, mask: NDArray[np.bool_]) -> None:
         arms = np.flatnonzero(mask).tolist()
-        self._task.begin(arms, [self._random[arm] for arm in arms])
+        self._task.begin(arms, [self._streams[arm][0] for arm in arms])
         self._elapsed[mask] = 0
         self._ended = self._ended & ~mask
 
@@ -301,7 +314,8 @@ _SWING_UP = """An arm that hangs is to swing up and stay, with efforts half as s
     rad/s; truncated after 200 steps (10 s).
 
     ## Arguments
-    `links`, 2 or 3; `max_episode_steps`, -1 for no limit. The vector environment has `threads` too, those of `Batch`.
+    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`, and `max_episode_steps`, -1 for no
+    limit.
 
     ## Versions
     v0: the first.
@@ -332,7 +346,8 @@ _REACH = """The end effector is to come to a target and stay, with efforts twice
     faster than 25 rad/s; truncated after 100 steps (5 s).
 
     ## Arguments
-    `links`, 2 or 3; `max_episode_steps`, -1 for no limit. The vector environment has `threads` too, those of `Batch`.
+    `links`, 2 or 3; the vector environment has `threads` too, those of `Batch`, and `max_episode_steps`, -1 for no
+    limit.
 
     ## Versions
     v0: the first.
