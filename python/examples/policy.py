@@ -1,9 +1,9 @@
 """A policy that swings the arm up, found in about a minute: policy.py [generations].
 
 CMA-ES (the package `cma`) draws some dozens of small networks, 300 times unless told otherwise; a vector environment
-tries each of them on several arms at once, and the best half shapes the next draw. Needs `pip install "pendularm[gym]"
-cma`. Prints the reward of a random policy and what is found, 0.85, on starts that were not trained on, and keeps the
-network in `policy.npz`.
+tries each of them on several arms at once, and the best half shapes the next draw. Needs
+`pip install "$(ls python/target/wheels/*.whl)[gym]" cma`. Prints the reward of a random policy and what is found, 0.85,
+on starts that were not trained on, and keeps the network in `policy.npz`.
 """
 
 import sys

@@ -11,6 +11,12 @@ import pytest
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
+@pytest.mark.parametrize("name", ["lesson.ipynb", "live_client.py", "policy.py"])
+def test_an_example_needs_the_wheel_and_not_an_index_that_has_it(name):
+    said = (EXAMPLES / name).read_text(encoding="utf-8").split("pip install ")[1:]
+    assert all(".whl" in command.split("`")[0] for command in said)
+
+
 # Jupyter's own warnings are Jupyter's.
 @pytest.mark.filterwarnings("ignore")
 def test_the_lesson_shows_what_it_says(tmp_path, play_notebook):
