@@ -243,7 +243,8 @@ def test_a_mask_may_be_a_view_or_of_objects():
         (lambda batch: batch.reset([np.ma.masked, 1]), "arms must have no masked entries, got [masked, 1]"),
         (
             lambda batch: batch.set_setpoint([[0, 0], np.ma.array([1, 1], mask=[0, 1]), [0, 0]]),
-            "positions must have no masked numbers, got [[0, 0], masked_array(data=[1, --],\n             mask=[False...",
+            "positions must have no masked numbers, "
+            "got [[0, 0], masked_array(data=[1, --],\n             mask=[False...",
         ),
         (lambda batch: batch.reset([True]), "arms must be a mask of 3 or indices below that"),
         (lambda batch: batch.set_state([0, "a"]), "position must be an array of numbers, got [0, 'a']"),

@@ -47,7 +47,10 @@ def among_objects(*values):
             lambda: pendularm.sweep({"kp": [1]}, masses=HIDDEN.astype(object)),
             "every masses must have no masked numbers, got [masked_a",
         ),
-        (lambda: pendularm.sweep({"kp": [1]}, masses=among_objects(np.ma.masked, 1)), "every masses must have no masked"),
+        (
+            lambda: pendularm.sweep({"kp": [1]}, masses=among_objects(np.ma.masked, 1)),
+            "every masses must have no masked",
+        ),
         (lambda: pendularm.sweep({"kp": [1]}, duration=np.ma.masked), "duration must have no masked numbers, got"),
         (
             lambda: pendularm.sweep({"kp": [1]}, samples=np.ma.array(5, mask=True)),

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ._fields import Floats, is_masked, numbers, shown
+from ._fields import is_masked, numbers, shown
 from ._native import Batch
 
 TRIED_AT_ONCE = 16_384
