@@ -53,6 +53,7 @@
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
 //! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
+//! - [`TakeSnapshot`], from tests: the whole simulation as it is.
 //! - [`SettleWith`], from `ik_action` and `follow` when they start: who is to be asked before it says that it stands
 //!   still.
 //!
@@ -123,6 +124,7 @@
 //! [`SetSetpoint`]: arm::sim::SetSetpoint
 //! [`ArmPose`]: arm::sim::ArmPose
 //! [`ArmSettings`]: arm::sim::ArmSettings
+//! [`TakeSnapshot`]: arm::sim::TakeSnapshot
 //! [`TrackGoal`]: arm::sim::TrackGoal
 //! [`CommandGoal`]: arm::sim::CommandGoal
 //! [`EndGoal`]: arm::sim::EndGoal

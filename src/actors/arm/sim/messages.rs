@@ -18,7 +18,7 @@ use crate::study::control_loop::ControlLoop;
 #[rtype(result = "f64")]
 pub struct SimulationTime;
 
-/// Asks for the simulation that an offline observer would have to run to get the present state. From tests and tools.
+/// Asks for the simulation that an offline observer would have to run to get the present state. From tests.
 #[derive(Message)]
 #[rtype(result = "Snapshot<N>")]
 pub struct TakeSnapshot<const N: usize>;
