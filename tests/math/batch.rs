@@ -191,9 +191,7 @@ fn a_lane_ends_where_time_ends_too() {
     let weightless = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
     let mut arms = vec![Simulation::<2>::new(weightless, Gains::default()); 16];
     arms[3].set_timestep(1e308);
-    arms[5].set_timestep(1e18);
-    arms[5].advance(1);
-    arms[5].set_timestep(0.001);
+    arms[5].set_timestep(1e307);
     let mut alone = arms.clone();
     batch::advance(arms.iter_mut().map(|arm| (arm, 100)));
     for (index, (arm, alone)) in arms.iter().zip(&mut alone).enumerate() {

@@ -144,34 +144,21 @@ fn a_diverged_arm_that_is_paused_is_diverged_still() {
 
 /// A weightless arm at rest stays finite whatever the timestep is; its clock does not.
 #[test]
-fn a_step_that_would_not_move_the_clock_is_not_taken() {
+fn a_step_after_which_the_clock_would_not_be_finite_is_not_taken() {
     let runtime = Runtime::start();
     let mut client = runtime.connect();
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.ask("/arm_sim/set_params", json!({"gravity": 0}));
-    let set_timestep = |client: &mut Client, timestep: f64| {
-        client.ask("/arm_sim/set_integrator", json!({"timestep": timestep}));
-    };
-    for (first, second) in [(1e308, 1e308), (1e18, 0.001)] {
-        set_timestep(&mut client, 0.001);
-        client.ask("/arm_sim/reset", json!({}));
-        set_timestep(&mut client, first);
-        client.ask("/arm_sim/step", json!({"steps": 1}));
-        set_timestep(&mut client, second);
-        let ended = client.call("/arm_sim/step", json!({"steps": 2}));
-        assert_eq!(ended["result"], false, "{ended}");
-        assert_eq!(ended["values"], json!({"steps": 0, "time": first}));
-        client.subscribe("/diagnostics");
-        let message = client.message("/diagnostics");
-        let message = arm_status(&message)["message"].as_str().unwrap();
-        assert!(
-            message.contains("step 2 from t = 1") && message.contains("not have moved the clock"),
-            "{message}"
-        );
-        client.send(&json!({"op": "unsubscribe", "topic": "/diagnostics"}));
-        client.settle();
-        client.kept.clear();
-    }
+    client.ask("/arm_sim/reset", json!({}));
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e308}));
+    let ended = client.call("/arm_sim/step", json!({"steps": 2}));
+    assert_eq!(ended["result"], false, "{ended}");
+    assert_eq!(ended["values"], json!({"steps": 1, "time": 1e308}));
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 0.001}));
+    client.subscribe("/diagnostics");
+    let message = client.message("/diagnostics");
+    let message = arm_status(&message)["message"].as_str().unwrap();
+    assert!(message.contains("step 2 from t = 1"), "{message}");
     client.ask("/arm_sim/reset", json!({}));
     assert_eq!(
         client.ask("/arm_sim/step", json!({"steps": 2})),

@@ -1,6 +1,6 @@
 //! Simulation time, and how far it can go.
 //!
-//! **Invariant:** time is `base + k timestep`, never a running sum; every step leads to a later time, and a finite one.
+//! **Invariant:** time is `base + k timestep`, never a running sum, and finite.
 
 use std::ops::ControlFlow;
 
@@ -19,22 +19,14 @@ impl<const N: usize> Simulation<N> {
         self.base + in_f64(self.steps_since_base.saturating_add(steps)) * self.timestep
     }
 
-    /// Whether a step leads to a later time: from 1e308 s on another 1e308 s is none, and at 1e18 s a millisecond is
-    /// lost in rounding.
+    /// Whether so many more steps lead to a finite time, and so does each on the way: time does not fall from step to
+    /// step, rounding included.
     #[must_use]
-    pub fn has_later_time(&self) -> bool {
-        let next = self.time_after(1);
-        next.is_finite() && next > self.time()
+    pub fn has_time_for(&self, steps: u64) -> bool {
+        self.time_after(steps).is_finite()
     }
 
-    /// Whether each of the next `steps` surely leads to a later time. Asked once for all of them: where a timestep is
-    /// more than four units in the last place of the time at the end, which no finite one is of an infinite time, the
-    /// roundings of product and sum cannot hold the clock anywhere on the way.
-    pub(super) fn has_time_for(&self, steps: u64) -> bool {
-        self.timestep > 4.0 * f64::EPSILON * self.time_after(steps)
-    }
-
-    /// As [`Simulation::advance_with`] near the end of time: asks before each step whether it leads to a later one.
+    /// As [`Simulation::advance_with`] where time ends before the last step: asks before each whether there is time for it.
     #[cold]
     pub(super) fn take_last_steps(
         &mut self,
@@ -42,7 +34,7 @@ impl<const N: usize> Simulation<N> {
         mut observe: impl FnMut(&Self) -> ControlFlow<()>,
     ) -> u64 {
         for taken in 0..steps {
-            if !self.has_later_time() {
+            if !self.has_time_for(1) {
                 self.diverge();
                 return taken;
             }

@@ -10,8 +10,8 @@
 //! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
 //! studied, bit for bit. May use the rest of `math`; told no time, it is stepped.
 //!
-//! **Invariant:** state and time are finite. A step whose result is not, or which leads to no later time, is not taken,
-//! in whole or in part, and nothing steps after it until [`Simulation::reset`].
+//! **Invariant:** state and time are finite. A step after which they would not be is not taken, in whole or in part, and
+//! nothing steps after it until [`Simulation::reset`].
 
 #![allow(
     clippy::indexing_slicing,
@@ -39,7 +39,7 @@ use super::pid::{Control, Gains, Pid, Setpoint};
 /// Timestep until another is set \[s\]. A third of what the default gains are stable to.
 pub const DEFAULT_TIMESTEP: f64 = 0.001;
 
-/// The step that a simulation did not take, since its result was not finite or led to no later time.
+/// The step that a simulation did not take, since state or time would not have been finite after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Divergence {
     /// Number of the step, since the reset, that was not taken; the first step is 1.
@@ -353,7 +353,7 @@ impl<const N: usize> Simulation<N> {
         self.pid.set_setpoint(setpoint);
     }
 
-    /// The first step since the reset that was not taken because its result was not finite or led to no later time.
+    /// The first step since the reset that was not taken, since state or time would not have been finite after it.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.divergence

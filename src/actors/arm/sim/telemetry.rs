@@ -106,13 +106,8 @@ impl<const N: usize> ArmSim<N> {
         let level = u8::from(!warnings.is_empty());
         let (level, state, message) = match self.simulation.divergence() {
             Some(divergence) => {
-                let why = if self.simulation.has_later_time() {
-                    "was not finite"
-                } else {
-                    "would not have moved the clock"
-                };
                 let message = format!(
-                    "diverged: step {} from t = {} s {why} and was not taken; {} clears this",
+                    "diverged: step {} from t = {} s was not finite and was not taken; {} clears this",
                     divergence.step,
                     divergence.time,
                     Service::Reset.name()
