@@ -45,10 +45,27 @@ pub fn short_type(name: &str) -> String {
 }
 
 /// Whether two names mean one type; a middle part that only one of them has is left out of account.
+///
+/// A name is compared with every type that there is: of the longer one no more is looked at than the shorter one has.
 #[must_use]
 pub fn same_type(one: &str, other: &str) -> bool {
-    let parts = |name: &'_ str| name.split('/').count();
-    one == other || (parts(one) != parts(other) && short_type(one) == short_type(other))
+    let is_longer = one.len() > other.len();
+    let (short, long) = if is_longer {
+        (other, one)
+    } else {
+        (one, other)
+    };
+    short == long || is_without_middle(short, long)
+}
+
+/// Whether `short` is `long` without its middle part, or parts.
+fn is_without_middle(short: &str, long: &str) -> bool {
+    let parts = short.split_once('/');
+    let middle = parts
+        .filter(|(_, last)| !last.contains('/'))
+        .and_then(|(package, last)| long.strip_prefix(package)?.strip_suffix(last));
+    middle
+        .is_some_and(|middle| middle.len() > 1 && middle.starts_with('/') && middle.ends_with('/'))
 }
 
 #[cfg(test)]
@@ -71,6 +88,11 @@ mod tests {
         assert!(same_type("a/b", "a/b"));
         assert!(!same_type("std_msgs/msg/Header", "std_msgs/srv/Header"));
         assert!(!same_type("std_msgs/Header", "other_msgs/msg/Header"));
+        assert!(same_type("std_msgs/msg/Header", "std_msgs/Header"));
+        assert!(!same_type("a/b", "a/bb"));
+        assert!(!same_type("a/b", "aa/x/b"));
+        assert!(!same_type("aa/aa", "aa/a"));
+        assert!(!same_type("plain", "plain/msg/plain"));
         assert_eq!(short_type("plain"), "plain");
     }
 }

@@ -88,6 +88,30 @@ fn of_too_many_goals_the_oldest_ends_and_the_others_go_on() {
 }
 
 #[test]
+fn whoever_has_one_goal_loses_it_to_nobody_who_has_many() {
+    in_virtual_time(async {
+        let (stage, mut viewer) = Stage::<2>::with_a_floating_arm().await;
+        send_goal(&mut viewer, "one", wish("world", &["hand"], 10.0)).await;
+        viewer.settle().await;
+        let mut greedy = stage.connect();
+        for n in 0..2 * MAX_WISHES {
+            send_goal(&mut greedy, &n.to_string(), wish("world", &["hand"], 1.0)).await;
+        }
+        let end = with_op(&mut greedy, "action_result").await;
+        assert_eq!((&end["id"], &end["status"]), (&json!("0"), &json!(6)));
+        let why = end["values"].as_str().unwrap();
+        assert!(why.contains("this client has most"), "{why}");
+        viewer.heard.clear();
+        viewer.messages_for(ms(1000), "").await;
+        let ops: Vec<_> = viewer.heard.iter().map(|frame| &frame["op"]).collect();
+        assert!(
+            ops.len() >= 8 && ops.iter().all(|op| *op == "action_feedback"),
+            "{ops:?}"
+        );
+    });
+}
+
+#[test]
 fn the_topic_has_every_frame_thirty_times_a_second_while_somebody_subscribes() {
     in_virtual_time(async {
         let (_stage, mut client) = Stage::<2>::with_a_floating_arm().await;

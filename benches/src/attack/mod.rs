@@ -14,6 +14,7 @@ pub mod gateway;
 pub mod memory;
 pub mod names;
 pub mod peers;
+pub mod reading;
 pub mod script;
 pub mod stage;
 pub mod websocket;
@@ -99,7 +100,7 @@ impl Attack {
 }
 
 /// All attacks, by what they are aimed at.
-pub fn groups() -> [(&'static str, &'static [Attack]); 9] {
+pub fn groups() -> [(&'static str, &'static [Attack]); 10] {
     [
         ("gateway", gateway::ATTACKS),
         ("websocket", websocket::ATTACKS),
@@ -108,6 +109,7 @@ pub fn groups() -> [(&'static str, &'static [Attack]); 9] {
         ("memory", memory::ATTACKS),
         ("forms", forms::ATTACKS),
         ("names", names::ATTACKS),
+        ("reading", reading::ATTACKS),
         ("crowds", crowds::ATTACKS),
         ("admission", admission::ATTACKS),
     ]

@@ -4,18 +4,20 @@
 //! goal, by the action or by the topics of ROS 1's actions (which roslib 1 does), gets the frames that it names as
 //! feedback, seen from the frame that it names, at its rate.
 //!
-//! **Invariant:** nothing is asked of the arm while nobody wants frames; the newest [`MAX_WISHES`] wishes are kept.
+//! **Invariant:** nothing is asked of the arm while nobody wants frames; at most [`MAX_WISHES`] wishes are kept, and who
+//! has few loses none to who has many.
 
 mod answers;
 mod wire;
 
-use std::collections::VecDeque;
+use std::collections::{HashMap, VecDeque};
 use std::time::Duration;
 
 use actix::prelude::*;
 use serde::Serialize;
 use tokio::time::Instant;
 
+use crate::actors::ConnectionId;
 use crate::actors::arm::sim::{ArmPose, Pose};
 use crate::actors::node::{Ask, Call, Interest, Publish, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, Canceller};
@@ -25,7 +27,7 @@ use crate::protocol::messages::scene::WORLD;
 use crate::protocol::messages::{Empty, Stamp};
 use crate::protocol::op::GoalStatus;
 
-/// Wishes for frames that are kept; the oldest gives way, for a viewer may go without a word.
+/// Wishes for frames that are kept; the oldest of the client with most gives way, for a viewer may go without a word.
 pub const MAX_WISHES: usize = 64;
 /// Frames that one wish may name.
 pub const MAX_FRAMES: usize = 32;
@@ -39,6 +41,9 @@ const AT_ONCE: usize = 16;
 /// Messages of published wishes among them: each goes to all who subscribe.
 const TOPIC_AT_ONCE: usize = 5;
 
+/// The end of a wish that gives way.
+const GIVEN_WAY: &str =
+    "the oldest of this client's goals gives way: there are too many, and this client has most";
 /// The error for a client that cancels a wish which it has not sent, or which is not kept any more.
 const NOT_KEPT: &str = "id must be that of a goal of this connection";
 
@@ -139,9 +144,9 @@ impl<const N: usize> Handler<WishFrames> for TfRepublisher<N> {
             return;
         }
         if self.wishes.len() >= MAX_WISHES
-            && let Some((oldest, _)) = self.wishes.pop_front()
+            && let Some((oldest, _)) = self.oldest_of_most().and_then(|at| self.wishes.remove(at))
         {
-            oldest.end(GoalStatus::Aborted);
+            oldest.end(GoalStatus::Aborted, GIVEN_WAY);
         }
         self.wishes.push_back((wish, Instant::now()));
         self.keep_timer(ctx);
@@ -160,7 +165,7 @@ impl<const N: usize> Handler<ForgetFrames> for TfRepublisher<N> {
                 };
                 let at = self.wishes.iter().position(|(wish, _)| is_meant(wish));
                 match at.and_then(|at| self.wishes.remove(at)) {
-                    Some((wish, _)) => wish.end(GoalStatus::Canceled),
+                    Some((wish, _)) => wish.end(GoalStatus::Canceled, Empty {}),
                     None => who.refuse(NOT_KEPT),
                 }
             }
@@ -192,7 +197,7 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 
     fn handle(&mut self, _: ShutDown, ctx: &mut Context<Self>) {
         for (wish, _) in self.wishes.drain(..) {
-            wish.end(GoalStatus::Aborted);
+            wish.end(GoalStatus::Aborted, Empty {});
         }
         self.keep_timer(ctx);
     }
@@ -202,9 +207,17 @@ impl<const N: usize> Handler<ShutDown> for TfRepublisher<N> {
 
 impl WishFrames {
     /// A client that has sent a goal of the action hears of its end.
-    fn end(&self, status: GoalStatus) {
+    fn end(&self, status: GoalStatus, values: impl Serialize + Send + 'static) {
         if let Wisher::Client(client) = &self.by {
-            client.conclude(Empty {}, status);
+            client.conclude(values, status);
+        }
+    }
+
+    /// The client; none of who has published, which nobody knows.
+    fn client(&self) -> Option<ConnectionId> {
+        match &self.by {
+            Wisher::Client(client) => Some(client.connection),
+            Wisher::Topic(_) => None,
         }
     }
 
@@ -214,6 +227,19 @@ impl WishFrames {
 }
 
 impl<const N: usize> TfRepublisher<N> {
+    /// The place of the oldest wish of the client that has most of them; all that are published count as one's.
+    fn oldest_of_most(&self) -> Option<usize> {
+        let clients = self.wishes.iter().map(|(wish, _)| wish.client());
+        let mut counts: HashMap<_, usize> = HashMap::new();
+        for client in clients.clone() {
+            *counts.entry(client).or_default() += 1;
+        }
+        let most = counts.values().max().copied();
+        clients
+            .into_iter()
+            .position(|client| counts.get(&client).copied() == most)
+    }
+
     fn forget_published(&mut self, id: Option<&str>) {
         self.wishes.retain(|(wish, _)| match &wish.by {
             Wisher::Client(_) => true,

@@ -87,12 +87,35 @@ impl Incomplete {
     }
 }
 
+/// A message all of whose pieces have come. To put megabytes of them together takes milliseconds.
+#[derive(Debug, PartialEq, Eq)]
+pub struct Complete {
+    pieces: BTreeMap<usize, String>,
+    bytes: usize,
+}
+
+impl Complete {
+    /// Bytes of the whole text.
+    #[must_use]
+    pub const fn bytes(&self) -> usize {
+        self.bytes
+    }
+
+    /// The whole text.
+    #[must_use]
+    pub fn text(self) -> String {
+        let mut text = String::with_capacity(self.bytes);
+        text.extend(self.pieces.into_values());
+        text
+    }
+}
+
 impl Fragments {
-    /// Takes a piece; the whole text once it is the last one missing. A piece that comes twice counts once.
+    /// Takes a piece; the message once it is the last one missing. A piece that comes twice counts once.
     ///
     /// # Errors
     /// [`FragmentError`] where the piece breaks a bound.
-    pub fn take(&mut self, piece: Piece, now: Instant) -> Result<Option<String>, FragmentError> {
+    pub fn take(&mut self, piece: Piece, now: Instant) -> Result<Option<Complete>, FragmentError> {
         self.forget_old(now);
         let Piece {
             id,
@@ -120,9 +143,10 @@ impl Fragments {
         if unfinished.pieces.len() < total {
             return Ok(None);
         }
-        Ok(self
-            .forget(&id)
-            .map(|whole| whole.pieces.into_values().collect()))
+        Ok(self.forget(&id).map(|whole| Complete {
+            bytes: whole.bytes(),
+            pieces: whole.pieces,
+        }))
     }
 
     /// Bytes of what is kept.
@@ -208,8 +232,8 @@ mod tests {
         for _ in 0..3 {
             assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
         }
-        let whole = fragments.take(piece("a", 1, 2, &half), now);
-        assert_eq!(whole, Ok(Some(half.repeat(2))));
+        let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
+        assert_eq!(whole.map(Complete::text), Some(half.repeat(2)));
         assert_eq!(fragments.bytes(), 0);
     }
 
@@ -221,8 +245,8 @@ mod tests {
         assert_eq!(fragments.take(piece("b", 0, 2, "other"), now), Ok(None));
         assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
         assert_eq!(fragments.take(piece("a", 0, 3, "x"), now), Ok(None));
-        let whole = fragments.take(piece("a", 1, 3, "y"), now);
-        assert_eq!(whole, Ok(Some("xyz".to_owned())));
+        let whole = fragments.take(piece("a", 1, 3, "y"), now).unwrap();
+        assert_eq!(whole.map(Complete::text), Some("xyz".to_owned()));
         assert_eq!(fragments.bytes, "other".len());
     }
 
@@ -283,7 +307,7 @@ mod tests {
         let mut fragments = Fragments::default();
         assert_eq!(fragments.take(piece("a", 0, 2, &half), now), Ok(None));
         let whole = fragments.take(piece("a", 1, 2, &half), now).unwrap();
-        assert_eq!(whole.map(|text| text.len()), Some(MAX_FRAME));
+        assert_eq!(whole.map(|whole| whole.bytes()), Some(MAX_FRAME));
     }
 
     #[test]

@@ -106,9 +106,10 @@ impl Reader {
                 return None;
             }
         };
-        *share = self.share_for(whole.len());
+        let length = whole.bytes();
+        *share = self.share_for(length);
         let why = match self
-            .read_frame(whole.len(), move || read_whole(&whole))
+            .read_frame(length, move || read_whole(&whole.text()))
             .await??
         {
             Ok(Incoming {

@@ -87,6 +87,9 @@ impl Reader {
     ) -> std::io::Result<()> {
         loop {
             let full = chunk.len() >= CHUNK / 2;
+            if !turns::may_read(chunk.len()) {
+                turns::read_bytes(chunk.len()).await;
+            }
             self.frames.push(&chunk);
             chunk.clear();
             let mut in_a_row = 0;
