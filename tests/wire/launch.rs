@@ -86,6 +86,7 @@ fn assert_one_line(output: &Output, parts: &[&str]) {
     let stderr = String::from_utf8(output.stderr.clone()).unwrap();
     assert_eq!(output.stdout, b"", "{stderr}");
     assert_eq!(stderr.lines().count(), 1, "{stderr}");
+    assert!(stderr.starts_with("pendularm: "), "{stderr}");
     assert!(
         stderr.ends_with('\n') && !stderr.contains("panic"),
         "{stderr}"
@@ -129,21 +130,25 @@ fn bad_usage_is_told_in_one_line_with_status_2() {
         &'static [(&'static str, &'static str)],
         &'static str,
     );
-    let cases: [Case; 14] = [
+    let cases: [Case; 18] = [
         (&[], &[("ARM_SIM_LINKS", "1")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "4")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "two")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", " 2")], "ARM_SIM_LINKS"),
         (&[], &[("ARM_SIM_LINKS", "2.0")], "ARM_SIM_LINKS"),
+        (&["--links", "4"], &[], "--links must be 2 or 3, got \"4\""),
         (&["--links", "5"], &[], "--links"),
         (&["--links"], &[], "--links"),
         (&["--what"], &[], "--what"),
-        (&["serve"], &[], "serve"),
+        (&["serve"], &[], "\"serve\""),
         (&["--bind", "nowhere"], &[], "--bind"),
         (&["--bind", "0.0.0.0:0"], &[], "loopback"),
         (&["--bind", "192.168.1.1:9095"], &[], "loopback"),
         (&["--bind", "[::]:0"], &[], "loopback"),
         (&[], &[("ARM_SIM_BIND", "0.0.0.0:0")], "ARM_SIM_BIND"),
+        (&[], &[("ARM_SIM_BIND", "nonsense")], "ARM_SIM_BIND"),
+        (&[], &[("ARM_SIM_SEED", "nonsense")], "ARM_SIM_SEED"),
+        (&[], &[("ARM_SIM_LOG", "nonsense")], "ARM_SIM_LOG"),
     ];
     for (arguments, variables, part) in cases {
         let output = outcome(arguments, variables);
