@@ -180,7 +180,8 @@ fn ends_while(links: usize, clients: usize, state: impl Fn(&mut Client)) {
     for client in &mut kept {
         state(client);
     }
-    // Nothing is answered in some of these states, so there is no event to wait for; the program must end at any time.
+    // There is no event to wait for: in some of these states nothing is answered, and in others the program soon reads
+    // no further and uses no processor time. It must end at any time, so a moment on the way into a state is as good.
     std::thread::sleep(Duration::from_millis(300));
     ends_on(&mut runtime, "TERM");
 }
