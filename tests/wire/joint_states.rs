@@ -96,7 +96,7 @@ fn a_client_that_has_unsubscribed_hears_nothing_more() {
     client.send(&json!({"op": "unsubscribe", "topic": "/joint_states"}));
     client.settle();
     client.kept.clear();
-    // Whoever is still subscribed hears of twenty ticks meanwhile.
+    // A client that is still subscribed hears of twenty ticks meanwhile.
     let mut other = runtime.connect();
     other.subscribe("/joint_states");
     ticks(&mut other, 20);

@@ -118,7 +118,7 @@ fn no_state_from_before_follows_the_response_to_a_reset() {
     let mut client = runtime.connect();
     client.subscribe("/joint_states");
     for round in 0..30 {
-        // Of an arm that goes on, half a second is from before the reset: being late, it makes up 250 ms at most.
+        // An arm that goes on makes up 250 ms at most if it is late: half a second is from before the reset.
         let (paused, least) = if round % 2 == 0 {
             (true, 0.1)
         } else {
