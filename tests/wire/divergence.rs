@@ -2,7 +2,7 @@
 
 use crate::arm::{numbers, send_trajectory, stamp, state, state_where, trajectory};
 use crate::common::{Client, Runtime};
-use crate::diagnostics::{arm_status, status};
+use crate::diagnostics::status;
 use serde_json::{Value, json};
 
 /// An aggressive loop at a timestep far beyond its limit.
@@ -16,6 +16,10 @@ fn diverge(client: &mut Client, links: usize) {
     send_trajectory(client, &trajectory(&vec![1.0; links]));
 }
 
+fn arm_status(message: &Value) -> &Value {
+    status(message, "arm_sim")
+}
+
 #[test]
 fn a_diverged_arm_holds_its_last_finite_state_and_says_when_and_why() {
     for links in [2, 3] {
@@ -24,9 +28,9 @@ fn a_diverged_arm_holds_its_last_finite_state_and_says_when_and_why() {
         client.subscribe("/diagnostics");
         diverge(&mut client, links);
         let told = client.receive_where("a divergence", |frame| {
-            frame["topic"] == "/diagnostics" && status(&frame["msg"], "arm_sim")["level"] == 2
+            frame["topic"] == "/diagnostics" && arm_status(&frame["msg"])["level"] == 2
         });
-        let arm = status(&told["msg"], "arm_sim");
+        let arm = arm_status(&told["msg"]);
         let message = arm["message"].as_str().unwrap();
         assert!(
             message.starts_with("diverged: ") && message.contains("step"),
@@ -67,7 +71,7 @@ fn nothing_but_a_reset_moves_a_diverged_arm() {
     client.subscribe("/diagnostics");
     diverge(&mut client, 2);
     let is_level = |frame: &Value, level: u64| {
-        frame["topic"] == "/diagnostics" && status(&frame["msg"], "arm_sim")["level"] == level
+        frame["topic"] == "/diagnostics" && arm_status(&frame["msg"])["level"] == level
     };
     client.receive_where("a divergence", |frame| is_level(frame, 2));
     client.subscribe("/joint_states");
@@ -125,15 +129,15 @@ fn a_diverged_arm_that_is_paused_is_diverged_still() {
     client.subscribe("/diagnostics");
     diverge(&mut client, 2);
     client.receive_where("a divergence", |frame| {
-        frame["topic"] == "/diagnostics" && status(&frame["msg"], "arm_sim")["level"] == 2
+        frame["topic"] == "/diagnostics" && arm_status(&frame["msg"])["level"] == 2
     });
     client.ask("/arm_sim/pause", json!({"data": true}));
     client.kept.clear();
-    assert_eq!(arm_status(&mut client)["level"], 2);
+    assert_eq!(arm_status(&client.message("/diagnostics"))["level"], 2);
     client.ask("/arm_sim/reset", json!({}));
     client.kept.clear();
     let after = client.message("/diagnostics");
-    assert_eq!(status(&after, "arm_sim")["message"], "paused");
+    assert_eq!(arm_status(&after)["message"], "paused");
 }
 
 /// A weightless arm at rest stays finite whatever the timestep is; its clock does not.
@@ -157,7 +161,7 @@ fn a_step_that_would_not_move_the_clock_is_not_taken() {
         assert_eq!(ended["values"], json!({"steps": 0, "time": first}));
         client.subscribe("/diagnostics");
         let message = client.message("/diagnostics");
-        let message = status(&message, "arm_sim")["message"].as_str().unwrap();
+        let message = arm_status(&message)["message"].as_str().unwrap();
         assert!(
             message.contains("step 2 from t = 1") && message.contains("not have moved the clock"),
             "{message}"
