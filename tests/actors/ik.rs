@@ -3,22 +3,17 @@
 use std::cell::Cell;
 use std::f64::consts::PI;
 use std::rc::Rc;
-use std::sync::Arc;
 
+use crate::askers::JsonCaller;
 use crate::stage::numbers;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
-use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::ik::{Ik, Solve, SolveError};
 use pendularm::actors::arm::sim::{ArmPose, Pose};
-use pendularm::actors::node::{Respond, ask};
-use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
+use pendularm::actors::node::ask;
 use pendularm::math::kinematics::{BOUNDARY, Target, forward};
 use pendularm::protocol::catalog::Service;
-use pendularm::protocol::op::Arguments;
-use serde_json::value::to_raw_value;
 use serde_json::{Value, json};
-use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 /// An arm that stands still, and counts how often it is asked.
 struct StandIn<const N: usize> {
@@ -39,31 +34,14 @@ impl<const N: usize> Handler<ArmPose<N>> for StandIn<N> {
     }
 }
 
-/// Takes the answers.
-struct Probe(UnboundedSender<Value>);
-
-impl Actor for Probe {
-    type Context = Context<Self>;
-}
-
-impl Handler<Respond> for Probe {
-    type Result = ();
-
-    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
-        let frame = serde_json::from_slice(&respond.frame.write()).unwrap();
-        self.0.send(frame).unwrap();
-    }
-}
-
-struct Bench<const N: usize> {
+struct IkBench<const N: usize> {
     pose: Rc<Cell<Pose<N>>>,
     asked: Rc<Cell<u32>>,
     ik: Addr<Ik<N>>,
-    probe: Addr<Probe>,
-    answers: UnboundedReceiver<Value>,
+    client: JsonCaller,
 }
 
-impl<const N: usize> Bench<N> {
+impl<const N: usize> IkBench<N> {
     fn new(lengths: [f64; N], positions: [f64; N]) -> Self {
         let pose = Rc::new(Cell::new(Pose {
             lengths,
@@ -77,13 +55,12 @@ impl<const N: usize> Bench<N> {
             pose: Rc::clone(&pose),
             asked: Rc::clone(&asked),
         };
-        let (sender, answers) = unbounded_channel();
+        let ik = Ik::new(arm.start().recipient()).start();
         Self {
             pose,
             asked,
-            ik: Ik::new(arm.start().recipient()).start(),
-            probe: Probe(sender).start(),
-            answers,
+            client: JsonCaller::of(|routes| Ik::attach(&ik, routes)),
+            ik,
         }
     }
 
@@ -94,42 +71,15 @@ impl<const N: usize> Bench<N> {
         });
     }
 
-    async fn call(&mut self, args: Value) -> Value {
-        let (caller, ended) = Caller::new(
-            self.probe.clone().recipient(),
-            ConnectionId(1),
-            Service::Solve,
-            "/ik/solve".into(),
-            None,
-            Arc::default(),
-        );
-        let arguments = Arguments::Object(to_raw_value(&args).unwrap().into());
-        let mut routes = Nodes::default();
-        Ik::attach(&self.ik, &mut routes);
-        routes.services[&Service::Solve](ServiceCall {
-            service: Service::Solve,
-            arguments,
-            caller,
-        });
-        let answer = self.answers.recv().await.unwrap();
-        assert!(ended.await.is_err(), "the call ends with its answer");
-        answer
-    }
-
     /// The answer to a client that asks for this.
     async fn read_and_solve(&mut self, args: Value) -> [f64; N] {
-        let answer = self.call(args).await;
-        assert_eq!(answer["result"], true, "{answer}");
-        assert_eq!(answer["status"], "");
-        assert_eq!(answer["values"].as_object().unwrap().len(), 1);
-        numbers(&answer["values"]["positions"]).try_into().unwrap()
+        let values = self.client.values(Service::Solve, &args).await;
+        assert_eq!(values.as_object().unwrap().len(), 1);
+        numbers(&values["positions"]).try_into().unwrap()
     }
 
     async fn read_and_refuse(&mut self, args: Value) -> String {
-        let answer = self.call(args).await;
-        assert_eq!(answer["result"], false, "{answer}");
-        assert_eq!(answer["values"], json!({}));
-        answer["status"].as_str().unwrap().to_owned()
+        self.client.refusal(Service::Solve, &args).await
     }
 
     async fn ask(&self, target: Target) -> Result<[f64; N], SolveError> {
@@ -175,10 +125,10 @@ const ROUNDING: f64 = 1e-14;
 #[test]
 fn the_solution_puts_the_hand_on_the_target() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0, 0.5], [0.0; 2]);
+        let bench = IkBench::new([1.0, 0.5], [0.0; 2]);
         let q = bench.solve(at(0.6, 0.7)).await;
         assert!(bench.miss(&q, 0.6, 0.7) < ROUNDING);
-        let bench = Bench::new([1.0, 0.5, 0.25], [0.0; 3]);
+        let bench = IkBench::new([1.0, 0.5, 0.25], [0.0; 3]);
         let q = bench.solve(turned(at(0.6, 0.7), 2.0)).await;
         assert!(bench.miss(&q, 0.6, 0.7) < ROUNDING);
         assert!((q.iter().sum::<f64>() - 2.0).abs() < ROUNDING);
@@ -188,7 +138,7 @@ fn the_solution_puts_the_hand_on_the_target() {
 #[test]
 fn lengths_are_asked_of_the_arm_at_every_call() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        let bench = IkBench::new([1.0, 1.0], [0.0; 2]);
         bench.solve(at(1.5, 0.0)).await;
         let pose = bench.pose.get();
         bench.pose.set(Pose {
@@ -205,7 +155,7 @@ fn lengths_are_asked_of_the_arm_at_every_call() {
 #[test]
 fn x_and_y_are_required_numbers_and_every_bad_one_is_named() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        let mut bench = IkBench::new([1.0, 1.0], [0.0; 2]);
         for (args, sentence) in [
             (json!({"y": 1}), "x is required"),
             (json!({"x": 1}), "y is required"),
@@ -224,7 +174,7 @@ fn x_and_y_are_required_numbers_and_every_bad_one_is_named() {
 #[test]
 fn two_links_ignore_phi_even_a_malformed_one() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0, 1.0], [0.0; 2]);
+        let mut bench = IkBench::new([1.0, 1.0], [0.0; 2]);
         let plain = bench.read_and_solve(json!({"x": 0.5, "y": 0.5})).await;
         for phi in [json!(3), json!("north"), json!([1]), json!(null)] {
             let with_phi = bench
@@ -238,7 +188,7 @@ fn two_links_ignore_phi_even_a_malformed_one() {
 #[test]
 fn three_links_reject_a_malformed_phi_and_take_null_for_none() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0; 3], [0.1, 0.2, 0.3]);
+        let mut bench = IkBench::new([1.0; 3], [0.1, 0.2, 0.3]);
         let why = bench
             .read_and_refuse(json!({"x": 1, "y": 1, "phi": "north"}))
             .await;
@@ -254,12 +204,12 @@ fn three_links_reject_a_malformed_phi_and_take_null_for_none() {
 #[test]
 fn what_is_beyond_the_reach_or_inside_the_fold_is_rejected_with_its_distance_and_the_limit() {
     in_virtual_time(async {
-        let bench = Bench::new([2.0, 0.5], [0.0; 2]);
+        let bench = IkBench::new([2.0, 0.5], [0.0; 2]);
         let far = bench.refusal(at(0.0, 3.0)).await;
         assert!(far.contains("3 m") && far.contains("2.5 m"), "{far}");
         let near = bench.refusal(at(1.0, 0.0)).await;
         assert!(near.contains("1 m") && near.contains("1.5 m"), "{near}");
-        let bench = Bench::new([1.0; 3], [0.0; 3]);
+        let bench = IkBench::new([1.0; 3], [0.0; 3]);
         let far = bench.refusal(at(3.01, 0.0)).await;
         assert!(far.contains("3.01 m") && far.contains("3 m"), "{far}");
     });
@@ -269,7 +219,7 @@ fn what_is_beyond_the_reach_or_inside_the_fold_is_rejected_with_its_distance_and
 #[test]
 fn a_phi_that_puts_the_wrist_out_of_reach_is_rejected_though_the_position_is_reachable() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0; 3], [0.0; 3]);
+        let bench = IkBench::new([1.0; 3], [0.0; 3]);
         bench.solve(at(2.5, 0.0)).await;
         let why = bench.refusal(turned(at(2.5, 0.0), PI)).await;
         assert!(why.contains("phi") && why.contains("3.5 m"), "{why}");
@@ -280,7 +230,7 @@ fn a_phi_that_puts_the_wrist_out_of_reach_is_rejected_though_the_position_is_rea
 #[test]
 fn the_boundary_counts_as_reachable_from_a_hair_outside_too() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0, 0.4], [0.3, 0.0]);
+        let bench = IkBench::new([1.0, 0.4], [0.3, 0.0]);
         let slack = BOUNDARY * 1.4;
         for (distance, outwards) in [(1.4, 1.0), (0.6, -1.0)] {
             for (x, y) in [(1.0, 0.0), (0.0, -1.0), (0.6, 0.8)] {
@@ -304,7 +254,7 @@ fn the_boundary_counts_as_reachable_from_a_hair_outside_too() {
 #[test]
 fn solutions_are_wrapped_also_for_an_arm_that_has_wound_up() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0; 3], [1000.0, -2000.0, 3000.0]);
+        let bench = IkBench::new([1.0; 3], [1000.0, -2000.0, 3000.0]);
         for (x, y) in [(1.0, 1.0), (-2.9, 0.0), (-1.0, -0.01), (0.0, 2.0)] {
             let q = bench.solve(at(x, y)).await;
             assert!(q.iter().all(|q| -PI < *q && *q <= PI), "{q:?}");
@@ -315,7 +265,7 @@ fn solutions_are_wrapped_also_for_an_arm_that_has_wound_up() {
 #[test]
 fn of_the_two_elbows_the_one_nearer_to_the_present_pose_is_given() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0, 1.0], [0.0, 0.5]);
+        let bench = IkBench::new([1.0, 1.0], [0.0, 0.5]);
         assert!(bench.solve(at(1.0, 1.0)).await[1] > 0.0);
         bench.stand([1.5, -1.0]);
         assert!(bench.solve(at(1.0, 1.0)).await[1] < 0.0);
@@ -331,7 +281,7 @@ fn of_the_two_elbows_the_one_nearer_to_the_present_pose_is_given() {
 #[test]
 fn three_links_without_phi_keep_the_present_orientation_where_that_is_possible() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0; 3], [0.2, 0.3, 0.4]);
+        let bench = IkBench::new([1.0; 3], [0.2, 0.3, 0.4]);
         let q = bench.solve(at(1.0, 1.0)).await;
         assert!((q.iter().sum::<f64>() - 0.9).abs() < ROUNDING, "{q:?}");
     });
@@ -342,7 +292,7 @@ fn three_links_without_phi_keep_the_present_orientation_where_that_is_possible()
 #[test]
 fn three_links_without_phi_take_the_nearest_orientation_that_is_possible_otherwise() {
     in_virtual_time(async {
-        let bench = Bench::new([1.0; 3], [PI - 0.1, 0.0, 0.0]);
+        let bench = IkBench::new([1.0; 3], [PI - 0.1, 0.0, 0.0]);
         let q = bench.solve(at(2.9, 0.0)).await;
         let orientation: f64 = q.iter().sum();
         let nearest = ((2.9_f64.powi(2) + 1.0 - 4.0) / (2.0 * 2.9)).acos();
@@ -356,7 +306,7 @@ fn three_links_without_phi_take_the_nearest_orientation_that_is_possible_otherwi
 #[test]
 fn a_node_that_asks_gets_what_a_client_gets() {
     in_virtual_time(async {
-        let mut bench = Bench::new([1.0; 3], [0.0; 3]);
+        let mut bench = IkBench::new([1.0; 3], [0.0; 3]);
         let named = bench
             .read_and_solve(json!({"x": 1, "y": 0.5, "phi": 1}))
             .await;

@@ -1,107 +1,27 @@
 //! `/arm_sim/integration_step` on the worker pool: turns, ends, and one answer each.
 
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
+use crate::askers::{PATIENCE, PoolBench};
 use crate::system::in_real_time;
-use actix::prelude::*;
-use pendularm::actors::ConnectionId;
-use pendularm::actors::compute::integration::{Integration, IntegrationStep, NotIntegrated};
-use pendularm::actors::compute::workers::WorkerPool;
-use pendularm::actors::node::{Asker, Call, Done, Reply, Unserved};
+use pendularm::actors::compute::integration::{Integration, IntegrationStep};
+use pendularm::actors::node::Unserved;
 use pendularm::math::expression::Expression;
 use pendularm::math::integrator::Method;
 use pendularm::math::particle::Particle;
-use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 
-/// How long anything may take before a test gives up.
-const PATIENCE: Duration = Duration::from_secs(20);
-
-type Answer = Result<Box<Particle>, NotIntegrated>;
-/// A connection, and the answer to its call.
-type Answered = (u64, Result<Answer, Unserved>);
-
-/// Stands in for a client that has called.
-struct Caller {
-    connection: u64,
-    gone: Arc<AtomicBool>,
-    answers: mpsc::UnboundedSender<Answered>,
+fn integration() -> PoolBench<Integration> {
+    PoolBench::new(Integration::new)
 }
 
-impl Asker<Answer> for Caller {
-    fn answer(self: Box<Self>, answer: Result<Answer, Unserved>, _: Option<Done>) {
-        let _ = self.answers.send((self.connection, answer));
-    }
-
-    fn client(&self) -> Option<ConnectionId> {
-        Some(ConnectionId(self.connection))
-    }
-
-    fn is_gone(&self) -> bool {
-        self.gone.load(Ordering::Relaxed)
-    }
-}
-
-struct Bench {
-    pool: WorkerPool,
-    integration: Addr<Integration>,
-    caller: mpsc::UnboundedSender<Answered>,
-    answers: mpsc::UnboundedReceiver<Answered>,
-}
-
-/// A call on its way: ends with it; and the flag that its caller has gone.
-struct Called {
-    ended: oneshot::Receiver<()>,
-    gone: Arc<AtomicBool>,
-}
-
-impl Bench {
-    /// With one worker, so that turns can be told from luck.
-    fn new() -> Self {
-        let (caller, answers) = mpsc::unbounded_channel();
-        let pool = WorkerPool::start(1).unwrap();
-        let integration = Integration::new(pool.clone()).start();
-        Self {
-            integration,
-            pool,
-            caller,
-            answers,
-        }
-    }
-
-    fn call(&self, connection: u64, ask: IntegrationStep) -> Called {
-        let gone = Arc::new(AtomicBool::new(false));
-        let caller = Caller {
-            connection,
-            gone: Arc::clone(&gone),
-            answers: self.caller.clone(),
-        };
-        let (done, ended) = oneshot::channel();
-        let reply = Reply::new(caller, Some(done));
-        self.integration.do_send(Call { ask, reply });
-        Called { ended, gone }
-    }
-
-    async fn answer(&mut self) -> Answered {
-        let answer = timeout(PATIENCE, self.answers.recv()).await;
-        answer.expect("an answer in time").expect("the bench lives")
-    }
-
-    async fn assert_nothing_more(&mut self) {
-        // The worker would say anything else before it is done with the next call.
-        let call = self.call(99, request("t", 1));
-        assert_eq!(self.answer().await.0, 99);
-        let _ = call.ended.await;
-        assert!(self.answers.try_recv().is_err());
-    }
-}
-
-impl Drop for Bench {
-    fn drop(&mut self) {
-        self.pool.close("the test is over");
-    }
+async fn assert_nothing_more(bench: &mut PoolBench<Integration>) {
+    // The worker would say anything else before it is done with the next call.
+    let call = bench.ask_as(99, request("t", 1));
+    assert_eq!(bench.next().await, 99);
+    let _ = call.ended.await;
+    assert!(bench.is_silent());
 }
 
 fn request(function: &str, steps: u64) -> IntegrationStep {
@@ -124,11 +44,10 @@ fn heavy() -> IntegrationStep {
 #[test]
 fn the_answer_is_the_particles_own() {
     in_real_time(async {
-        let mut bench = Bench::new();
-        bench.call(1, request("sin(5*t)*exp(-t)", 5000));
-        let (connection, answer) = bench.answer().await;
-        assert_eq!(connection, 1);
-        let answered = answer.unwrap().unwrap();
+        let mut bench = integration();
+        let call = bench.ask_as(1, request("sin(5*t)*exp(-t)", 5000));
+        assert_eq!(bench.next().await, 1);
+        let answered = call.answer.await.unwrap().unwrap().unwrap();
         let function = Expression::parse("sin(5*t)*exp(-t)").unwrap();
         let mut particle = Particle::new(function, 1.0, -1.0, 0.001, 5000, Method::Rk4).unwrap();
         particle.advance(5000);
@@ -141,14 +60,14 @@ fn the_answer_is_the_particles_own() {
 #[test]
 fn a_light_call_is_done_while_a_heavy_one_takes_turns_with_it() {
     in_real_time(async {
-        let mut bench = Bench::new();
-        let heavy = bench.call(1, heavy());
+        let mut bench = integration();
+        let heavy = bench.ask_as(1, heavy());
         for connection in 2..10 {
-            bench.call(connection, request("t", 100));
+            bench.ask_as(connection, request("t", 100));
         }
         let mut order = Vec::new();
         for _ in 2..10 {
-            order.push(bench.answer().await.0);
+            order.push(bench.next().await);
         }
         assert_eq!(
             order,
@@ -162,51 +81,48 @@ fn a_light_call_is_done_while_a_heavy_one_takes_turns_with_it() {
 #[test]
 fn a_call_whose_caller_has_gone_ends_early_and_once() {
     in_real_time(async {
-        let mut bench = Bench::new();
-        let call = bench.call(1, heavy());
+        let mut bench = integration();
+        let call = bench.ask_as(1, heavy());
         call.gone.store(true, Ordering::Relaxed);
         // The registry drops the answer; that there is one is how every call ends.
-        let (connection, answer) = bench.answer().await;
-        assert_eq!(connection, 1);
-        assert!(matches!(answer, Err(Unserved::CallerGone)));
+        assert_eq!(bench.next().await, 1);
+        assert!(matches!(call.answer.await, Ok(Err(Unserved::CallerGone))));
         assert!(timeout(PATIENCE, call.ended).await.is_ok());
-        bench.assert_nothing_more().await;
+        assert_nothing_more(&mut bench).await;
     });
 }
 
 #[test]
 fn a_caller_that_leaves_at_any_moment_is_answered_once() {
     in_real_time(async {
-        let mut bench = Bench::new();
+        let mut bench = integration();
         for microseconds in (0..2000).step_by(40) {
-            let call = bench.call(1, request("t", 300));
+            let call = bench.ask_as(1, request("t", 300));
             tokio::time::sleep(Duration::from_micros(microseconds)).await;
             call.gone.store(true, Ordering::Relaxed);
             assert!(timeout(PATIENCE, call.ended).await.is_ok());
-            assert_eq!(bench.answer().await.0, 1);
+            assert_eq!(bench.next().await, 1);
         }
-        bench.assert_nothing_more().await;
+        assert_nothing_more(&mut bench).await;
     });
 }
 
 #[test]
 fn the_end_of_the_pool_refuses_what_runs_what_waits_and_what_comes() {
     in_real_time(async {
-        let mut bench = Bench::new();
-        for connection in 1..=5 {
-            bench.call(connection, heavy());
-        }
+        let mut bench = integration();
+        let mut calls: Vec<_> = (1..=5).map(|n| bench.ask_as(n, heavy())).collect();
         bench.pool.close("shutting down");
-        bench.call(6, heavy());
+        calls.push(bench.ask_as(6, heavy()));
         let mut refused = Vec::new();
-        for _ in 1..=6 {
-            let (connection, answer) = bench.answer().await;
+        for call in calls {
+            refused.push(bench.next().await);
+            let answer = call.answer.await.unwrap();
             assert!(matches!(answer, Err(Unserved::Refused("shutting down"))));
-            refused.push(connection);
         }
         refused.sort_unstable();
         assert_eq!(refused, [1, 2, 3, 4, 5, 6]);
-        assert!(bench.answers.try_recv().is_err());
+        assert!(bench.is_silent());
         assert!(bench.pool.is_idle());
     });
 }
@@ -214,19 +130,17 @@ fn the_end_of_the_pool_refuses_what_runs_what_waits_and_what_comes() {
 #[test]
 fn what_is_refused_does_not_take_a_turn_away() {
     in_real_time(async {
-        let mut bench = Bench::new();
-        for (connection, ask) in [
+        let mut bench = integration();
+        let calls = [
             (1, IntegrationStep::default()),
             (2, request("((((", 10)),
             (3, request("t", 2_000_000)),
             (4, request("t", 10)),
-        ] {
-            bench.call(connection, ask);
-        }
-        for connection in 1..=4 {
-            let (of, answer) = bench.answer().await;
-            assert_eq!(of, connection);
-            assert_eq!(answer.unwrap().is_ok(), connection == 4);
+        ]
+        .map(|(connection, ask)| (connection, bench.ask_as(connection, ask)));
+        for (connection, call) in calls {
+            assert_eq!(bench.next().await, connection);
+            assert_eq!(call.answer.await.unwrap().unwrap().is_ok(), connection == 4);
         }
     });
 }

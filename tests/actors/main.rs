@@ -20,6 +20,8 @@
 mod admission;
 mod arm_sim;
 mod arm_turns;
+#[path = "../support/askers.rs"]
+mod askers;
 mod connection;
 mod encodings;
 mod endings;

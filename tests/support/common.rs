@@ -9,7 +9,7 @@ use std::time::Duration;
 use pendularm_client::ending;
 
 pub use pendularm_client::blocking::{Client, PATIENCE};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// A call that shows in the arm's parameters, for whoever tries what must not be executed.
 pub const SET_GRAVITY: &str =
@@ -41,6 +41,38 @@ fn without_variables(mut command: Command) -> Command {
         command.env_remove(variable);
     }
     command
+}
+
+/// Sends a signal, by its name.
+#[track_caller]
+pub fn signal(pid: u32, name: &str) {
+    let mut kill = Command::new("kill");
+    let status = kill.args([format!("-{name}"), pid.to_string()]).status();
+    assert!(status.expect("kill is there").success());
+}
+
+/// Has the client provide a service.
+#[track_caller]
+pub fn provide(client: &mut Client, service: &str) {
+    client.send(&json!({"op": "advertise_service", "service": service, "type": "x/Y", "id": "ad"}));
+    let status = client.status();
+    assert_eq!(status["level"], "info", "{status}");
+    assert_eq!(status["id"], "ad");
+}
+
+/// The next call that reaches a provider.
+pub fn forwarded(provider: &mut Client) -> Value {
+    let frame = provider.receive_where("forwarded call", |frame| frame["op"] == "call_service");
+    assert!(frame["id"].is_string(), "{frame}");
+    frame
+}
+
+/// Answers a call that has reached a provider, or pretends to.
+pub fn respond(provider: &mut Client, call: &Value, values: Value) {
+    provider.send(
+        &json!({"op": "service_response", "service": call["service"], "id": call["id"],
+        "values": values, "result": true}),
+    );
 }
 
 /// The exit status of what must end by itself, and how long that took.

@@ -8,25 +8,14 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use crate::common::{Client, PATIENCE, Runtime};
+use crate::common::{PATIENCE, Runtime, provide};
+use crate::diagnostics::gateway_count;
 use pendularm::actors::gateway::limits::MAX_BACKLOG;
 use serde_json::{Value, json};
 
 const MIB: usize = 1024 * 1024;
 /// Memory that the program needs by itself, and that an allocator and a test build add.
 const BASE: usize = 40 * MIB;
-
-fn diagnostic(client: &mut Client, key: &str) -> u64 {
-    let message = client.message("/diagnostics");
-    let statuses = message["status"].as_array().unwrap();
-    let gateway = statuses
-        .iter()
-        .find(|one| one["name"] == "gateway")
-        .unwrap();
-    let values = gateway["values"].as_array().unwrap();
-    let value = values.iter().find(|one| one["key"] == key).unwrap();
-    value["value"].as_str().unwrap().parse().unwrap()
-}
 
 #[test]
 fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted() {
@@ -49,7 +38,7 @@ fn a_subscriber_that_never_reads_delays_nobody_loses_the_oldest_and_is_counted()
     let peak = runtime.peak_memory();
     assert!(peak < BASE, "{peak} bytes for an outbox of 4 MiB");
     client.subscribe("/diagnostics");
-    let dropped = diagnostic(&mut client, "messages_dropped");
+    let dropped = gateway_count(&mut client, "messages_dropped");
     assert!(dropped > 200, "{dropped} of 400");
 
     let mut received = vec![];
@@ -125,8 +114,7 @@ fn responses_that_nobody_reads_stop_the_reading_and_are_never_dropped() {
 fn a_provider_that_never_reads_costs_its_callers_a_refusal_and_not_the_memory() {
     let runtime = Runtime::start();
     let mut provider = runtime.connect();
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
+    provide(&mut provider, "/s");
     let mut caller = runtime.connect();
     let blob = "x".repeat(MIB);
     let mut busy = 0;

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use crate::arm::{stamp, time};
 use crate::common::{Client, PATIENCE, Runtime};
+use crate::diagnostics::{arm_status, number, status, text};
 use pendularm::actors::resources::budget::MODEST;
 use serde_json::{Value, json};
 
@@ -23,13 +24,6 @@ const KEYS: [&str; 11] = [
     "warning",
 ];
 
-fn status<'a>(message: &'a Value, name: &str) -> &'a Value {
-    let all = message["status"].as_array().unwrap();
-    all.iter()
-        .find(|status| status["name"] == name)
-        .unwrap_or_else(|| panic!("no {name} in {message}"))
-}
-
 /// The keys that docs/protocol.md has for a status.
 fn documented(name: &str) -> Vec<String> {
     let paper = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/protocol.md");
@@ -38,23 +32,6 @@ fn documented(name: &str) -> Vec<String> {
     let row = paper.lines().find_map(|line| line.strip_prefix(&start));
     let codes = row.expect("a row of its own").split('`').skip(1).step_by(2);
     codes.map(str::to_owned).collect()
-}
-
-fn text<'a>(status: &'a Value, key: &str) -> &'a str {
-    let values = status["values"].as_array().unwrap();
-    let entry = values.iter().find(|entry| entry["key"] == key);
-    entry
-        .and_then(|entry| entry["value"].as_str())
-        .unwrap_or_else(|| panic!("no {key} in {status}"))
-}
-
-fn number(status: &Value, key: &str) -> f64 {
-    text(status, key).parse().unwrap()
-}
-
-/// The arm's status in the next message.
-fn arm_status(client: &mut Client) -> Value {
-    status(&client.message("/diagnostics"), "arm_sim").clone()
 }
 
 #[test]

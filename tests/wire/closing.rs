@@ -5,7 +5,8 @@
 use std::net::Shutdown;
 use std::time::{Duration, Instant};
 
-use crate::common::{Client, PATIENCE, Runtime};
+use crate::common::{Client, PATIENCE, Runtime, provide};
+use crate::diagnostics::gateway_count;
 use serde_json::{Value, json};
 
 fn half_close(client: &Client) {
@@ -69,10 +70,8 @@ fn a_half_closed_client_gets_the_results_of_its_computations() {
 fn a_half_closed_client_gets_the_answer_of_a_provider() {
     let runtime = Runtime::start();
     let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
-    caller.send(&json!({"op": "advertise_service", "service": "/mine"}));
-    caller.status();
+    provide(&mut provider, "/s");
+    provide(&mut caller, "/mine");
     for id in [1, 2] {
         caller.send(&json!({"op": "call_service", "service": "/s", "id": id}));
     }
@@ -112,8 +111,7 @@ fn what_a_half_closed_client_provides_is_withdrawn_and_its_own_calls_fail_if_nob
  {
     let runtime = Runtime::start();
     let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
+    provide(&mut provider, "/s");
     provider.send(&json!({"op": "call_service", "service": "/s", "id": 7}));
     caller.send(&json!({"op": "call_service", "service": "/s", "id": 8}));
     caller.settle();
@@ -132,25 +130,6 @@ fn what_a_half_closed_client_provides_is_withdrawn_and_its_own_calls_fail_if_nob
     assert!(provider.is_closed());
 }
 
-/// The number of clients connected, as `/diagnostics` has it.
-fn connections(client: &mut Client) -> u64 {
-    let message = client.message("/diagnostics");
-    let gateway = message["status"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|one| one["name"] == "gateway");
-    let values = gateway.expect("a status of the gateway")["values"]
-        .as_array()
-        .unwrap()
-        .clone();
-    let value = values
-        .iter()
-        .find(|one| one["key"] == "connections")
-        .expect("a count");
-    value["value"].as_str().unwrap().parse().unwrap()
-}
-
 #[test]
 fn a_closed_connection_is_counted_no_more_and_leaves_its_settings_behind() {
     let runtime = Runtime::start();
@@ -163,11 +142,11 @@ fn a_closed_connection_is_counted_no_more_and_leaves_its_settings_behind() {
         client.ask("/pid_controller/enable", json!({"data": true}));
     }
     let deadline = Instant::now() + PATIENCE;
-    while connections(&mut watcher) != 10 {
+    while gateway_count(&mut watcher, "connections") != 10 {
         assert!(Instant::now() < deadline);
     }
     drop(clients);
-    while connections(&mut watcher) != 1 {
+    while gateway_count(&mut watcher, "connections") != 1 {
         assert!(Instant::now() < deadline);
     }
     assert_eq!(

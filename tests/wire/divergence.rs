@@ -2,6 +2,7 @@
 
 use crate::arm::{numbers, send_trajectory, stamp, state, state_where, trajectory};
 use crate::common::{Client, Runtime};
+use crate::diagnostics::status;
 use serde_json::{Value, json};
 
 /// An aggressive loop at a timestep far beyond its limit.
@@ -16,10 +17,7 @@ fn diverge(client: &mut Client, links: usize) {
 }
 
 fn arm_status(message: &Value) -> &Value {
-    let all = message["status"].as_array().unwrap();
-    all.iter()
-        .find(|status| status["name"] == "arm_sim")
-        .unwrap()
+    status(message, "arm_sim")
 }
 
 #[test]

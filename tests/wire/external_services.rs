@@ -4,32 +4,11 @@
 
 use std::time::{Duration, Instant};
 
-use crate::common::{Client, Runtime};
+use crate::common::{Client, Runtime, forwarded, provide, respond};
 use serde_json::{Value, json};
-
-fn provide(client: &mut Client, service: &str) {
-    client.send(&json!({"op": "advertise_service", "service": service, "type": "x/Y", "id": "ad"}));
-    let status = client.status();
-    assert_eq!(status["level"], "info", "{status}");
-    assert_eq!(status["id"], "ad");
-}
 
 fn call(client: &mut Client, service: &str, id: Value) {
     client.send(&json!({"op": "call_service", "service": service, "id": id, "args": {"a": 1}}));
-}
-
-/// The next call that reaches a provider.
-fn forwarded(provider: &mut Client) -> Value {
-    let frame = provider.receive_where("forwarded call", |frame| frame["op"] == "call_service");
-    assert!(frame["id"].is_string(), "{frame}");
-    frame
-}
-
-fn respond(provider: &mut Client, call: &Value, values: Value) {
-    provider.send(
-        &json!({"op": "service_response", "service": call["service"], "id": call["id"],
-        "values": values, "result": true}),
-    );
 }
 
 /// The next response, which must be a failure; gives its status.

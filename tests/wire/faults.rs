@@ -3,11 +3,10 @@
 //! **Invariant:** what a client is owed it gets, or it is told; nobody else notices.
 
 use std::io::Write;
-use std::process::Command;
 use std::time::Duration;
 
 use crate::arm::ticks;
-use crate::common::{Client, Runtime};
+use crate::common::{Client, Runtime, provide, signal};
 use serde_json::json;
 
 const STEP: &str = "/arm_sim/integration_step";
@@ -65,8 +64,7 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
         ask_steps(client, ENDLESS, 1_000_000, 7);
     }
     let mut provider = runtime.connect();
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
+    provide(&mut provider, "/s");
     let mut late = runtime.connect();
     late.subscribe("/big");
     late.send(&json!({"op": "advertise", "topic": "/big"}));
@@ -89,9 +87,7 @@ fn sigterm_under_load_ends_in_time_and_flushes_what_is_read() {
     });
     // Everything is under way: the arm has made twelve ticks beside it.
     ticks(&mut watchers[0], 12);
-    let pid = runtime.pid().to_string();
-    let sent = Command::new("kill").args(["-TERM", &pid]).status();
-    assert!(sent.expect("kill runs").success());
+    signal(runtime.pid(), "TERM");
     let (status, took) = runtime.end();
     // README's second, and one more for a machine that is busy with other tests.
     assert!(

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use crate::arm::{stamp, state};
-use crate::common::{Client, PATIENCE, Runtime};
+use crate::common::{Client, PATIENCE, Runtime, provide};
 use pendularm::actors::resources::budget::MAX_MEMORY;
 use serde_json::{Value, json};
 
@@ -98,8 +98,7 @@ fn a_wall_clock_that_jumps_changes_nothing() {
     ));
     let mut client = runtime.connect();
     let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
+    provide(&mut provider, "/s");
     client.subscribe("/joint_states");
     for jump in ["+1h", "-1d", "+0"] {
         caller.send(&json!({"op": "call_service", "service": "/s", "id": jump, "timeout": 60}));

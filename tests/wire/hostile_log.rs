@@ -12,7 +12,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::mpsc;
 use std::thread;
 
-use crate::common::{Client, PATIENCE};
+use crate::common::{Client, PATIENCE, signal};
 use serde_json::{Value, json};
 
 /// Texts that do harm wherever they are written as they came, or read as anything but a text.
@@ -107,9 +107,7 @@ impl Talkative {
 
     /// Ends the program in order, and gives its log.
     fn end(mut self) -> String {
-        let pid = self.child.id().to_string();
-        let asked = Command::new("kill").args(["-TERM", &pid]).status();
-        assert!(asked.unwrap().success());
+        signal(self.child.id(), "TERM");
         let mut log = std::mem::take(&mut self.log);
         log.extend(self.lines.iter().flatten());
         assert!(self.child.wait().unwrap().success());

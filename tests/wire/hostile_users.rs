@@ -5,7 +5,7 @@
 
 use std::io::{BufRead, BufReader};
 
-use crate::common::{Client, Runtime};
+use crate::common::{Client, Runtime, forwarded, provide, respond};
 use pendularm::protocol::catalog::{Direction, Rosapi, Service, Topic};
 use serde_json::{Value, json};
 
@@ -56,21 +56,6 @@ fn error(client: &mut Client) -> String {
     let status = client.status();
     assert_eq!(status["level"], "error", "{status}");
     status["msg"].as_str().unwrap().to_owned()
-}
-
-fn provide(client: &mut Client, service: &str) {
-    client.send(&json!({"op": "advertise_service", "service": service}));
-    let status = client.status();
-    assert_eq!(status["level"], "info", "{status}");
-}
-
-/// The next call that reaches a provider.
-fn forwarded(provider: &mut Client) -> Value {
-    provider.receive_where("forwarded call", |frame| frame["op"] == "call_service")
-}
-
-fn response(to: &Value, values: Value) -> Value {
-    json!({"op": "service_response", "service": to["service"], "id": to["id"], "values": values, "result": true})
 }
 
 #[test]
@@ -201,7 +186,7 @@ fn a_guessed_id_answers_nobodys_call_but_ones_own() {
                 continue;
             }
             let forged = json!({"service": service, "id": format!("{prefix}:{guess}")});
-            thief.send(&response(&forged, json!({"forged": true})));
+            respond(&mut thief, &forged, json!({"forged": true}));
             error(&mut thief);
         }
     }
@@ -213,7 +198,11 @@ fn a_guessed_id_answers_nobodys_call_but_ones_own() {
         json!([seen]),
     ] {
         for service in ["/s", "/t"] {
-            thief.send(&response(&json!({"service": service, "id": id}), json!({})));
+            respond(
+                &mut thief,
+                &json!({"service": service, "id": id}),
+                json!({}),
+            );
             error(&mut thief);
         }
     }
@@ -223,16 +212,16 @@ fn a_guessed_id_answers_nobodys_call_but_ones_own() {
         format!("{prefix}:0{number}"),
         format!(" {seen}"),
     ] {
-        thief.send(&response(&json!({"service": "/t", "id": id}), json!({})));
+        respond(&mut thief, &json!({"service": "/t", "id": id}), json!({}));
         error(&mut thief);
     }
     // Taking the service over takes what comes from now on, not what is outstanding.
     provide(&mut thief, "/s");
-    thief.send(&response(&call, json!({"forged": true})));
+    respond(&mut thief, &call, json!({"forged": true}));
     error(&mut thief);
     caller.settle();
     assert!(caller.kept.is_empty(), "{:?}", caller.kept);
-    provider.send(&response(&call, json!({"genuine": true})));
+    respond(&mut provider, &call, json!({"genuine": true}));
     let answer = caller.receive();
     assert_eq!(
         (&answer["id"], &answer["values"]),
@@ -251,10 +240,10 @@ fn an_answer_after_the_timeout_or_a_second_one_reaches_nobody() {
     // The same caller waits again, under the same id of its own.
     caller.send(&json!({"op": "call_service", "service": "/s", "id": 1, "timeout": 600}));
     let call = forwarded(&mut provider);
-    provider.send(&response(&late, json!({"late": true})));
+    respond(&mut provider, &late, json!({"late": true}));
     error(&mut provider);
-    provider.send(&response(&call, json!({"genuine": true})));
-    provider.send(&response(&call, json!({"again": true})));
+    respond(&mut provider, &call, json!({"genuine": true}));
+    respond(&mut provider, &call, json!({"again": true}));
     error(&mut provider);
     assert_eq!(caller.receive()["values"], json!({"genuine": true}));
     caller.settle();

@@ -3,7 +3,7 @@
 //! **Invariant:** what is over a limit is refused by name; what was registered before stays, and what is withdrawn makes
 //! room again.
 
-use crate::common::{Client, Runtime};
+use crate::common::{Client, Runtime, provide};
 use pendularm::actors::gateway::limits::{
     MAX_ADVERTISED, MAX_PROVIDED, MAX_SUBSCRIPTIONS, MAX_WAITING_CALLS,
 };
@@ -82,8 +82,7 @@ fn a_connection_provides_so_many_services() {
     assert_eq!(errors(&statuses), [MAX_PROVIDED]);
     // A service that another connection takes over counts no more.
     let mut other = runtime.connect();
-    other.send(&json!({"op": "advertise_service", "service": "/5"}));
-    other.status();
+    provide(&mut other, "/5");
     client.send(&json!({"op": "advertise_service", "service": "/new"}));
     assert_eq!(client.status()["level"], "info");
 }
@@ -92,8 +91,7 @@ fn a_connection_provides_so_many_services() {
 fn so_many_calls_of_a_connection_wait_for_other_clients() {
     let runtime = Runtime::start();
     let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
+    provide(&mut provider, "/s");
     let frames: String = (0..=MAX_WAITING_CALLS)
         .map(|n| {
             format!(

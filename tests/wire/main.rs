@@ -30,6 +30,8 @@ mod closing;
 mod command;
 #[path = "../support/common.rs"]
 mod common;
+#[path = "../support/diagnostics.rs"]
+mod diagnostics;
 mod divergence;
 mod external_services;
 mod faults;

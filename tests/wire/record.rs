@@ -12,7 +12,7 @@ use pendularm::record::{
 };
 use serde_json::{Value, json};
 
-use crate::common::{PATIENCE, Runtime};
+use crate::common::{PATIENCE, Runtime, signal};
 
 /// An empty folder of this test's own.
 fn folder(name: &str) -> PathBuf {
@@ -53,9 +53,7 @@ fn text(path: &Path) -> &str {
 }
 
 fn end(mut runtime: Runtime) {
-    let pid = runtime.pid().to_string();
-    let killed = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
-    assert!(killed.success());
+    signal(runtime.pid(), "TERM");
     let status = runtime.end().0;
     assert!(status.success());
 }
@@ -100,9 +98,7 @@ fn a_killed_program_leaves_a_record_that_is_read_and_replayed() {
         assert!(Instant::now() < deadline, "it is not flushed");
         std::thread::sleep(std::time::Duration::from_millis(50));
     }
-    let pid = runtime.pid().to_string();
-    let killed = Command::new("kill").args(["-KILL", &pid]).status().unwrap();
-    assert!(killed.success());
+    signal(runtime.pid(), "KILL");
     runtime.end();
 
     assert!(holds_call(&file, "{\"gravity\":4.25}"));

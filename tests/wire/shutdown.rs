@@ -3,28 +3,20 @@
 //! **Invariant:** nothing that a client does keeps the program from ending, with exit status 0.
 
 use std::io::Write;
-use std::process::Command;
 use std::time::Duration;
 
 use crate::arm::ticks;
-use crate::common::{Client, Runtime};
+use crate::common::{Client, Runtime, provide, signal};
+use crate::diagnostics::status;
 use pendularm::protocol::op::GoalStatus;
 use serde_json::{Value, json};
 
 /// README's second, and one more for a machine that is busy with other tests.
 const LIMIT: Duration = Duration::from_secs(2);
 
-fn signal(runtime: &Runtime, name: &str) {
-    let status = Command::new("kill")
-        .args([&format!("-{name}"), &runtime.pid().to_string()])
-        .status()
-        .expect("kill runs");
-    assert!(status.success());
-}
-
 /// Sends the signal; the program must end in time, with status 0.
 fn ends_on(runtime: &mut Runtime, name: &str) {
-    signal(runtime, name);
+    signal(runtime.pid(), name);
     let (status, took) = runtime.end();
     assert!(status.success(), "{status}");
     assert!(took < LIMIT, "it took {took:?}");
@@ -41,9 +33,19 @@ fn rest(client: &mut Client) -> Vec<Value> {
 }
 
 #[test]
-fn a_signal_ends_an_idle_program() {
+fn a_signal_ends_an_idle_program_and_one_that_is_only_watched() {
     for name in ["INT", "TERM"] {
-        ends_on(&mut Runtime::start(), name);
+        for clients in [0, 20] {
+            let mut runtime = Runtime::start();
+            let mut watchers: Vec<Client> = (0..clients).map(|_| runtime.connect()).collect();
+            for client in &mut watchers {
+                client.subscribe("/joint_states");
+            }
+            ends_on(&mut runtime, name);
+            for client in &mut watchers {
+                assert!(client.is_closed());
+            }
+        }
     }
 }
 
@@ -79,8 +81,7 @@ fn a_signal_ends_a_program_with_clients_that_watch_flood_or_never_read() {
 fn pending_calls_are_told_that_the_program_is_shutting_down() {
     let mut runtime = Runtime::start();
     let (mut provider, mut caller) = (runtime.connect(), runtime.connect());
-    provider.send(&json!({"op": "advertise_service", "service": "/s"}));
-    provider.status();
+    provide(&mut provider, "/s");
     for id in 0..5 {
         caller.send(&json!({"op": "call_service", "service": "/s", "id": id}));
     }
@@ -165,6 +166,11 @@ fn line(service: &str, args: &Value) -> String {
     format!("{call}\n")
 }
 
+/// An answer of tens of megabytes.
+fn millions() -> Value {
+    json!({"function": "t", "x0": 0.1, "dt": 0.1, "steps": 1_000_000, "integrator": "euler"})
+}
+
 /// Sends the same again and again until the stream ends, whether or not anything comes back.
 fn flood(client: &Client, bytes: impl Into<Vec<u8>>) {
     let mut stream = client.stream().try_clone().unwrap();
@@ -180,7 +186,8 @@ fn ends_while(links: usize, clients: usize, state: impl Fn(&mut Client)) {
     for client in &mut kept {
         state(client);
     }
-    // Nothing is answered in some of these states, so there is no event to wait for; the program must end at any time.
+    // There is no event to wait for: in some of these states nothing is answered, and in others the program soon reads
+    // no further and uses no processor time. It must end at any time, so a moment on the way into a state is as good.
     std::thread::sleep(Duration::from_millis(300));
     ends_on(&mut runtime, "TERM");
 }
@@ -222,16 +229,36 @@ fn a_signal_ends_a_program_whose_arm_is_flooded_with_calls_and_trajectories() {
 
 #[test]
 fn a_signal_ends_a_program_that_encodes_millions_of_numbers() {
-    let args =
-        json!({"function": "t", "x0": 0.1, "dt": 0.1, "steps": 1_000_000, "integrator": "euler"});
-    let call = line("/arm_sim/integration_step", &args);
+    let call = line("/arm_sim/integration_step", &millions());
     ends_while(2, 10, |client| client.send_bytes(call.as_bytes()));
+}
+
+#[test]
+fn a_signal_ends_a_program_that_writes_to_a_client_that_never_reads() {
+    let mut runtime = Runtime::start();
+    let mut deaf = runtime.connect();
+    // Tens of megabytes, which fill every buffer on the way once they have begun to come.
+    deaf.send_bytes(line("/arm_sim/integration_step", &millions()).as_bytes());
+    deaf.stream().peek(&mut [0]).expect("an answer begins");
+    for topic in ["/joint_states", "/clock", "/diagnostics"] {
+        deaf.send(&json!({"op": "subscribe", "topic": topic}));
+    }
+    ends_on(&mut runtime, "TERM");
 }
 
 #[test]
 fn a_signal_ends_a_program_that_can_not_follow_its_timestep() {
     let call = line("/arm_sim/set_integrator", &json!({"timestep": 1e-6}));
     ends_while(3, 1, |client| client.send_bytes(call.as_bytes()));
+    // However far it lags.
+    let mut runtime = Runtime::start();
+    let mut client = runtime.connect();
+    client.ask("/arm_sim/set_integrator", json!({"timestep": 1e-12}));
+    client.subscribe("/diagnostics");
+    client.receive_where("a word of the delay", |frame| {
+        frame["topic"] == "/diagnostics" && status(&frame["msg"], "arm_sim")["level"] != 0
+    });
+    ends_on(&mut runtime, "TERM");
 }
 
 #[test]

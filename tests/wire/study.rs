@@ -3,6 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::common::{Client, Runtime};
+use crate::diagnostics::{arm_status, text};
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
@@ -257,16 +258,6 @@ fn the_largest_answers_are_given_while_the_arm_goes_on() {
     }
     assert_eq!(values["evaluations"], 1_000_000);
     assert!((values["times"][99_999].as_f64().unwrap() - 100.0).abs() < 1e-9);
-}
-
-fn arm_status(client: &mut Client) -> Value {
-    client.message("/diagnostics")["status"][0].clone()
-}
-
-fn text<'a>(status: &'a Value, key: &str) -> &'a str {
-    let values = status["values"].as_array().unwrap();
-    let entry = values.iter().find(|entry| entry["key"] == key).unwrap();
-    entry["value"].as_str().unwrap()
 }
 
 /// The next status in which the limit is this one.

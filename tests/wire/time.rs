@@ -1,11 +1,10 @@
 //! Simulation time against wall time, at any timestep, and after the process has been stopped.
 
-use std::process::Command;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 use crate::arm::{in_one_of_three_tries, let_simulate, stamp, state, state_where, ticks};
-use crate::common::{Client, PATIENCE, Runtime};
+use crate::common::{Client, PATIENCE, Runtime, signal};
 use serde_json::json;
 
 /// An arm that nothing moves: what such a timestep would make of a swing is not the question here.
@@ -132,13 +131,6 @@ fn a_timestep_beyond_all_measure_stops_the_clock_and_nothing_else() {
     state_where(&mut client, "a moving arm", |state| stamp(state) > before);
 }
 
-fn signal(runtime: &Runtime, name: &str) {
-    let status = Command::new("kill")
-        .args([&format!("-{name}"), &runtime.pid().to_string()])
-        .status();
-    assert!(status.expect("kill is there").success());
-}
-
 /// Stopped for two seconds, the arm is two seconds behind. It catches up a quarter of a second and a step, once.
 #[test]
 fn a_stalled_process_catches_up_a_quarter_of_a_second_and_drops_the_rest() {
@@ -148,10 +140,10 @@ fn a_stalled_process_catches_up_a_quarter_of_a_second_and_drops_the_rest() {
         client.subscribe("/joint_states");
         let epoch = Instant::now();
         let before = lead(&mut client, epoch);
-        signal(&runtime, "STOP");
+        signal(runtime.pid(), "STOP");
         let stopped = Instant::now();
         sleep(Duration::from_secs(2));
-        signal(&runtime, "CONT");
+        signal(runtime.pid(), "CONT");
         let stall = stopped.elapsed().as_secs_f64();
         let burst = client.receive_for(Duration::from_millis(200));
         // Twelve ticks in 0.2 s, and what was under way when it stopped; the 120 missed ones are skipped.

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn a_bad_trajectory_is_answered_to_its_sender_alone_with_the_frames_id() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         let held = *bench.snapshot().await.pid().setpoint();
         let id = json!({"my": [1, "id"]});
         bench
@@ -38,34 +38,27 @@ fn a_bad_trajectory_is_answered_to_its_sender_alone_with_the_frames_id() {
 #[test]
 fn a_message_of_a_change_comes_before_the_response_and_shows_the_change() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         bench.want(Topic::Diagnostics, true).await;
         sleep(ms(100)).await;
         bench.heard.take();
-        bench.call(Service::Pause, json!({"data": true})).await;
+        let echo = bench.ask(pause(true)).await;
         let said = bench.heard.take();
-        let [
-            Said::Published(Topic::Diagnostics, frame),
-            Said::Responded(CALLER, response),
-        ] = &said[..]
-        else {
+        let [Said::Published(Topic::Diagnostics, frame), Said::Answered] = &said[..] else {
             panic!("{said:?}")
         };
         assert_eq!(frame["msg"]["status"][0]["message"], "paused");
-        assert_eq!(response["values"], json!({"data": true}));
-        bench.call(Service::Pause, json!({"data": true})).await;
-        assert_eq!(
-            bench.heard.take().len(),
-            1,
-            "the response; nothing has changed"
-        );
+        assert!(echo.values && echo.rejected.is_empty(), "{echo:?}");
+        bench.ask(pause(true)).await;
+        let said = bench.heard.take();
+        assert_eq!(said, [Said::Answered], "nothing has changed");
     });
 }
 
 #[test]
 fn every_service_of_the_arm_answers_whatever_it_is_asked() {
     in_virtual_time(async {
-        let bench = Bench::<3>::new(Arm::default());
+        let bench = ArmBench::<3>::new(Arm::default());
         let services = [
             Service::SetIntegrator,
             Service::SetParams,

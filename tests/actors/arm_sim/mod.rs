@@ -1,5 +1,7 @@
 //! The arm's actor in virtual time: exact step counts, what it says and when, and that it is the offline simulation.
 //! Here an arm, and somebody who hears all that it says.
+//!
+//! The arm is asked as another node asks it. A client's calls are here where it is meant what is made of their fields.
 
 mod answers;
 mod offline;
@@ -11,6 +13,8 @@ use std::rc::Rc;
 use std::sync::Arc;
 use std::time::Duration;
 
+use crate::askers::{CALLER, hand_on};
+use crate::stage::ms;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use bytes::Bytes;
@@ -18,15 +22,16 @@ use pendularm::actors::ConnectionId;
 use pendularm::actors::arm::sim::{
     ArmSim, Enable, Pause, Reset, SetGains, SetIntegrator, SetSetpoint, TakeSnapshot,
 };
-use pendularm::actors::node::{Ask, Call, Interest, Publish, Respond, ask};
+use pendularm::actors::node::{
+    Ask, Asker, Call, Done, Interest, Publish, Reply, Respond, Unserved,
+};
 use pendularm::actors::resources::gauges::Gauges;
-use pendularm::actors::wire::{Caller, Nodes, ServiceCall, TopicMessage};
+use pendularm::actors::wire::{Nodes, TopicMessage};
 use pendularm::math::arm::Arm;
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::{Service, Topic};
-use pendularm::protocol::op::Arguments;
 use pendularm::protocol::wire::payload::Payload;
 use serde_json::value::to_raw_value;
 use serde_json::{Value, json};
@@ -35,12 +40,14 @@ use tokio::time::{Instant, sleep};
 
 /// Everything that the arm has said, in order.
 #[derive(Clone, Default)]
-struct Heard(Rc<RefCell<Vec<Said>>>);
+pub struct Heard(Rc<RefCell<Vec<Said>>>);
 
 #[derive(Clone, Debug, PartialEq)]
-enum Said {
+pub enum Said {
     Published(Topic, Value),
     Responded(ConnectionId, Value),
+    /// To a typed message.
+    Answered,
 }
 
 impl Heard {
@@ -48,8 +55,12 @@ impl Heard {
         std::mem::take(&mut self.0.borrow_mut())
     }
 
+    fn push(&self, said: Said) {
+        self.0.borrow_mut().push(said);
+    }
+
     /// The messages on `topic` since the last look at anything.
-    fn messages(&self, topic: Topic) -> Vec<Value> {
+    pub fn messages(&self, topic: Topic) -> Vec<Value> {
         let said = self.take().into_iter();
         said.filter_map(|one| match one {
             Said::Published(of, frame) if of == topic => Some(frame["msg"].clone()),
@@ -60,64 +71,83 @@ impl Heard {
 }
 
 /// Stands in for the registry.
-struct Probe(Heard);
+struct Ear(Heard);
 
-impl Actor for Probe {
+impl Actor for Ear {
     type Context = Context<Self>;
 }
 
-impl Handler<Publish> for Probe {
+impl Handler<Publish> for Ear {
     type Result = ();
 
     fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
         let frame: Value = serde_json::from_slice(&publish.frame.write()).expect("valid JSON");
-        self.0
-            .0
-            .borrow_mut()
-            .push(Said::Published(publish.topic, frame));
+        self.0.push(Said::Published(publish.topic, frame));
     }
 }
 
-impl Handler<Respond> for Probe {
+impl Handler<Respond> for Ear {
     type Result = ();
 
     fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
         let frame = serde_json::from_slice(&respond.frame.write()).expect("valid JSON");
-        self.0
-            .0
-            .borrow_mut()
-            .push(Said::Responded(respond.connection, frame));
+        self.0.push(Said::Responded(respond.connection, frame));
+    }
+}
+
+/// Stands in for a client with a typed message: the word of its answer takes the way that the arm's messages take.
+struct Asking<T> {
+    ear: Addr<Ear>,
+    answer: oneshot::Sender<T>,
+}
+
+impl<T: Send> Asker<T> for Asking<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+        self.ear.do_send(Answered);
+        let _ = self.answer.send(answer.expect("an answer"));
+    }
+}
+
+#[derive(Message)]
+#[rtype(result = "()")]
+struct Answered;
+
+impl Handler<Answered> for Ear {
+    type Result = ();
+
+    fn handle(&mut self, _: Answered, _: &mut Context<Self>) {
+        self.0.push(Said::Answered);
     }
 }
 
 /// An arm, and somebody who hears all that it says.
-struct Bench<const N: usize> {
-    arm: Addr<ArmSim<N>>,
+pub struct ArmBench<const N: usize> {
+    pub arm: Addr<ArmSim<N>>,
     /// The ways by which clients' calls and messages come to it.
     routes: Nodes,
-    probe: Addr<Probe>,
-    heard: Heard,
+    ear: Addr<Ear>,
+    pub heard: Heard,
+    pub gauges: Arc<Gauges>,
 }
 
-const CALLER: ConnectionId = ConnectionId(7);
-
-impl<const N: usize> Bench<N>
+impl<const N: usize> ArmBench<N>
 where
     Gains<N>: Default,
 {
-    fn new(arm: Arm<N>) -> Self {
+    pub fn new(arm: Arm<N>) -> Self {
         let heard = Heard::default();
-        let probe = Probe(heard.clone()).start();
-        let publish = probe.clone().recipient();
+        let ear = Ear(heard.clone()).start();
+        let publish = ear.clone().recipient();
         let gauges = Arc::new(Gauges::default());
-        let arm = ArmSim::new(arm, Gains::default(), publish, gauges).start();
+        let arm = ArmSim::new(arm, Gains::default(), publish, Arc::clone(&gauges)).start();
         let mut routes = Nodes::default();
         ArmSim::attach(&arm, &mut routes);
         Self {
             arm,
             routes,
-            probe,
+            ear,
             heard,
+            gauges,
         }
     }
 
@@ -128,25 +158,8 @@ where
 
     /// Calls a service as a client does and gives the whole response; no virtual time passes.
     async fn call(&self, service: Service, args: Value) -> Value {
-        let (caller, ended) = Caller::new(
-            self.probe.clone().recipient(),
-            CALLER,
-            service,
-            service.name().into(),
-            None,
-            Arc::default(),
-        );
-        let raw = to_raw_value(&args).unwrap();
-        let arguments = if args.is_array() {
-            Arguments::Positional(raw.into())
-        } else {
-            Arguments::Object(raw.into())
-        };
-        self.routes.services[&service](ServiceCall {
-            service,
-            arguments,
-            caller,
-        });
+        let respond = self.ear.clone().recipient();
+        let ended = hand_on(&self.routes, respond, service, &args);
         let _ = ended.await;
         self.heard_all().await;
         let said = self.heard.0.borrow();
@@ -161,26 +174,36 @@ where
     }
 
     /// Asks as another node does; no virtual time passes.
-    async fn ask<A: Ask>(&self, question: A) -> A::Answer
+    pub async fn ask<A: Ask>(&self, question: A) -> A::Answer
     where
         ArmSim<N>: Actor<Context = Context<ArmSim<N>>> + Handler<Call<A>>,
     {
-        let answer = ask(&self.arm.clone().recipient(), question).await;
+        let (give, answer) = oneshot::channel();
+        let asking = Asking {
+            ear: self.ear.clone(),
+            answer: give,
+        };
+        let reply = Reply::new(asking, None);
+        self.arm.do_send(Call {
+            ask: question,
+            reply,
+        });
+        let answer = answer.await.expect("an arm");
         self.heard_all().await;
-        answer.expect("an answer")
+        answer
     }
 
     /// Has the controller hold this from the next step on.
-    async fn hold(&self, position: [f64; N], velocity: [f64; N]) {
+    pub async fn hold(&self, position: [f64; N], velocity: [f64; N]) {
         let (setpoint, done) = (Setpoint { position, velocity }, None);
         let held = SetSetpoint { setpoint, done };
         self.arm.send(held).await.unwrap();
     }
 
-    /// Waits until the probe has heard what was said so far.
+    /// Waits until the ear has heard what was said so far.
     async fn heard_all(&self) {
         tokio::task::yield_now().await;
-        self.probe
+        self.ear
             .send(Respond {
                 connection: ConnectionId(0),
                 frame: Bytes::from_static(b"null").into(),
@@ -198,7 +221,7 @@ where
         let (done, ended) = oneshot::channel();
         self.routes.listeners[&Topic::JointTrajectory](TopicMessage {
             heard: Payload::from(to_raw_value(&msg).unwrap()).into(),
-            respond: self.probe.clone().recipient(),
+            respond: self.ear.clone().recipient(),
             connection: CALLER,
             id: id.map(|id| to_raw_value(&id).unwrap().into()),
             done,
@@ -210,7 +233,7 @@ where
         self.heard_all().await;
     }
 
-    async fn want(&self, topic: Topic, wanted: bool) {
+    pub async fn want(&self, topic: Topic, wanted: bool) {
         self.arm.send(Interest { topic, wanted }).await.unwrap();
     }
 
@@ -231,34 +254,30 @@ where
     }
 }
 
-fn of_timestep(timestep: f64) -> SetIntegrator {
+pub fn of_timestep(timestep: f64) -> SetIntegrator {
     SetIntegrator {
         timestep: Some(timestep),
         ..SetIntegrator::default()
     }
 }
 
-fn method(method: Method) -> SetIntegrator {
+pub fn method(method: Method) -> SetIntegrator {
     SetIntegrator {
         method: Some(method),
         ..SetIntegrator::default()
     }
 }
 
-fn pause(paused: bool) -> Pause {
+pub fn pause(paused: bool) -> Pause {
     Pause {
         paused: Some(paused),
         ..Pause::default()
     }
 }
 
-fn enable(enabled: bool) -> Enable {
+pub fn enable(enabled: bool) -> Enable {
     Enable {
         enabled: Some(enabled),
         ..Enable::default()
     }
-}
-
-fn ms(milliseconds: u64) -> Duration {
-    Duration::from_millis(milliseconds)
 }

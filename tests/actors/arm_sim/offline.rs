@@ -10,7 +10,7 @@ where
     Gains<N>: Default,
 {
     in_virtual_time(async move {
-        let bench = Bench::<N>::new(Arm::default());
+        let bench = ArmBench::<N>::new(Arm::default());
         let mut offline = Simulation::<N>::new(Arm::default(), Gains::default());
         let mut random = fastrand::Rng::with_seed(seed);
         for event in 0..60 {
@@ -88,7 +88,7 @@ fn the_live_arm_is_the_offline_simulation_bit_for_bit() {
 #[test]
 fn a_request_takes_effect_at_the_step_that_is_due_when_it_comes() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         let mut offline = Simulation::<2>::new(Arm::default(), Gains::default());
         bench.ask(Reset::default()).await;
         let began = Instant::now();

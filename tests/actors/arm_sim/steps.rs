@@ -27,7 +27,7 @@ fn the_steps_after_a_time_are_the_whole_timesteps_in_it() {
             (7, 2),
         ] {
             let timestep = numerator as f64 / denominator as f64;
-            let bench = Bench::<2>::weightless();
+            let bench = ArmBench::<2>::weightless();
             bench
                 .ask(SetIntegrator {
                     timestep: Some(timestep),
@@ -57,7 +57,7 @@ fn a_microsecond_is_followed_step_by_step() {
     in_virtual_time(async {
         // Ten thousand steps are within a wake-up's budget, however busy the machine is.
         work_clock::count(Duration::from_micros(1));
-        let bench = Bench::<3>::weightless();
+        let bench = ArmBench::<3>::weightless();
         bench
             .ask(SetIntegrator {
                 timestep: Some(1e-6),
@@ -80,7 +80,7 @@ fn a_microsecond_is_followed_step_by_step() {
 #[test]
 fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
     in_virtual_time(async {
-        let bench = Bench::<3>::weightless();
+        let bench = ArmBench::<3>::weightless();
         bench.ask(of_timestep(1e-12)).await;
         let began = std::time::Instant::now();
         sleep(ms(200)).await;
@@ -94,7 +94,7 @@ fn what_one_wake_up_leaves_owed_is_taken_up_before_the_next_tick() {
 fn a_new_timestep_a_resume_and_a_reset_discard_the_unfinished_step() {
     in_virtual_time(async {
         for change in 0..3 {
-            let bench = Bench::<2>::weightless();
+            let bench = ArmBench::<2>::weightless();
 
             bench.ask(of_timestep(1.0)).await;
             sleep(ms(1600)).await;
@@ -124,7 +124,7 @@ fn a_new_timestep_a_resume_and_a_reset_discard_the_unfinished_step() {
 #[test]
 fn requests_that_change_nothing_keep_the_unfinished_step() {
     in_virtual_time(async {
-        let bench = Bench::<2>::weightless();
+        let bench = ArmBench::<2>::weightless();
         bench.ask(of_timestep(1.0)).await;
         let before = bench.steps().await;
         let began = Instant::now();
@@ -165,7 +165,7 @@ fn requests_that_change_nothing_keep_the_unfinished_step() {
 #[test]
 fn a_paused_arm_takes_no_step_and_owes_none() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         sleep(ms(500)).await;
         bench.ask(enable(true)).await;
         sleep(ms(500)).await;
@@ -187,7 +187,7 @@ fn a_paused_arm_takes_no_step_and_owes_none() {
 #[test]
 fn missed_ticks_are_skipped_and_at_most_a_quarter_of_a_second_is_caught_up() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         bench.want(Topic::JointStates, true).await;
         for stall in [3, 1000, 60_000] {
             sleep(ms(100)).await;
@@ -211,7 +211,7 @@ fn missed_ticks_are_skipped_and_at_most_a_quarter_of_a_second_is_caught_up() {
 #[test]
 fn a_short_stall_is_caught_up_in_full() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         bench.ask(Reset::default()).await;
         let began = Instant::now();
         for _ in 0..20 {

@@ -5,7 +5,7 @@ use super::*;
 #[test]
 fn states_go_out_sixty_times_a_second() {
     in_virtual_time(async {
-        let bench = Bench::<3>::new(Arm::default());
+        let bench = ArmBench::<3>::new(Arm::default());
         bench.want(Topic::JointStates, true).await;
         bench.want(Topic::Clock, true).await;
         for paused in [false, true] {
@@ -32,11 +32,11 @@ fn states_go_out_sixty_times_a_second() {
 #[test]
 fn nothing_is_said_on_a_topic_that_nobody_wants() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         sleep(ms(3000)).await;
         bench.ask(pause(true)).await;
         bench.ask(pause(false)).await;
-        assert_eq!(bench.heard.take(), []);
+        assert_eq!(bench.heard.take(), [Said::Answered, Said::Answered]);
         for topic in [Topic::JointStates, Topic::Clock, Topic::Diagnostics] {
             bench.want(topic, true).await;
             bench.want(topic, true).await;
@@ -59,7 +59,7 @@ fn nothing_is_said_on_a_topic_that_nobody_wants() {
 #[test]
 fn a_divergence_is_told_at_once_and_holds_until_the_reset() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         bench.want(Topic::Diagnostics, true).await;
         bench
             .ask(SetGains {
@@ -108,7 +108,7 @@ fn a_divergence_is_told_at_once_and_holds_until_the_reset() {
 #[test]
 fn diagnostics_come_once_a_second_with_rates_of_virtual_time() {
     in_virtual_time(async {
-        let bench = Bench::<2>::new(Arm::default());
+        let bench = ArmBench::<2>::new(Arm::default());
         bench.want(Topic::Diagnostics, true).await;
         sleep(ms(10_500)).await;
         let messages = bench.heard.messages(Topic::Diagnostics);

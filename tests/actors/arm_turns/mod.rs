@@ -12,6 +12,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use crate::arm_sim::pause;
 use crate::system::in_virtual_time;
 use actix::prelude::*;
 use pendularm::actors::arm::sim::{
@@ -52,13 +53,13 @@ enum Answer {
 type Log = Arc<Mutex<Vec<Said>>>;
 
 /// Stands in for the registry.
-struct Probe(Log);
+struct TickEar(Log);
 
-impl Actor for Probe {
+impl Actor for TickEar {
     type Context = Context<Self>;
 }
 
-impl Handler<Publish> for Probe {
+impl Handler<Publish> for TickEar {
     type Result = ();
 
     fn handle(&mut self, publish: Publish, _: &mut Context<Self>) {
@@ -98,15 +99,15 @@ impl<T: 'static> Asker<T> for Client {
 }
 
 /// An arm of three links whose `/joint_states` are heard.
-struct Bench {
+struct TurnsBench {
     arm: Addr<ArmSim<3>>,
     said: Log,
 }
 
-impl Bench {
+impl TurnsBench {
     async fn new() -> Self {
         let said = Log::default();
-        let publish = Probe(Arc::clone(&said)).start().recipient();
+        let publish = TickEar(Arc::clone(&said)).start().recipient();
         let gauges = Arc::new(Gauges::default());
         let arm = ArmSim::new(Arm::default(), Gains::default(), publish, gauges).start();
         let topic = Topic::JointStates;
@@ -191,13 +192,6 @@ impl Bench {
 
     async fn snapshot(&self) -> Simulation<3> {
         *self.arm.send(TakeSnapshot).await.unwrap().0
-    }
-}
-
-fn pause(paused: bool) -> Pause {
-    Pause {
-        paused: Some(paused),
-        ..Pause::default()
     }
 }
 

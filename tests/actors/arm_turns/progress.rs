@@ -32,7 +32,7 @@ impl Handler<GoalJudged<3>> for Owner {
 #[test]
 fn progress_of_a_goal_is_told_step_by_step_however_many_step_the_arm() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         let (turns, heard) = (Rc::new(Cell::new(0)), Rc::default());
         let others = Rc::clone(&turns);
         // Somebody else who always has something to do.

@@ -7,7 +7,7 @@ use pendularm::actors::node::ShutDown;
 #[test]
 fn clients_who_step_the_arm_take_turns_and_neither_the_tick_nor_a_light_call_waits_for_them() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         for connection in 1..=9 {
             bench.step(connection, MAX_STEPS);
         }
@@ -42,7 +42,7 @@ fn clients_who_step_the_arm_take_turns_and_neither_the_tick_nor_a_light_call_wai
 #[test]
 fn a_resume_ends_the_steps_that_are_left_and_says_so() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         bench.step(1, MAX_STEPS);
         bench.ask(2, pause(false));
         bench.until_answers(2).await;
@@ -60,7 +60,7 @@ fn a_resume_ends_the_steps_that_are_left_and_says_so() {
 #[test]
 fn a_reset_in_between_takes_effect_in_between() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         bench.step(1, MAX_STEPS);
         bench.ask(2, Reset::default());
         bench.until_answers(2).await;
@@ -78,7 +78,7 @@ fn a_reset_in_between_takes_effect_in_between() {
 #[test]
 fn a_divergence_ends_everybodys_steps() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         let integrator = |timestep: f64| SetIntegrator {
             method: Some(Method::Euler),
             timestep: Some(timestep),
@@ -101,7 +101,7 @@ fn a_divergence_ends_everybodys_steps() {
 #[test]
 fn steps_of_a_client_that_is_gone_are_not_taken() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         let gone = bench.step(1, MAX_STEPS);
         gone.store(true, Ordering::Relaxed);
         bench.step(2, 2 * STEPS_IN_A_ROW);
@@ -114,7 +114,7 @@ fn steps_of_a_client_that_is_gone_are_not_taken() {
 #[test]
 fn at_the_end_the_steps_that_are_left_are_refused() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         for connection in 1..=3 {
             bench.step(connection, MAX_STEPS);
         }

@@ -10,7 +10,7 @@ use pendularm::math::pid::Setpoint;
 #[test]
 fn the_tick_comes_however_many_messages_wait_for_the_arm() {
     const FLOOD: usize = 100 * TURN_MESSAGES;
-    type Send = fn(&Bench);
+    type Send = fn(&TurnsBench);
     let kinds: [(&str, Send); 8] = [
         ("params", |bench| {
             let gravity = Some(9.7);
@@ -68,7 +68,7 @@ fn the_tick_comes_however_many_messages_wait_for_the_arm() {
     ];
     for (name, send) in kinds {
         in_virtual_time(async move {
-            let bench = Bench::new().await;
+            let bench = TurnsBench::new().await;
             for _ in 0..FLOOD {
                 send(&bench);
             }
@@ -82,7 +82,7 @@ fn the_tick_comes_however_many_messages_wait_for_the_arm() {
 #[test]
 fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
     const FLOOD: usize = 100 * TURN_MESSAGES;
-    type Send = fn(&Bench, usize);
+    type Send = fn(&TurnsBench, usize);
     let kinds: [(&str, Send); 6] = [
         ("setpoints", |bench, _| {
             let (setpoint, done) = (Setpoint::default(), None);
@@ -102,7 +102,7 @@ fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
     ];
     for (name, send) in kinds {
         in_virtual_time(async move {
-            let bench = Bench::new().await;
+            let bench = TurnsBench::new().await;
             for n in 0..FLOOD {
                 send(&bench, n);
             }
@@ -118,7 +118,7 @@ fn the_tick_comes_however_many_messages_of_other_kinds_wait() {
 #[test]
 fn the_tick_comes_while_clients_step_without_end() {
     in_virtual_time(async {
-        let bench = Bench::paused().await;
+        let bench = TurnsBench::paused().await;
         let mut asked = 0;
         for _ in 0..1000 {
             while asked < bench.answered() + 4 {

@@ -90,6 +90,7 @@ fn every_goal_has_exactly_one_result() {
     });
 }
 
+/// The order of its responses and messages is meant, and that its next frame waits until a call has had its effects.
 #[test]
 fn what_one_connection_sends_takes_effect_in_order_without_waiting_for_answers() {
     in_virtual_time(async {
@@ -131,6 +132,7 @@ fn what_one_connection_sends_takes_effect_in_order_without_waiting_for_answers()
     });
 }
 
+/// A client's calls, because an answer to another node takes a way of its own, past the messages.
 #[test]
 fn cancelling_publishes_the_result_and_then_answers_with_nothing() {
     in_virtual_time(async {

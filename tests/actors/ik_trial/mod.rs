@@ -38,8 +38,6 @@ const SKIP: &str = "/ik_trial/skip";
 const STOP: &str = "/ik_trial/stop";
 const STATUS: &str = "/ik_trial/status";
 const RESULT: &str = "/ik_action/result";
-const SEND: &str = "/ik_action/send_goal";
-const CANCEL: &str = "/ik_action/cancel_goal";
 
 /// Differences of simulation times: a few units in the last place of 100 s.
 const ROUNDING: f64 = 1e-12;
@@ -55,12 +53,16 @@ fn hard(duration: f64) -> StartTrial {
 }
 
 fn start(duration: f64, epsilon: f64, success_hold: f64) -> StartTrial {
+    changed(Changes {
+        duration: Some(duration),
+        epsilon: Some(epsilon),
+        success_hold: Some(success_hold),
+    })
+}
+
+fn changed(changes: Changes) -> StartTrial {
     StartTrial {
-        changes: Changes {
-            duration: Some(duration),
-            epsilon: Some(epsilon),
-            success_hold: Some(success_hold),
-        },
+        changes,
         ..StartTrial::default()
     }
 }

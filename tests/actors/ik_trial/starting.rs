@@ -5,20 +5,30 @@ use super::*;
 #[test]
 fn start_answers_with_the_settings_in_force_and_keeps_what_is_not_named() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        let defaults = json!({"duration": 60.0, "epsilon": 0.02, "success_hold": 0.5});
-        assert_eq!(client.ask(START, json!({})).await, defaults);
-        let values = client.ask(START, json!({"epsilon": 0.1})).await;
-        assert_eq!(values["epsilon"], 0.1);
-        let values = client
-            .ask(
-                START,
-                json!({"duration": 30, "success_hold": 0, "epsilon": null}),
-            )
-            .await;
-        let kept = json!({"duration": 30.0, "epsilon": 0.1, "success_hold": 0.0});
-        assert_eq!(values, kept);
-        assert_eq!(client.ask(START, json!({})).await, kept);
+        let (stage, _client) = floating_and_watched().await;
+        let mut settings = Settings {
+            duration: 60.0,
+            criteria: Criteria {
+                epsilon: 0.02,
+                success_hold: 0.5,
+            },
+        };
+        assert_eq!(begin(&stage.trial, StartTrial::default()).await, settings);
+        let changes = Changes {
+            epsilon: Some(0.1),
+            ..Changes::default()
+        };
+        settings.criteria.epsilon = 0.1;
+        assert_eq!(begin(&stage.trial, changed(changes)).await, settings);
+        let changes = Changes {
+            duration: Some(30.0),
+            success_hold: Some(0.0),
+            ..Changes::default()
+        };
+        settings.duration = 30.0;
+        settings.criteria.success_hold = 0.0;
+        assert_eq!(begin(&stage.trial, changed(changes)).await, settings);
+        assert_eq!(begin(&stage.trial, StartTrial::default()).await, settings);
     });
 }
 
@@ -92,20 +102,12 @@ fn start_begins_afresh_and_cancels_the_goal_that_was_left_over() {
 #[test]
 fn the_goal_is_under_way_when_start_is_answered_and_what_follows_finds_it() {
     in_virtual_time(async {
-        let (_stage, mut client) = floating_and_watched().await;
-        let hard = json!({"duration": 60, "epsilon": 1e-9, "success_hold": 0});
-        for (service, args) in [(START, hard), (CANCEL, json!({})), (SKIP, json!({}))] {
-            client
-                .send(&json!({"op": "call_service", "service": service, "args": args}))
-                .await;
-        }
-        client.ask(SEND, json!({"x": 1, "y": 1})).await;
-        let results: Vec<bool> = client
-            .heard
-            .iter()
-            .filter_map(|frame| frame["result"].as_bool())
-            .collect();
-        assert_eq!(results, [true; 4], "{:?}", client.heard);
+        let (stage, mut client) = floating_and_watched().await;
+        begin(&stage.trial, hard(60.0)).await;
+        assert_eq!(stage.cancel().await, Ok(()));
+        assert_eq!(asked(&stage.trial, SkipTarget).await, Ok(()));
+        stage.send_goal(theirs()).await;
+        client.settle().await;
         assert_eq!(client.messages(RESULT).len(), 2);
     });
 }
@@ -175,11 +177,10 @@ fn stop_ends_the_trial_and_leaves_nothing_in_flight() {
 fn args_with_more_entries_than_the_service_has_fields_are_rejected_and_change_nothing() {
     in_virtual_time(async {
         let (_stage, mut client) = floating_and_watched().await;
-        let values = client.ask(START, json!([60, 1e-9, 0])).await;
-        assert_eq!(
-            values,
-            json!({"duration": 60.0, "epsilon": 1e-9, "success_hold": 0.0})
-        );
+        let values = json!({"duration": 60.0, "epsilon": 1e-9, "success_hold": 0.0});
+        for args in [json!([60, 1e-9, 0]), json!({"epsilon": null})] {
+            assert_eq!(client.ask(START, args).await, values);
+        }
         let before = status(&mut client).await;
         let response = client.call(START, json!([5, 1, 1, 1])).await;
         assert_eq!(response["values"], values);

@@ -30,7 +30,8 @@ fn stability_values<const N: usize>(limits: &Limits<N>, motion: &Motion) -> Valu
 }
 
 async fn assert_predictions_are_the_studys<const N: usize>() {
-    let mut bench = Bench::<N>::new();
+    let bench = study::<N>();
+    let mut client = caller_of(&bench);
     let Present { control, state } = settings::<N>();
     let expected = limits(&control);
     let motion = Motion::ahead(&control, &state);
@@ -42,7 +43,7 @@ async fn assert_predictions_are_the_studys<const N: usize>() {
     let nulls =
         json!({"integrator": null, "gains": {"kp": null}, "params": null, "setpoint": null});
     for args in [json!({}), all, nulls] {
-        assert_eq!(bench.values(Service::Stability, &args).await, written);
+        assert_eq!(client.values(Service::Stability, &args).await, written);
     }
 }
 
@@ -57,7 +58,7 @@ fn the_predictions_are_the_studys_and_what_is_left_out_is_the_arms_own() {
 #[test]
 fn members_that_are_left_out_of_an_object_are_the_arms_own() {
     in_real_time(async {
-        let bench = Bench::<2>::new();
+        let bench = study::<2>();
         let predicted = bench
             .ask(PredictStability {
                 gains: Some(SetGains {
@@ -81,10 +82,11 @@ fn members_that_are_left_out_of_an_object_are_the_arms_own() {
 #[test]
 fn no_limit_is_null_and_no_stable_timestep_is_zero() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
+        let bench = study::<2>();
+        let mut client = caller_of(&bench);
         let none = json!({"kp": [0, 0], "ki": [0, 0], "kd": [0, 0]});
         let args = json!({"gains": none, "params": {"gravity": 0}});
-        let values = bench.values(Service::Stability, &args).await;
+        let values = client.values(Service::Stability, &args).await;
         for limit in [
             "timestep_limit_held",
             "timestep_limit_continuous",
@@ -102,7 +104,7 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
         assert_eq!(values["timestep_limit_motion"], 0.3 / speed);
         assert_eq!(values["advised_timestep"], 0.8 * (0.3 / speed));
         let args = json!({"gains": none, "integrator": "euler"});
-        let values = bench.values(Service::Stability, &args).await;
+        let values = client.values(Service::Stability, &args).await;
         assert_eq!(values["timestep_limit_held"], 0.0, "{values}");
         assert_eq!(values["advised_timestep"], 0.0, "{values}");
     });
@@ -112,7 +114,8 @@ fn no_limit_is_null_and_no_stable_timestep_is_zero() {
 #[test]
 fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
+        let bench = study::<2>();
+        let mut client = caller_of(&bench);
         let Present { control, state } = settings::<2>();
         let wish = Wish {
             settling_time: 4.0,
@@ -127,7 +130,7 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let suggested = bench.ask(SuggestGains::default()).await.unwrap();
         assert_eq!(suggested.found, found);
         assert_eq!(suggested.timestep, control.timestep);
-        let values = bench.values(Service::SuggestGains, &json!({})).await;
+        let values = client.values(Service::SuggestGains, &json!({})).await;
         assert_eq!(values["kp"], json!(found.gains.kp));
         assert_eq!(values["timestep_limit"], json!(found.limit));
         let task = Task {
@@ -146,12 +149,12 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         assert_eq!(run.planned, planned);
         assert!(run.controlled);
         let args = json!({"error": 0.05, "servo": true});
-        let values = bench.values(Service::Plan, &args).await;
+        let values = client.values(Service::Plan, &args).await;
         let best = planned.best().unwrap();
         assert_eq!(values["integrator"], best.method.name());
         assert_eq!(values["timestep"], json!(best.timestep));
         assert_eq!(
-            bench
+            client
                 .refusal(Service::Plan, &json!({"error": -1, "servo": 1}))
                 .await,
             "error must be greater than 0, got -1; servo must be true or false, got 1"
@@ -177,7 +180,8 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
 #[test]
 fn refused_advice_names_a_field_and_spells_no_number_out() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
+        let bench = study::<2>();
+        let mut client = caller_of(&bench);
         for (service, args, why) in [
             (
                 Service::SuggestGains,
@@ -190,7 +194,7 @@ fn refused_advice_names_a_field_and_spells_no_number_out() {
                 "error must be larger or duration shorter: the motion itself ",
             ),
         ] {
-            let refused = bench.refusal(service, &args).await;
+            let refused = client.refusal(service, &args).await;
             assert!(
                 refused.starts_with(why) && !refused.contains("inf"),
                 "{refused}"
@@ -315,19 +319,20 @@ fn wrong_runs() -> [(Value, &'static str); 12] {
 #[test]
 fn every_field_that_is_wrong_is_named_members_with_their_object() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
+        let bench = study::<2>();
+        let mut client = caller_of(&bench);
         let common = wrong_loops();
         let methods = Method::ALL.map(Method::name).join(", ");
         let named = |why: &str| why.replace("{METHODS}", &methods);
         for (args, why) in &common {
-            let refused = bench.refusal(Service::Stability, args).await;
+            let refused = client.refusal(Service::Stability, args).await;
             assert_eq!(refused, named(why));
         }
         for (args, why) in &common[..10] {
-            assert_eq!(bench.refusal(Service::Rollout, args).await, named(why));
+            assert_eq!(client.refusal(Service::Rollout, args).await, named(why));
         }
         for (args, why) in wrong_runs() {
-            assert_eq!(bench.refusal(Service::Rollout, &args).await, why);
+            assert_eq!(client.refusal(Service::Rollout, &args).await, why);
         }
         let too_long = RunOffline {
             duration: Some(20.0),

@@ -11,7 +11,8 @@ fn joints(values: &Value) -> Vec<[f64; 2]> {
 #[test]
 fn a_rollout_is_the_live_simulation_bit_for_bit() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
+        let bench = study::<2>();
+        let mut client = caller_of(&bench);
         for method in Method::ALL {
             for controlled in [false, true] {
                 let mut args = json!({"q0": [0.4, -0.3], "qdot0": [0.5, 1], "duration": 1, "timestep": 0.005,
@@ -39,7 +40,7 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
                     position: [1.0, -0.5],
                     velocity: [0.0; 2],
                 });
-                let values = bench.values(Service::Rollout, &args).await;
+                let values = client.values(Service::Rollout, &args).await;
                 let times: Vec<f64> = serde_json::from_value(values["times"].clone()).unwrap();
                 assert_eq!(times.len(), 51);
                 let (positions, velocities) =
@@ -67,7 +68,7 @@ fn a_rollout_is_the_live_simulation_bit_for_bit() {
 #[test]
 fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
     in_real_time(async {
-        let bench = Bench::<3>::new();
+        let bench = study::<3>();
         let run = bench.ask(RunOffline::default()).await.unwrap().run;
         let mut live = Simulation::new(settings::<3>().control.arm, no_control());
         live.set_method(Method::Midpoint);
@@ -85,7 +86,7 @@ fn an_empty_rollout_is_ten_seconds_of_the_present_arm_left_to_itself() {
 #[test]
 fn methods_can_be_compared_by_their_errors() {
     in_real_time(async {
-        let bench = Bench::<2>::new();
+        let bench = study::<2>();
         let control = SetGains {
             kp: Some([200.0, 100.0]),
             kd: Some([30.0, 12.0]),
@@ -132,10 +133,11 @@ fn methods_can_be_compared_by_their_errors() {
 #[test]
 fn a_rollout_that_diverges_ends_with_its_last_finite_sample() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
+        let bench = study::<2>();
+        let mut client = caller_of(&bench);
         let args = json!({"integrator": "euler", "timestep": 1, "duration": 1000, "q0": [1, 1], "reference": true,
             "gains": {"kp": [1e9, 1e9], "ki": [0, 0], "kd": [1e9, 1e9]}});
-        let values = bench.values(Service::Rollout, &args).await;
+        let values = client.values(Service::Rollout, &args).await;
         let times = values["times"].as_array().unwrap();
         assert!(times.len() < 1001, "{}", times.len());
         for key in ["positions", "velocities", "efforts", "energy"] {

@@ -29,17 +29,17 @@ fn short<const N: usize>() -> RunOffline<N> {
 #[test]
 fn what_is_light_is_answered_while_what_is_heavy_takes_turns_with_it() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
-        let heavy = bench.call(1, heavy());
-        bench.call(2, short());
-        bench.call(3, short());
+        let mut bench = study::<2>();
+        let heavy = bench.ask_as(1, heavy());
+        bench.ask_as(2, short());
+        bench.ask_as(3, short());
         let mut light = [bench.next().await, bench.next().await];
         light.sort_unstable();
         assert_eq!(light, [2, 3]);
         // A prediction is cut into slices too.
-        let mut three = Bench::<3>::new();
-        three.call(1, PredictStability::default());
-        three.call(2, short());
+        let mut three = study::<3>();
+        three.ask_as(1, PredictStability::default());
+        three.ask_as(2, short());
         assert_eq!(three.next().await, 2);
         assert_eq!(three.next().await, 1);
         heavy.gone.store(true, Ordering::Relaxed);
@@ -58,7 +58,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
         .recipient();
     let integration = Integration::new(pool.clone()).start().recipient();
     for connection in 1..=others {
-        call(&study, connection, &answered, heavy());
+        ask_as(&study, connection, &answered, heavy());
     }
     // The study asks the arm first; a moment of virtual time passes when all wait.
     pass(ms(1)).await;
@@ -73,7 +73,7 @@ async fn turns_until_integrated(others: u64) -> u32 {
         method: Some(Method::Rk4),
         ..IntegrationStep::default()
     };
-    let mut honest = call(&integration, 100, &answered, step);
+    let mut honest = ask_as(&integration, 100, &answered, step);
     pass(ms(1)).await;
     let mut turns = 0;
     while honest.ended.try_recv() == Err(oneshot::error::TryRecvError::Empty) {
@@ -105,14 +105,14 @@ fn heavy_rollouts_delay_an_integration_by_its_fair_share_and_no_more() {
 #[test]
 fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
     in_real_time(async {
-        let mut bench = Bench::<2>::new();
-        let (first, third) = (bench.call(1, heavy()), bench.call(3, heavy()));
-        bench.call(2, PredictStability::default());
+        let mut bench = study::<2>();
+        let (first, third) = (bench.ask_as(1, heavy()), bench.ask_as(3, heavy()));
+        bench.ask_as(2, PredictStability::default());
         while bench.pool.is_idle() {
             tokio::task::yield_now().await;
         }
         bench.pool.close("shutting down");
-        let late = bench.call(4, heavy());
+        let late = bench.ask_as(4, heavy());
         let mut heard = Vec::new();
         for _ in 1..=4 {
             heard.push(bench.next().await);
@@ -124,16 +124,16 @@ fn the_end_of_the_pool_refuses_what_runs_and_what_comes() {
             assert!(matches!(answer, Err(Unserved::Refused("shutting down"))));
         }
         let control = settings::<2>().control;
-        assert_eq!(bench.study.send(HeldLimit(control)).await.unwrap(), None);
+        assert_eq!(bench.node.send(HeldLimit(control)).await.unwrap(), None);
     });
 }
 
 #[test]
 fn the_arms_own_question_is_answered_by_the_pool() {
     in_real_time(async {
-        let bench = Bench::<2>::new();
+        let bench = study::<2>();
         let control = settings::<2>().control;
-        let limit = bench.study.send(HeldLimit(control)).await.unwrap();
+        let limit = bench.node.send(HeldLimit(control)).await.unwrap();
         assert_eq!(limit, limit_held(&control));
         let arm = Arm::new([1.0; 2], [1.0; 2], 0.0).unwrap();
         let free = ControlLoop {
@@ -141,7 +141,7 @@ fn the_arms_own_question_is_answered_by_the_pool() {
             gains: no_control(),
             ..control
         };
-        let limit = bench.study.send(HeldLimit(free)).await.unwrap();
+        let limit = bench.node.send(HeldLimit(free)).await.unwrap();
         assert_eq!(limit, Some(f64::INFINITY));
     });
 }

@@ -1,6 +1,6 @@
 //! The commands against a server that means them harm: they end in time, in words, and hold little of what it sends.
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
 use std::process::{Child, Stdio};
 use std::thread;
@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-use crate::common::{self, PATIENCE};
+use crate::common;
 
 /// A server that answers questions for types, topics and parameters, and does `then` at the first other frame.
 fn server(then: impl Fn(&mut TcpStream) + Send + 'static) -> String {
@@ -111,6 +111,11 @@ fn the_text_of_a_parameter_acts_on_no_terminal() {
     assert_eq!((status, out.as_str()), (Some(0), "one\\u{1b}[2J\nother\n"));
 }
 
+/// Keeps the connection until the command closes it.
+fn hold(stream: &mut TcpStream) {
+    let _ = io::copy(stream, &mut io::sink());
+}
+
 /// Publishes this text on the topic, once.
 fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
     move |stream| {
@@ -119,7 +124,7 @@ fn say(topic: &'static str, msg: String) -> impl Fn(&mut TcpStream) + Send {
             stream,
             "{{\"op\":\"publish\",\"topic\":\"{topic}\",\"msg\":{msg}}}"
         );
-        thread::sleep(PATIENCE);
+        hold(stream);
     }
 }
 
@@ -175,7 +180,7 @@ fn values_that_say_nothing_to_a_command_are_not_spread_out() {
             let foreign = format!("{{\"op\":\"service_response\",\"{member}\":[{value}1]}}\n");
             let answer = "{\"op\":\"service_response\",\"id\":1,\"values\":{},\"result\":true}\n";
             let _ = stream.write_all((foreign + answer).as_bytes());
-            thread::sleep(PATIENCE);
+            hold(stream);
         });
         let (status, out, complaint) = end(start_within(200_000, &CALL, &address));
         assert_eq!((status, complaint.as_str()), (Some(0), ""), "{member}");

@@ -14,7 +14,7 @@ use std::process::{Child, Output, Stdio};
 
 use serde_json::Value;
 
-use crate::common::{self, Runtime};
+use crate::common::{self, Runtime, signal};
 
 /// A command with the address of a runtime, ready to be started.
 fn command(runtime: &Runtime, arguments: &[&str]) -> std::process::Command {
@@ -92,11 +92,7 @@ impl Going {
     }
 
     fn interrupt(&self) {
-        let pid = self.0.id().to_string();
-        let sent = std::process::Command::new("kill")
-            .args(["-INT", &pid])
-            .status();
-        assert!(sent.unwrap().success());
+        signal(self.0.id(), "INT");
     }
 
     /// Exit status, the rest of standard output, and standard error.

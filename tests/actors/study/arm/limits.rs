@@ -5,45 +5,43 @@ use super::*;
 #[test]
 fn without_subscribers_no_limit_is_asked_for_and_no_error_estimated() {
     in_virtual_time(async {
-        let stage = Stage::new(0.004).await;
-        stage.want(Topic::JointStates, true).await;
+        let arm = Consulting::new(0.004).await;
+        arm.want(Topic::JointStates, true).await;
         for timestep in [0.01, 0.02, 0.03] {
-            stage
-                .ask(integrator(Some(timestep), Some(Method::Verlet)))
+            arm.ask(integrator(Some(timestep), Some(Method::Verlet)))
                 .await;
-            stage.ask(enable(true)).await;
-            stage.set_setpoint([timestep, 1.0]).await;
+            arm.ask(enable(true)).await;
+            arm.hold([timestep, 1.0], [0.0; 2]).await;
             sleep(Duration::from_secs(2)).await;
         }
-        assert_eq!(stage.questions().await, []);
-        assert_eq!(stage.gauges.error_estimates(), 0);
+        assert_eq!(arm.questions().await, []);
+        assert_eq!(arm.gauges.error_estimates(), 0);
     });
 }
 
 #[test]
 fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
     in_virtual_time(async {
-        let stage = Stage::new(0.004).await;
-        stage.want(Topic::Diagnostics, true).await;
-        let first = stage.questions().await;
+        let arm = Consulting::new(0.004).await;
+        arm.want(Topic::Diagnostics, true).await;
+        let first = arm.questions().await;
         let free = ControlLoop::free(Arm::default());
         assert_eq!(first, [free]);
         sleep(Duration::from_secs(10)).await;
-        assert_eq!(stage.questions().await, []);
+        assert_eq!(arm.questions().await, []);
         // Changes that do not bear on the loop in force: with the controller off, gains and setpoint too.
-        stage.ask(integrator(Some(0.002), Some(Method::Rk4))).await;
-        stage.ask(gravity(9.81)).await;
-        stage
-            .ask(SetGains {
-                kp: Some([50.0, 50.0]),
-                ..SetGains::default()
-            })
-            .await;
-        stage.set_setpoint([1.0, -1.0]).await;
-        stage.ask(pause(true)).await;
-        stage.ask(pause(false)).await;
-        assert_eq!(stage.questions().await, []);
-        stage.ask(enable(true)).await;
+        arm.ask(integrator(Some(0.002), Some(Method::Rk4))).await;
+        arm.ask(gravity(9.81)).await;
+        arm.ask(SetGains {
+            kp: Some([50.0, 50.0]),
+            ..SetGains::default()
+        })
+        .await;
+        arm.hold([1.0, -1.0], [0.0; 2]).await;
+        arm.ask(pause(true)).await;
+        arm.ask(pause(false)).await;
+        assert_eq!(arm.questions().await, []);
+        arm.ask(enable(true)).await;
         let gains = Gains {
             kp: [50.0; 2],
             ..Gains::default()
@@ -58,30 +56,29 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
             timestep: 0.002,
             ..free
         };
-        assert_eq!(stage.questions().await, [control]);
-        stage.ask(integrator(None, Some(Method::Midpoint))).await;
+        assert_eq!(arm.questions().await, [control]);
+        arm.ask(integrator(None, Some(Method::Midpoint))).await;
         control.method = Method::Midpoint;
-        assert_eq!(stage.questions().await, [control]);
-        stage.ask(gravity(1.0)).await;
+        assert_eq!(arm.questions().await, [control]);
+        arm.ask(gravity(1.0)).await;
         control.arm = Arm::new([1.0; 2], [1.0; 2], 1.0).unwrap();
-        assert_eq!(stage.questions().await, [control]);
-        stage
-            .ask(SetGains {
-                ki: Some([0.0, 0.0]),
-                ..SetGains::default()
-            })
-            .await;
+        assert_eq!(arm.questions().await, [control]);
+        arm.ask(SetGains {
+            ki: Some([0.0, 0.0]),
+            ..SetGains::default()
+        })
+        .await;
         control.gains.ki = [0.0; 2];
-        assert_eq!(stage.questions().await, [control]);
-        stage.set_setpoint([0.5, 0.5]).await;
+        assert_eq!(arm.questions().await, [control]);
+        arm.hold([0.5, 0.5], [0.0; 2]).await;
         control.setpoint.position = [0.5; 2];
-        assert_eq!(stage.questions().await, [control]);
-        stage.ask(Reset::default()).await;
+        assert_eq!(arm.questions().await, [control]);
+        arm.ask(Reset::default()).await;
         control.setpoint.position = [0.0; 2];
-        assert_eq!(stage.questions().await, [control]);
-        stage.want(Topic::Diagnostics, false).await;
-        stage.set_setpoint([0.5, 0.5]).await;
-        assert_eq!(stage.questions().await, []);
+        assert_eq!(arm.questions().await, [control]);
+        arm.want(Topic::Diagnostics, false).await;
+        arm.hold([0.5, 0.5], [0.0; 2]).await;
+        assert_eq!(arm.questions().await, []);
     });
 }
 
@@ -89,14 +86,14 @@ fn the_limit_is_asked_for_when_the_loop_in_force_changes_and_never_else() {
 #[test]
 fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
     in_virtual_time(async {
-        let stage = Stage::new(0.004).await;
-        stage.ask(enable(true)).await;
-        stage.want(Topic::Diagnostics, true).await;
+        let arm = Consulting::new(0.004).await;
+        arm.ask(enable(true)).await;
+        arm.want(Topic::Diagnostics, true).await;
         for k in 0..2000 {
-            stage.set_setpoint([1e-4 * f64::from(k), 0.0]).await;
+            arm.hold([1e-4 * f64::from(k), 0.0], [0.0; 2]).await;
             sleep(Duration::from_millis(1)).await;
         }
-        let questions = stage.questions().await;
+        let questions = arm.questions().await;
         assert!((15..=22).contains(&questions.len()), "{}", questions.len());
         let last = questions.last().unwrap().setpoint.position;
         assert_eq!(last, [1e-4 * 1999.0, 0.0], "the latest has the last word");
@@ -107,17 +104,17 @@ fn a_stream_of_setpoints_costs_ten_predictions_a_second() {
 #[test]
 fn a_setpoint_that_goes_on_moving_is_predicted_now_and_then() {
     in_virtual_time(async {
-        let stage = Stage::new(0.004).await;
-        stage.want(Topic::Diagnostics, true).await;
-        stage.ask(enable(true)).await;
-        stage.questions().await;
+        let arm = Consulting::new(0.004).await;
+        arm.want(Topic::Diagnostics, true).await;
+        arm.ask(enable(true)).await;
+        arm.questions().await;
         let time = Duration::from_secs(2);
         let moves = 100_u32;
         for n in 1..=moves {
-            stage.set_setpoint([f64::from(n) * 1e-2, 0.0]).await;
+            arm.hold([f64::from(n) * 1e-2, 0.0], [0.0; 2]).await;
             sleep(time / moves).await;
         }
-        let asked = stage.questions().await;
+        let asked = arm.questions().await;
         let most = usize::try_from(time.as_millis() / LEAST_PAUSE.as_millis()).unwrap() + 2;
         assert!(
             asked.len() > 5 && asked.len() <= most,
@@ -133,16 +130,16 @@ fn a_setpoint_that_goes_on_moving_is_predicted_now_and_then() {
 #[test]
 fn a_limit_of_another_loop_is_never_held_against_the_arm() {
     in_virtual_time(async {
-        let stage = Stage::new(0.0).await;
-        stage.want(Topic::Diagnostics, true).await;
+        let arm = Consulting::new(0.0).await;
+        arm.want(Topic::Diagnostics, true).await;
         // Between two ticks, so that none comes between the change and the message.
         sleep(Duration::from_millis(508)).await;
-        stage.said(Topic::Diagnostics);
-        stage.oracle.limit.set(0.004);
-        stage.ask(enable(true)).await;
-        stage.ask(pause(true)).await;
+        arm.heard.messages(Topic::Diagnostics);
+        arm.oracle.limit.set(0.004);
+        arm.ask(enable(true)).await;
+        arm.ask(pause(true)).await;
         sleep(Duration::from_millis(100)).await;
-        let told = stage.said(Topic::Diagnostics);
+        let told = arm.heard.messages(Topic::Diagnostics);
         let told: Vec<_> = told
             .iter()
             .map(|one| {

@@ -5,11 +5,11 @@ use super::*;
 #[test]
 fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
     in_virtual_time(async {
-        let stage = Stage::new(0.004).await;
-        stage.ask(enable(true)).await;
-        stage.want(Topic::Diagnostics, true).await;
+        let arm = Consulting::new(0.004).await;
+        arm.ask(enable(true)).await;
+        arm.want(Topic::Diagnostics, true).await;
         sleep(Duration::from_millis(2100)).await;
-        for message in stage.said(Topic::Diagnostics) {
+        for message in arm.heard.messages(Topic::Diagnostics) {
             assert_eq!(message["status"][0]["level"], 0);
             assert_eq!(
                 (
@@ -21,14 +21,14 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
         }
         for paused in [false, true] {
             let state = if paused { "paused" } else { "running" };
-            stage.ask(pause(paused)).await;
+            arm.ask(pause(paused)).await;
             for (timestep, level) in [(0.005, 1), (0.004, 0)] {
                 // Within a tick of the change, not a second later.
                 sleep(Duration::from_millis(5)).await;
-                stage.said(Topic::Diagnostics);
-                stage.ask(integrator(Some(timestep), None)).await;
+                arm.heard.messages(Topic::Diagnostics);
+                arm.ask(integrator(Some(timestep), None)).await;
                 sleep(Duration::from_millis(20)).await;
-                let told = stage.said(Topic::Diagnostics);
+                let told = arm.heard.messages(Topic::Diagnostics);
                 let status = &told[0]["status"][0];
                 assert_eq!(
                     (&status["level"], &status["message"]),
@@ -45,10 +45,10 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
                 );
             }
         }
-        stage.oracle.limit.set(0.0);
-        stage.ask(enable(false)).await;
+        arm.oracle.limit.set(0.0);
+        arm.ask(enable(false)).await;
         sleep(Duration::from_millis(300)).await;
-        let told = stage.said(Topic::Diagnostics);
+        let told = arm.heard.messages(Topic::Diagnostics);
         assert_eq!(
             value(told.last().unwrap(), "warning"),
             "rk4 is predicted to be unstable at every timestep with the controller off"
@@ -59,15 +59,15 @@ fn a_warning_is_told_when_it_comes_and_when_it_goes_running_or_paused() {
 #[test]
 fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
     in_virtual_time(async {
-        let stage = Stage::new(f64::INFINITY).await;
-        stage.want(Topic::Diagnostics, true).await;
-        stage.ask(pause(true)).await;
+        let arm = Consulting::new(f64::INFINITY).await;
+        arm.want(Topic::Diagnostics, true).await;
+        arm.ask(pause(true)).await;
         // At rest without gravity, so that nothing moves either.
-        stage.ask(gravity(0.0)).await;
-        stage.ask(Reset::default()).await;
-        stage.ask(integrator(Some(1e6), None)).await;
+        arm.ask(gravity(0.0)).await;
+        arm.ask(Reset::default()).await;
+        arm.ask(integrator(Some(1e6), None)).await;
         sleep(Duration::from_secs(2)).await;
-        let told = stage.said(Topic::Diagnostics);
+        let told = arm.heard.messages(Topic::Diagnostics);
         let message = told.last().unwrap();
         assert_eq!(
             (value(message, "timestep_limit"), value(message, "warning")),
@@ -81,13 +81,13 @@ fn an_arm_that_nothing_limits_says_so_and_does_not_warn() {
 #[test]
 fn a_motion_too_fast_for_the_timestep_is_warned_of() {
     in_virtual_time(async {
-        let stage = Stage::new(0.2).await;
-        stage.want(Topic::Diagnostics, true).await;
-        stage.ask(pause(true)).await;
+        let arm = Consulting::new(0.2).await;
+        arm.want(Topic::Diagnostics, true).await;
+        arm.ask(pause(true)).await;
         for (timestep, warned) in [(0.05, false), (0.15, true)] {
-            stage.ask(integrator(Some(timestep), None)).await;
+            arm.ask(integrator(Some(timestep), None)).await;
             sleep(Duration::from_secs(2)).await;
-            let told = stage.said(Topic::Diagnostics);
+            let told = arm.heard.messages(Topic::Diagnostics);
             let message = told.last().unwrap();
             let limit: f64 = value(message, "timestep_limit_motion").parse().unwrap();
             assert!((0.05..0.15).contains(&limit), "{limit}");
@@ -97,9 +97,9 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
             assert_eq!(warning.contains(said), warned, "{warning}");
         }
         // Beyond both limits the smaller one is told.
-        stage.ask(integrator(Some(0.3), None)).await;
+        arm.ask(integrator(Some(0.3), None)).await;
         sleep(Duration::from_secs(2)).await;
-        let told = stage.said(Topic::Diagnostics);
+        let told = arm.heard.messages(Topic::Diagnostics);
         let warning = value(told.last().unwrap(), "warning").to_owned();
         assert!(warning.contains("16.4 rad/s"), "{warning}");
     });
@@ -108,46 +108,45 @@ fn a_motion_too_fast_for_the_timestep_is_warned_of() {
 #[test]
 fn the_error_estimate_comes_ten_times_a_second_while_somebody_listens() {
     in_virtual_time(async {
-        let stage = Stage::new(0.004).await;
-        stage.ask(integrator(None, Some(Method::Midpoint))).await;
-        stage.want(Topic::ErrorEstimate, true).await;
+        let arm = Consulting::new(0.004).await;
+        arm.ask(integrator(None, Some(Method::Midpoint))).await;
+        arm.want(Topic::ErrorEstimate, true).await;
         sleep(Duration::from_secs(3)).await;
-        let told = stage.said(Topic::ErrorEstimate);
+        let told = arm.heard.messages(Topic::ErrorEstimate);
         assert!((29..=31).contains(&told.len()), "{}", told.len());
-        assert_eq!(stage.gauges.error_estimates(), told.len() as u64);
-        stage.ask(pause(true)).await;
+        assert_eq!(arm.gauges.error_estimates(), told.len() as u64);
+        arm.ask(pause(true)).await;
         sleep(Duration::from_millis(200)).await;
-        let simulation = stage.arm.send(TakeSnapshot::<2>).await.unwrap().0;
+        let simulation = arm.bench.arm.send(TakeSnapshot::<2>).await.unwrap().0;
         let expected = estimate(&simulation).unwrap();
         assert!(expected.local_error > 0.0);
         assert_eq!(
-            *stage.said(Topic::ErrorEstimate).last().unwrap(),
+            *arm.heard.messages(Topic::ErrorEstimate).last().unwrap(),
             json!({"method": "midpoint", "timestep": 0.001, "local_error": expected.local_error,
                 "velocity_error": expected.velocity_error, "error_per_second": expected.error_per_second, "predicted_limit": 0.004})
         );
-        stage.want(Topic::ErrorEstimate, false).await;
-        let before = stage.gauges.error_estimates();
+        arm.want(Topic::ErrorEstimate, false).await;
+        let before = arm.gauges.error_estimates();
         sleep(Duration::from_secs(3)).await;
-        assert_eq!(stage.gauges.error_estimates(), before);
+        assert_eq!(arm.gauges.error_estimates(), before);
     });
 }
 
 #[test]
 fn an_arm_that_has_diverged_has_no_local_error() {
     in_virtual_time(async {
-        let stage = Stage::new(f64::INFINITY).await;
-        stage.want(Topic::ErrorEstimate, true).await;
-        stage
-            .ask(SetGains {
-                kp: Some([1e200; 2]),
-                ..SetGains::default()
-            })
-            .await;
-        stage.set_setpoint([1.0, 1.0]).await;
-        stage.ask(integrator(Some(0.01), Some(Method::Euler))).await;
-        stage.ask(enable(true)).await;
+        let arm = Consulting::new(f64::INFINITY).await;
+        arm.want(Topic::ErrorEstimate, true).await;
+        arm.ask(SetGains {
+            kp: Some([1e200; 2]),
+            ..SetGains::default()
+        })
+        .await;
+        arm.hold([1.0, 1.0], [0.0; 2]).await;
+        arm.ask(integrator(Some(0.01), Some(Method::Euler))).await;
+        arm.ask(enable(true)).await;
         sleep(Duration::from_secs(1)).await;
-        let told = stage.said(Topic::ErrorEstimate);
+        let told = arm.heard.messages(Topic::ErrorEstimate);
         assert_eq!(
             *told.last().unwrap(),
             json!({"method": "euler", "timestep": 0.01, "local_error": null, "velocity_error": null, "error_per_second": null, "predicted_limit": null})

@@ -1,0 +1,228 @@
+//! Who asks a node that stands alone, without registry and connections: a client with JSON, whose call is read and whose
+//! answer is written, and clients with typed messages, whose turns on the pool can be told apart.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use actix::dev::ToEnvelope;
+use actix::prelude::*;
+use pendularm::actors::ConnectionId;
+use pendularm::actors::compute::workers::WorkerPool;
+use pendularm::actors::node::{Ask, Asker, Call, Done, Reply, Respond, Unserved, ask};
+use pendularm::actors::wire::{Caller, Nodes, ServiceCall};
+use pendularm::protocol::catalog::Service;
+use pendularm::protocol::op::Arguments;
+use serde_json::value::to_raw_value;
+use serde_json::{Value, json};
+use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
+use tokio::sync::oneshot;
+use tokio::time::timeout;
+
+/// How long anything may take before a test gives up.
+pub const PATIENCE: Duration = Duration::from_secs(20);
+
+/// The connection of the client that calls with JSON.
+pub const CALLER: ConnectionId = ConnectionId(7);
+
+/// Hands a client's call to its node, as the registry does; the receiver ends with the call.
+pub fn hand_on(
+    routes: &Nodes,
+    respond: Recipient<Respond>,
+    service: Service,
+    args: &Value,
+) -> oneshot::Receiver<()> {
+    let name = service.name().into();
+    let (caller, ended) = Caller::new(respond, CALLER, service, name, None, Arc::default());
+    let raw = to_raw_value(args).unwrap().into();
+    let arguments = if args.is_array() {
+        Arguments::Positional(raw)
+    } else {
+        Arguments::Object(raw)
+    };
+    routes.services[&service](ServiceCall {
+        service,
+        arguments,
+        caller,
+    });
+    ended
+}
+
+/// Stands in for the registry: passes on every response.
+struct Responses(UnboundedSender<Value>);
+
+impl Actor for Responses {
+    type Context = Context<Self>;
+}
+
+impl Handler<Respond> for Responses {
+    type Result = ();
+
+    fn handle(&mut self, respond: Respond, _: &mut Context<Self>) {
+        let frame = serde_json::from_slice(&respond.frame.write()).expect("valid JSON");
+        let _ = self.0.send(frame);
+    }
+}
+
+/// A client that calls with JSON.
+pub struct JsonCaller {
+    routes: Nodes,
+    respond: Recipient<Respond>,
+    responses: UnboundedReceiver<Value>,
+}
+
+impl JsonCaller {
+    /// One whose calls go to the node that attaches itself here.
+    pub fn of(attach: impl FnOnce(&mut Nodes)) -> Self {
+        let (sender, responses) = unbounded_channel();
+        let mut routes = Nodes::default();
+        attach(&mut routes);
+        Self {
+            routes,
+            respond: Responses(sender).start().recipient(),
+            responses,
+        }
+    }
+
+    /// The whole response to a call, which ends with it.
+    pub async fn call(&mut self, service: Service, args: &Value) -> Value {
+        let ended = hand_on(&self.routes, self.respond.clone(), service, args);
+        let response = timeout(PATIENCE, self.responses.recv()).await;
+        let response = response.expect("a response in time").expect("the registry");
+        let ended = timeout(PATIENCE, ended).await.expect("an end in time");
+        assert!(ended.is_err(), "the call ends with its answer");
+        response
+    }
+
+    /// The values of a call that must succeed.
+    pub async fn values(&mut self, service: Service, args: &Value) -> Value {
+        pendularm_client::values(self.call(service, args).await)
+    }
+
+    /// The reason of a call that must be refused.
+    pub async fn refusal(&mut self, service: Service, args: &Value) -> String {
+        let response = self.call(service, args).await;
+        assert_eq!(response["values"], json!({}), "{response}");
+        pendularm_client::reason(&response)
+    }
+}
+
+/// Stands in for a client that has asked: says that it has its answer, and hands it on.
+struct Asking<T> {
+    connection: u64,
+    gone: Arc<AtomicBool>,
+    answered: UnboundedSender<u64>,
+    answer: oneshot::Sender<Result<T, Unserved>>,
+}
+
+impl<T: Send> Asker<T> for Asking<T> {
+    fn answer(self: Box<Self>, answer: Result<T, Unserved>, _: Option<Done>) {
+        // Who looks for the answer once it is said to be there finds it.
+        let _ = self.answer.send(answer);
+        let _ = self.answered.send(self.connection);
+    }
+
+    fn client(&self) -> Option<ConnectionId> {
+        Some(ConnectionId(self.connection))
+    }
+
+    fn is_gone(&self) -> bool {
+        self.gone.load(Ordering::Relaxed)
+    }
+}
+
+/// A question on its way: its answer and its end to come, and the flag that its asker has gone.
+pub struct Asked<T> {
+    pub answer: oneshot::Receiver<Result<T, Unserved>>,
+    pub ended: oneshot::Receiver<()>,
+    pub gone: Arc<AtomicBool>,
+}
+
+/// Asks as the client of that connection, which says so once it has its answer.
+pub fn ask_as<A: Ask>(
+    node: &Recipient<Call<A>>,
+    connection: u64,
+    answered: &UnboundedSender<u64>,
+    ask: A,
+) -> Asked<A::Answer> {
+    let gone = Arc::new(AtomicBool::new(false));
+    let (done, ended) = oneshot::channel();
+    let (give, answer) = oneshot::channel();
+    let asking = Asking {
+        connection,
+        gone: Arc::clone(&gone),
+        answered: answered.clone(),
+        answer: give,
+    };
+    let reply = Reply::new(asking, Some(done));
+    node.do_send(Call { ask, reply });
+    Asked {
+        answer,
+        ended,
+        gone,
+    }
+}
+
+/// A node that computes on a pool, and clients that ask it.
+pub struct PoolBench<T: Actor> {
+    pub pool: WorkerPool,
+    pub node: Addr<T>,
+    answered: UnboundedSender<u64>,
+    order: UnboundedReceiver<u64>,
+}
+
+impl<T: Actor<Context = Context<T>>> PoolBench<T> {
+    /// With one worker, so that turns can be told from luck.
+    pub fn new(node: impl FnOnce(WorkerPool) -> T) -> Self {
+        let (answered, order) = unbounded_channel();
+        let pool = WorkerPool::start(1).unwrap();
+        Self {
+            node: node(pool.clone()).start(),
+            pool,
+            answered,
+            order,
+        }
+    }
+
+    /// Asks as the client of that connection.
+    pub fn ask_as<A: Ask>(&self, connection: u64, ask: A) -> Asked<A::Answer>
+    where
+        T: Handler<Call<A>>,
+        Context<T>: ToEnvelope<T, Call<A>>,
+    {
+        ask_as(
+            &self.node.clone().recipient(),
+            connection,
+            &self.answered,
+            ask,
+        )
+    }
+
+    /// Asks as another node does.
+    pub async fn ask<A: Ask>(&self, question: A) -> A::Answer
+    where
+        T: Handler<Call<A>>,
+        Context<T>: ToEnvelope<T, Call<A>>,
+    {
+        let answer = ask(&self.node.clone().recipient(), question);
+        let answer = timeout(PATIENCE, answer).await;
+        answer.expect("an answer in time").expect("an answer")
+    }
+
+    /// The connection that is answered next.
+    pub async fn next(&mut self) -> u64 {
+        let next = timeout(PATIENCE, self.order.recv()).await;
+        next.expect("an answer in time").expect("the bench lives")
+    }
+
+    /// Whether nobody has been answered since the last look.
+    pub fn is_silent(&mut self) -> bool {
+        self.order.try_recv().is_err()
+    }
+}
+
+impl<T: Actor> Drop for PoolBench<T> {
+    fn drop(&mut self) {
+        self.pool.close("the test is over");
+    }
+}
