@@ -142,7 +142,7 @@ class Phone(Free, Steady, Access, PageTest):
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.run("document.querySelector('input[name=drag][value=setpoint]').click()")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)))
-        self.wait(lambda: sum((a - b) ** 2 for a, b in zip(self.runtime.tip(), (-0.4, 1.3))) < 0.02 ** 2, "tip at the setpoint")
+        self.wait(lambda: sum((a - b) ** 2 for a, b in zip(self.runtime.end_effector(), (-0.4, 1.3))) < 0.02 ** 2, "end effector at the setpoint")
         self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
 
 

@@ -38,7 +38,7 @@ class Replaying(PageTest):
     def is_done(self, live):
         state = live.next("/joint_states")
         is_at_rest = max(map(abs, state["velocity"])) < 1e-2
-        return state["header"]["stamp"]["sec"] >= 4 and is_at_rest and math.dist(live.tip(), (0.5, 1.2)) < 0.02
+        return state["header"]["stamp"]["sec"] >= 4 and is_at_rest and math.dist(live.end_effector(), (0.5, 1.2)) < 0.02
 
     def seek(self, part):
         self.page.run(
