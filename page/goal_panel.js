@@ -17,6 +17,7 @@ const fields = {
 };
 let said;
 let text;
+let shownId = ""; // of the goal that is shown
 
 export function startGoalPanel() {
   const send = el("button", { type: "submit", class: "primary" }, "Send goal");
@@ -61,6 +62,10 @@ export function showGoalPlace({ x, y }) {
 }
 
 function show(goal) {
+  if (goal && goal.id !== shownId) {
+    shownId = goal.id;
+    said.show(""); // what was refused before is of the past
+  }
   if (!goal) setText(text, "Drag in the view, or type a place for the end effector.");
   else if (goal.outcome === "active") setText(text, `On the way: ${fixed(goal.distance, 3)} m left, ${fixed(goal.elapsed, 1)} s.`);
   else if (goal.outcome === "reached") setText(text, `Reached, ${fixed(goal.distance * 1000, 1)} mm from the target.`);

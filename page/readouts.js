@@ -81,7 +81,7 @@ function showLimit() {
   setText(byId("out-limit"), state.stabilityMissing && Number.isNaN(limit) ? "not offered" : limitText(limit));
   byId("out-limit").title = said.where;
   byId("out-limit").classList.toggle("bad", bad);
-  setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
+  setText(byId("out-every"), state.enabled === false || state.stabilityMissing ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("worst-text"), worstText(answer));
   setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found");

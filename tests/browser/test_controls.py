@@ -39,7 +39,7 @@ class Controls(PageTest):
 
     # The view
 
-    def test_a_drag_sends_the_tip_to_where_it_ends(self):
+    def test_a_drag_sends_the_end_effector_to_where_it_ends(self):
         self.page.click("#servo")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((0.7, 1.2)))
         self.wait(lambda: math.dist(self.runtime.end_effector(), (0.7, 1.2)) < 0.02, "end effector at the target")
@@ -58,6 +58,8 @@ class Controls(PageTest):
         said = self.runtime.call("/ik_action/send_goal", x=9, y=0)["status"]
         self.assertEqual(refusal.split(" ")[0], said.split(" ")[0])
         self.page.until("document.querySelector('#announce-assertive').textContent !== ''")
+        self.runtime.call("/ik_action/send_goal", x=0.7, y=1.2)
+        self.page.until("document.querySelector('#goal-body .refusal').textContent === ''", why="another goal was accepted")
 
     def test_arrow_keys_in_the_view_move_the_target(self):
         self.page.click("#servo")
@@ -345,7 +347,7 @@ class Controls(PageTest):
 class ThreeLinks(PageTest):
     links = 3
 
-    def test_a_drag_sends_the_tip_to_where_it_ends(self):
+    def test_a_drag_sends_the_end_effector_to_where_it_ends(self):
         self.page.click("#servo")
         self.page.drag(self.on_canvas((2.4, 0.2)), self.on_canvas((1.0, 1.6)))
         self.wait(lambda: math.dist(self.runtime.end_effector(), (1.0, 1.6)) < 0.02, "end effector at the target")

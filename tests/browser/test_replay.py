@@ -63,6 +63,13 @@ class Replaying(PageTest):
     def speed(self, rate):
         self.page.run(f"(() => {{ const e = document.querySelector('#player-speed'); e.value = '{rate}'; e.dispatchEvent(new Event('change')); }})()")
 
+    def test_what_a_record_lacks_is_said_in_few_words(self):
+        self.page.until("!document.querySelector('#player').hidden", why="it says that it is a replay")
+        self.page.until("document.querySelector('#out-every').textContent === '–'", why="no study, no limit of every pose")
+        self.page.click("#lesson-euler")
+        self.page.until("/^A record is replayed/.test(document.querySelector('#lesson-text').textContent)")
+        self.assertIsNone(self.page.run("own('store.js').then(({ state }) => state.lesson)"))
+
     def test_what_was_before_stays_in_the_plots_while_a_record_goes_back(self):
         self.page.until("!document.querySelector('#player').hidden", why="it says that it is a replay")
         self.page.click("#pause")
