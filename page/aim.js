@@ -1,10 +1,10 @@
 // @ts-check
-// Pointing at the arm's canvas: a drag sends goals for the tip, with shift it places the setpoint directly.
+// Pointing at the arm's canvas: a drag sends goals for the end effector, with shift it places the setpoint directly.
 // Arrow keys do the same for those who use no pointer.
 // Invariant: at most ten requests a second leave while aiming, and the last place is always sent.
 
 import { warn } from "./announce.js";
-import { showAim, tip, toWorld } from "./arm_view.js";
+import { endEffector, showAim, toWorld } from "./arm_view.js";
 import { goalOptions, showGoalPlace, showGoalRefusal } from "./goal_panel.js";
 import { latestOnly } from "./latest.js";
 import { nearestTurn } from "./mechanics.js";
@@ -89,7 +89,7 @@ function arrows(event) {
   if (event.key === "Escape") cancelGoal();
   if (!way || state.links === 0 || event.ctrlKey || event.altKey || event.metaKey) return;
   event.preventDefault();
-  const from = aim ?? (state.goal && !event.shiftKey ? state.goal.target : tip());
+  const from = aim ?? (state.goal && !event.shiftKey ? state.goal.target : endEffector());
   const round = (value) => Math.round(value * 1e4) / 1e4;
   moveTo({ x: round(from.x + ARROW_M * way[0]), y: round(from.y + ARROW_M * way[1]) }, event.shiftKey);
   clearTimeout(settle);

@@ -1,5 +1,5 @@
 // @ts-check
-// The arm on its canvas: grid, reach, trail of the tip, ghost of the setpoint, target, and the links themselves.
+// The arm on its canvas: grid, reach, trail of the end effector, ghost of the setpoint, target, and the links themselves.
 // World coordinates are metres, x to the right and y up, the base in the middle.
 // Invariant: a frame allocates nothing, and nothing is drawn while nothing is seen to change.
 
@@ -122,8 +122,8 @@ export function toWorld(px, py) {
   return { x: round((px - surface.width / 2) / scale), y: round((surface.height / 2 - py) / scale) };
 }
 
-/** Where the tip is [m]. */
-export function tip() {
+/** Where the end effector is [m]. */
+export function endEffector() {
   const n = state.links;
   joints(n, state.position, lengths(), x, y);
   return { x: x[n], y: y[n] };

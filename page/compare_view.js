@@ -64,7 +64,7 @@ export class CompareView {
       isReference: i === runs.length,
     }));
     for (const run of this.runs) {
-      run.tips = run.poses.map((q) => {
+      run.trail = run.poses.map((q) => {
         if (!q) return null;
         joints(links, q, lengths, x, y);
         return [x[links], y[links]];
@@ -134,16 +134,16 @@ export class CompareView {
     context.beginPath();
     context.arc(px(0), py(0), reach(this.lengths) * scale, 0, 2 * Math.PI);
     context.stroke();
-    this.runs.forEach(({ tips }, k) => {
+    this.runs.forEach(({ trail }, k) => {
       context.strokeStyle = this.color(k);
       context.globalAlpha = 0.4;
       context.lineWidth = 1.25;
       context.beginPath();
       for (let i = 0, down = false; i <= this.at; i += 1) {
-        const tip = tips[i];
-        if (tip && down) context.lineTo(px(tip[0]), py(tip[1]));
-        else if (tip) context.moveTo(px(tip[0]), py(tip[1]));
-        down = tip !== null;
+        const place = trail[i];
+        if (place && down) context.lineTo(px(place[0]), py(place[1]));
+        else if (place) context.moveTo(px(place[0]), py(place[1]));
+        down = place !== null;
       }
       context.stroke();
     });

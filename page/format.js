@@ -3,6 +3,8 @@
 // Invariant: a value that is not finite is shown as a dash, never as text of the language.
 
 const MINUS = "\u2212";
+/** A figure in a caption has no more. */
+const MOST_DIGITS = 5;
 
 /** @param {number} value @param {number} digits */
 export function fixed(value, digits) {
@@ -10,6 +12,12 @@ export function fixed(value, digits) {
   if (Math.abs(value) >= 1e6) return significant(value, 3);
   const text = value.toFixed(digits);
   return text.startsWith("-") ? (Number(text) === 0 ? text.slice(1) : MINUS + text.slice(1)) : text;
+}
+
+/** Those digits behind the point, or as many as keep it short: its place is small. @param {number} value @param {number} digits */
+export function short(value, digits) {
+  const before = Math.max(1, Math.floor(Math.log10(Math.abs(value))) + 1);
+  return fixed(value, Number.isFinite(before) ? Math.max(0, Math.min(digits, MOST_DIGITS - before)) : digits);
 }
 
 /** @param {number} value @param {number} digits */

@@ -17,12 +17,13 @@ const fields = {
 };
 let said;
 let text;
+let shownId = ""; // of the goal that is shown
 
 export function startGoalPanel() {
   const send = el("button", { type: "submit", class: "primary" }, "Send goal");
   const cancel = el("button", { type: "button", onclick: () => report(cancelGoal()) }, "Cancel goal");
   said = refusal(fields.x.input, fields.y.input, fields.phi.input, fields.epsilon.input, fields.success_hold.input);
-  text = el("p", { class: "note", id: "goal-text" }, "Drag in the view, or type a place for the tip.");
+  text = el("p", { class: "note", id: "goal-text" }, "Drag in the view, or type a place for the end effector.");
   const form = el("form", { onsubmit: submit, novalidate: true },
     el("div", { class: "options" }, ...Object.values(fields).map((one) => one.element)),
     el("div", { class: "buttons" }, send, cancel), said.element, text);
@@ -61,7 +62,11 @@ export function showGoalPlace({ x, y }) {
 }
 
 function show(goal) {
-  if (!goal) setText(text, "Drag in the view, or type a place for the tip.");
+  if (goal && goal.id !== shownId) {
+    shownId = goal.id;
+    said.show(""); // what was refused before is of the past
+  }
+  if (!goal) setText(text, "Drag in the view, or type a place for the end effector.");
   else if (goal.outcome === "active") setText(text, `On the way: ${fixed(goal.distance, 3)} m left, ${fixed(goal.elapsed, 1)} s.`);
   else if (goal.outcome === "reached") setText(text, `Reached, ${fixed(goal.distance * 1000, 1)} mm from the target.`);
   else setText(text, "Given up: another goal, a cancellation or a reset took its place.");

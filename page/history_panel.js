@@ -79,5 +79,5 @@ function showStopwatch() {
   const runs = Number.isFinite(watchFrom);
   byId("watch-hud").hidden = !runs;
   setText(byId("watch"), !runs ? "Stopwatch" : Number.isNaN(watchTo) ? "Stop" : "Clear");
-  if (runs) setText(byId("watch-hud"), `⏱ ${fixed((Number.isNaN(watchTo) ? shown.time : watchTo) - watchFrom, 3)} s`);
+  if (runs) setText(byId("watch-hud"), `stopwatch ${fixed((Number.isNaN(watchTo) ? shown.time : watchTo) - watchFrom, 3)} s`);
 }

@@ -10,7 +10,7 @@ import { wake } from "./frames.js";
 import { TIMESTEPS, cheapest, errorText, read, rungs, uncertaintyOf } from "./ladder.js";
 import { rollout } from "./runtime.js";
 import { LogScale } from "./scale.js";
-import { state } from "./store.js";
+import { state, watch } from "./store.js";
 import { Surface } from "./surface.js";
 import { colors, onTheme } from "./theme.js";
 
@@ -20,6 +20,7 @@ const TOP = 8;
 const BOTTOM = 32;
 const SAMPLES = 101;
 const WANTED = 1e-3; // rad: the accuracy that the sentence speaks of
+const INVITATION = "Runs this arm from its present state with every method at eight timesteps, and compares each with a reference: what does accuracy cost?";
 
 let surface;
 let said;
@@ -38,7 +39,18 @@ export function startLadder() {
   said = refusal(go);
   byId("ladder-form").append(el("div", { class: "compare-row" }, seconds.element, el("label", { class: "option" }, el("span", {}, "servo"), servo), go), said.element);
   byId("ladder-form").addEventListener("submit", (event) => { event.preventDefault(); measure(); });
-  setText(byId("ladder-text"), "Runs this arm from its present state with every method at eight timesteps, and compares each with a reference: what does accuracy cost?");
+  setText(byId("ladder-text"), INVITATION);
+  watch("links", () => forget(INVITATION)); // what was measured is of another arm
+}
+
+/** No figure is shown, and none that is on its way will be. @param {string} text what stands there instead */
+function forget(text) {
+  running += 1;
+  found = [];
+  setText(go, "Measure");
+  setText(byId("ladder-text"), text);
+  byId("ladder-table").replaceChildren();
+  draw();
 }
 
 async function measure() {
@@ -46,9 +58,9 @@ async function measure() {
     said.show("There is no arm to measure: not connected.");
     return;
   }
-  const mine = running += 1;
   said.show("");
-  found = [];
+  forget("");
+  const mine = running;
   setText(go, "Measuring…");
   const n = state.links;
   const common = {
@@ -75,23 +87,25 @@ async function measure() {
 }
 
 function describe() {
-  const best = cheapest(found, WANTED);
-  if (best.length === 0) {
-    setText(byId("ladder-text"), found.length > 0 ? `No run came within ${WANTED} rad of the reference: shorten the duration.` : "");
-    return;
-  }
-  const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
-  const uncertainty = uncertaintyOf(found);
-  const text = `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}. A steeper line gains more from a smaller step: `
-    + "halving it halves Euler’s error, quarters midpoint’s and Verlet’s, and cuts Runge–Kutta’s to a sixteenth, until rounding ends it."
-    + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
+  const text = found.length > 0 ? inWords(cheapest(found, WANTED)) : INVITATION;
   setText(byId("ladder-text"), text);
+  if (found.length === 0) return;
   announce(text);
   byId("ladder-table").replaceChildren(
     el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "timestep"), ...METHODS.map(([, name], i) => el("th", { scope: "col", class: `run${i + 1}` }, name)))),
     el("tbody", {}, ...TIMESTEPS.map((timestep) => el("tr", {}, el("th", { scope: "row" }, duration(timestep)),
       ...METHODS.map(([method]) => el("td", {}, cellOf(method, timestep)))))),
   );
+}
+
+/** @param {import("./ladder.js").Rung[]} best of each method the cheapest run that is good enough */
+function inWords(best) {
+  if (best.length === 0) return `No run came within ${WANTED} rad of the reference: shorten the duration.`;
+  const cheap = best.reduce((a, b) => (b.wall < a.wall ? b : a));
+  const uncertainty = uncertaintyOf(found);
+  return `For ${WANTED} rad ${methodName(cheap.method)} costs least here: ${duration(cheap.wall)} of run time, at a timestep of ${duration(cheap.timestep)}. A steeper line gains more from a smaller step: `
+    + "halving it halves Euler’s error, quarters midpoint’s and Verlet’s, and cuts Runge–Kutta’s to a sixteenth, until rounding ends it."
+    + (uncertainty === null ? "" : ` The reference itself is known to ${significant(uncertainty, 1)} rad.`);
 }
 
 function cellOf(method, timestep) {

@@ -67,7 +67,7 @@ export const LESSONS = [
   },
   {
     id: "heavy",
-    name: "The heavy tip",
+    name: "A heavy last link",
     text: "The last link is several times heavier, and the same gains are soft for it: the arm sways longer, yet bears a longer timestep. Make that link 0.1 kg instead, and the limit falls: the same gain moves less mass faster.",
     panel: "plots",
     settings: (links) => from(links, {

@@ -2,7 +2,7 @@
 // The lessons' row: a button for each, and the two sentences of the one that was chosen.
 // Invariant: a lesson changes the arm only when it is clicked.
 
-import { announce } from "./announce.js";
+import { announce, warn } from "./announce.js";
 import { startLesson } from "./actions.js";
 import { byId, el, setText } from "./dom.js";
 import { LESSONS } from "./lessons.js";
@@ -10,6 +10,7 @@ import { set, state, watch } from "./store.js";
 
 /** Here the lessons' buttons are far from the arm; as in `small.css`. */
 const SMALL = "(max-width: 779px)";
+const RECORD = "A record is replayed, and nothing of it can be changed: lessons are for a live arm.";
 
 export function startLessons() {
   const welcome = [...byId("lesson-text").childNodes].map((one) => one.cloneNode(true));
@@ -21,14 +22,22 @@ export function startLessons() {
     const named = LESSONS.find(({ id }) => id === target.dataset.lesson);
     if (named) choose(named);
   });
-  watch("lesson", (chosen) => {
+  const show = () => {
+    const chosen = state.lesson;
     for (const [lesson, button] of buttons) button.setAttribute("aria-pressed", String(lesson === chosen));
     byId("lesson-text").replaceChildren(...(chosen ? [chosen.text] : welcome.map((one) => one.cloneNode(true))));
-  });
+  };
+  watch("lesson", show);
+  watch("replay", show);
 }
 
 async function choose(lesson) {
   if (state.links === 0) return;
+  if (state.replay) {
+    setText(byId("lesson-text"), RECORD);
+    warn(RECORD);
+    return;
+  }
   if (lesson === state.lesson) {
     set("lesson", null);
     announce("The lesson is over; its settings stay.");
@@ -36,5 +45,5 @@ async function choose(lesson) {
   }
   if (matchMedia(SMALL).matches) byId("lesson-text").scrollIntoView();
   const refusals = await startLesson(lesson);
-  if (refusals.length > 0) setText(byId("lesson-text"), `${lesson.text} Refused: ${refusals.join(" ")}`);
+  if (refusals.length > 0) setText(byId("lesson-text"), `${lesson.text} Refused: ${refusals.join("; ")}`);
 }

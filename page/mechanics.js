@@ -72,7 +72,7 @@ export function reach(lengths) {
   return lengths.reduce((sum, one) => sum + one, 0);
 }
 
-/** Radius of the disc around the base that the tip can't enter; 0 where there is none. */
+/** Radius of the disc around the base that the end effector can't enter; 0 where there is none. */
 export function innerReach(lengths) {
   return Math.max(0, 2 * Math.max(...lengths) - reach(lengths));
 }

@@ -5,7 +5,7 @@
 import { announce } from "./announce.js";
 import { cursor, hover } from "./cursor.js";
 import { byId, el, setText } from "./dom.js";
-import { fixed, significant } from "./format.js";
+import { short, significant } from "./format.js";
 import { onFrame, wake } from "./frames.js";
 import { PhasePlot } from "./phase_plot.js";
 import { shown as pose } from "./playback.js";
@@ -148,10 +148,10 @@ export function showValues() {
   const row = Number.isFinite(at) ? record.at(Math.min(firstAfter(at), record.length - 1)) : record.last();
   for (const { column, digits, values } of legends) {
     for (let joint = 0; joint < values.length; joint += 1) {
-      setText(values[joint], fixed(record.data[row + column + joint], digits));
+      setText(values[joint], short(record.data[row + column + joint], digits));
     }
   }
-  setText(byId("legend-energy-value"), fixed(record.data[row + ENERGY], 3));
+  setText(byId("legend-energy-value"), short(record.data[row + ENERGY], 3));
   setText(byId("legend-drift"), significant(record.data[row + ENERGY] - reference(), 3));
   setText(byId("legend-drift-name"), energyName(state));
 }

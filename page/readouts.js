@@ -4,7 +4,7 @@
 
 import { byId, setAttribute, setText } from "./dom.js";
 import { duration, fixed, shortName, significant } from "./format.js";
-import { tip } from "./arm_view.js";
+import { endEffector } from "./arm_view.js";
 import { growthOf } from "./growth.js";
 import { shown } from "./playback.js";
 import { adviceText, answerInForce, limitInForce, limitText, verdict, worstText } from "./policy.js";
@@ -81,7 +81,7 @@ function showLimit() {
   setText(byId("out-limit"), state.stabilityMissing && Number.isNaN(limit) ? "not offered" : limitText(limit));
   byId("out-limit").title = said.where;
   byId("out-limit").classList.toggle("bad", bad);
-  setText(byId("out-every"), state.enabled === false ? "–" : limitText(everyPose));
+  setText(byId("out-every"), state.enabled === false || state.stabilityMissing ? "–" : limitText(everyPose));
   const answer = state.enabled ? answerInForce(state) : null;
   setText(byId("worst-text"), worstText(answer));
   setText(byId("out-certified"), answer?.certified === undefined || !(everyPose > 0) ? "" : answer.certified ? "proven" : "found");
@@ -99,9 +99,9 @@ function showLimit() {
 /** The arm in a sentence, for those who can't see it; read when the view has the focus. */
 export function describeArm() {
   if (state.links === 0 || !state.params) return;
-  const { x, y } = tip();
+  const { x, y } = endEffector();
   const degrees = Array.from(state.position.subarray(0, state.links), (q) => fixed((q * 180) / Math.PI, 0));
   const goal = state.goal?.outcome === "active" ? ` Target at x ${fixed(state.goal.target.x, 2)}, y ${fixed(state.goal.target.y, 2)} metres, ${fixed(state.goal.distance, 2)} metres away.` : "";
   setText(byId("arm-text"), `${state.links} links, ${runState()}, servo ${state.enabled ? "on" : "off"}. Joints at ${degrees.join(", ")} degrees. `
-    + `Tip at x ${fixed(x, 2)}, y ${fixed(y, 2)} metres.${goal}`);
+    + `End effector at x ${fixed(x, 2)}, y ${fixed(y, 2)} metres.${goal}`);
 }

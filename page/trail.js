@@ -1,6 +1,6 @@
 // @ts-check
-// The way of the tip through the last seconds: a smooth curve through the recorded states, fading towards the past.
-// Invariant: between two states the curve has the tip's places and velocities at both, so it is no polygon however fast it goes.
+// The way of the end effector through the last seconds: a smooth curve through the recorded states, fading towards the past.
+// Invariant: between two states the curve has the end effector's places and velocities at both, so it is no polygon however fast it goes.
 
 import { reach } from "./mechanics.js";
 import { POSITION, TIME, VELOCITY, firstAfter, record } from "./history.js";
@@ -12,7 +12,7 @@ const PIECES = 6;
 const BRIGHTEST = 0.7;
 /** How far joints turn, all together, in one piece of curve: a cubic is as good, and fewer are less work [rad]. */
 const TURN = 0.15;
-/** Tips further apart are joined by straight lines: the velocity says nothing about so long a way [of the reach]. */
+/** Places further apart are joined by straight lines: the velocity says nothing about so long a way [of the reach]. */
 const FAR = 0.75;
 
 /** The trail that ends at `time`; `px` and `py` turn metres into pixels. */
@@ -64,7 +64,7 @@ function turned(n, a, b) {
 // Position and velocity of the end effector at the sample before.
 const before = { x: 0, y: 0, vx: 0, vy: 0, time: 0 };
 
-/** On to the tip of recorded row `i`, along the cubic that has the tip's places and velocities. */
+/** On to where recorded row `i` has the end effector, along the cubic with its places and velocities. */
 function extend(context, n, lengths, px, py, i, begins) {
   const { data } = record;
   const row = record.at(i);

@@ -76,7 +76,7 @@ class Runtime:
             return frame["msg"]
 
     def joints(self):
-        """Where each link ends [m], from the published state and the lengths: the base first, the tip last."""
+        """Where each link ends [m], from the published state and the lengths: the base first, the end effector last."""
         lengths = self.call("/arm_sim/set_params")["values"]["lengths"]
         ends, angle = [(0.0, 0.0)], 0.0
         for length, q in zip(lengths, self.next("/joint_states")["position"]):
@@ -85,7 +85,7 @@ class Runtime:
             ends.append((x + length * math.cos(angle), y + length * math.sin(angle)))
         return ends
 
-    def tip(self):
+    def end_effector(self):
         return self.joints()[-1]
 
 

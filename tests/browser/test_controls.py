@@ -39,16 +39,16 @@ class Controls(PageTest):
 
     # The view
 
-    def test_a_drag_sends_the_tip_to_where_it_ends(self):
+    def test_a_drag_sends_the_end_effector_to_where_it_ends(self):
         self.page.click("#servo")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((0.7, 1.2)))
-        self.wait(lambda: math.dist(self.runtime.tip(), (0.7, 1.2)) < 0.02, "tip at the target")
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (0.7, 1.2)) < 0.02, "end effector at the target")
         self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
 
     def test_a_shift_drag_places_the_setpoint_without_a_goal(self):
         self.page.click("#servo")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)), shift=True)
-        self.wait(lambda: math.dist(self.runtime.tip(), (-0.4, 1.3)) < 0.02, "tip at the setpoint")
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (-0.4, 1.3)) < 0.02, "end effector at the setpoint")
         self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
 
     def test_a_target_out_of_reach_is_refused_in_words(self):
@@ -58,16 +58,18 @@ class Controls(PageTest):
         said = self.runtime.call("/ik_action/send_goal", x=9, y=0)["status"]
         self.assertEqual(refusal.split(" ")[0], said.split(" ")[0])
         self.page.until("document.querySelector('#announce-assertive').textContent !== ''")
+        self.runtime.call("/ik_action/send_goal", x=0.7, y=1.2)
+        self.page.until("document.querySelector('#goal-body .refusal').textContent === ''", why="another goal was accepted")
 
     def test_arrow_keys_in_the_view_move_the_target(self):
         self.page.click("#servo")
         self.page.run("document.querySelector('#arm').focus()")
         self.runtime.call("/arm_sim/reset")
-        self.page.until("own('arm_view.js').then(({ tip }) => tip().x > 1.99)", why="the page has seen the reset")
+        self.page.until("own('arm_view.js').then(({ endEffector }) => endEffector().x > 1.99)", why="the page has seen the reset")
         for _ in range(4):
             self.page.key("ArrowLeft")
         self.page.until("document.querySelector('#goal-text').textContent.startsWith('Reached')")
-        self.wait(lambda: self.runtime.tip()[0] < 1.9, "the arm has followed")
+        self.wait(lambda: self.runtime.end_effector()[0] < 1.9, "the arm has followed")
 
     # Settings
 
@@ -345,10 +347,10 @@ class Controls(PageTest):
 class ThreeLinks(PageTest):
     links = 3
 
-    def test_a_drag_sends_the_tip_to_where_it_ends(self):
+    def test_a_drag_sends_the_end_effector_to_where_it_ends(self):
         self.page.click("#servo")
         self.page.drag(self.on_canvas((2.4, 0.2)), self.on_canvas((1.0, 1.6)))
-        self.wait(lambda: math.dist(self.runtime.tip(), (1.0, 1.6)) < 0.02, "tip at the target")
+        self.wait(lambda: math.dist(self.runtime.end_effector(), (1.0, 1.6)) < 0.02, "end effector at the target")
 
     def test_a_goal_may_have_an_orientation(self):
         self.page.click("#servo")

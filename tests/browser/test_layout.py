@@ -1,6 +1,7 @@
 """The layout: a lesson fits a desktop's first screen, a telephone has the arm first, and nobody is left out."""
 
 import pathlib
+import time
 
 from stage import PageTest
 
@@ -106,6 +107,18 @@ class Laptop(Free, Steady, PageTest):
         clipped = self.page.run("[...document.querySelectorAll('#plots figcaption')].filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.textContent)")
         self.assertEqual(clipped, [])
 
+    def test_captions_are_whole_while_an_arm_shakes(self):
+        clipped = """[...document.querySelectorAll('#panel figcaption')].filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth)
+            .map((one) => one.textContent)"""
+        self.page.click("#lesson-limit")
+        self.page.until("document.querySelector('#legend-drift-name').textContent === 'work done'")
+        for _ in range(40):
+            self.assertEqual(self.page.run(clipped), [])
+            time.sleep(0.1)
+        self.tab("stability")
+        self.page.until("document.querySelector('#map-value').textContent.length > 3")
+        self.assertEqual(self.page.run(clipped), [])
+
 
 class Narrow(PageTest):
     view = {"width": 320, "height": 700, "density": 2, "touch": True}
@@ -132,6 +145,12 @@ class Phone(Free, Steady, Access, PageTest):
         top, bottom = self.page.run("[document.querySelector('#lesson-text').getBoundingClientRect().top, document.querySelector('#arm').getBoundingClientRect().bottom]")
         self.assertTrue(0 <= top < bottom <= 844, (top, bottom))
 
+    def test_settings_that_fold_show_that_they_do(self):
+        marks = lambda: self.page.run("[...document.querySelectorAll('#controls summary')].map((one) => getComputedStyle(one, '::before').content[1])")
+        self.assertEqual(marks(), ["▾", "▾", "▸"])
+        self.page.click("#controls details:last-child summary")
+        self.assertEqual(marks(), ["▾", "▾", "▾"])
+
     def test_what_is_touched_is_44_pixels_high(self):
         small = self.page.run("[...document.querySelectorAll('button, select, input:not([type=checkbox], [type=radio]), summary, .segment')]"
                               ".filter((one) => one.checkVisibility()).map((one) => [one.id || one.outerHTML.slice(0, 80), one.getBoundingClientRect().height])"
@@ -142,7 +161,7 @@ class Phone(Free, Steady, Access, PageTest):
         self.runtime.call("/pid_controller/enable", data=True)
         self.page.run("document.querySelector('input[name=drag][value=setpoint]').click()")
         self.page.drag(self.on_canvas((1.6, 0.2)), self.on_canvas((-0.4, 1.3)))
-        self.wait(lambda: sum((a - b) ** 2 for a, b in zip(self.runtime.tip(), (-0.4, 1.3))) < 0.02 ** 2, "tip at the setpoint")
+        self.wait(lambda: sum((a - b) ** 2 for a, b in zip(self.runtime.end_effector(), (-0.4, 1.3))) < 0.02 ** 2, "end effector at the setpoint")
         self.assertFalse(self.runtime.call("/ik_action/cancel_goal")["result"], "no goal is active")
 
 

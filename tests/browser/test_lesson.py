@@ -108,7 +108,7 @@ class Ways(Lesson):
         self.page.click("#watch")
         time.sleep(0.5)
         self.page.click("#watch")
-        self.assertRegex(self.page.text("#watch-hud"), r"^⏱ [\d.]+ s$")
+        self.assertRegex(self.page.text("#watch-hud"), r"^stopwatch [\d.]+ s$")
 
 
 class Scenes:

@@ -119,3 +119,16 @@ class BlowUp(Lesson):
             self.assertGreater(self.image("#ladder").count(self.color(f"run{method}")), 40)
         self.assertIn("costs least", self.page.text("#ladder-text"))
         self.keep("error")
+
+    def test_an_error_that_was_measured_is_not_shown_for_another_run_or_arm(self):
+        cell = "document.querySelector('#ladder-table tbody tr:last-child td:last-child')?.textContent ?? ''"
+        self.tab("error")
+        self.page.fill(f"#ladder-form {NUMBER}", "1")
+        first = self.page.until(cell)
+        self.page.fill(f"#ladder-form {NUMBER}", "60")
+        self.page.until("document.querySelector('#ladder-text').textContent.startsWith('No run came within')")
+        self.assertNotEqual(self.page.run(cell), first)
+        self.page.expect_network_errors = True
+        self.runtime.restart(links=3)
+        self.connected(links=3)
+        self.assertEqual(self.page.run(cell), "")

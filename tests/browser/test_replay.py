@@ -38,7 +38,7 @@ class Replaying(PageTest):
     def is_done(self, live):
         state = live.next("/joint_states")
         is_at_rest = max(map(abs, state["velocity"])) < 1e-2
-        return state["header"]["stamp"]["sec"] >= 4 and is_at_rest and math.dist(live.tip(), (0.5, 1.2)) < 0.02
+        return state["header"]["stamp"]["sec"] >= 4 and is_at_rest and math.dist(live.end_effector(), (0.5, 1.2)) < 0.02
 
     def seek(self, part):
         self.page.run(
@@ -62,6 +62,13 @@ class Replaying(PageTest):
 
     def speed(self, rate):
         self.page.run(f"(() => {{ const e = document.querySelector('#player-speed'); e.value = '{rate}'; e.dispatchEvent(new Event('change')); }})()")
+
+    def test_what_a_record_lacks_is_said_in_few_words(self):
+        self.page.until("!document.querySelector('#player').hidden", why="it says that it is a replay")
+        self.page.until("document.querySelector('#out-every').textContent === '–'", why="no study, no limit of every pose")
+        self.page.click("#lesson-euler")
+        self.page.until("/^A record is replayed/.test(document.querySelector('#lesson-text').textContent)")
+        self.assertIsNone(self.page.run("own('store.js').then(({ state }) => state.lesson)"))
 
     def test_what_was_before_stays_in_the_plots_while_a_record_goes_back(self):
         self.page.until("!document.querySelector('#player').hidden", why="it says that it is a replay")

@@ -4,7 +4,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { Axis, symmetricLog } from "../../page/axis.js";
-import { duration, exact, fixed, plain, significant } from "../../page/format.js";
+import { duration, exact, fixed, plain, short, significant } from "../../page/format.js";
 import { LESSONS } from "../../page/lessons.js";
 import { DEFAULTS, Undo, fromFragment, presentSettings, toFragment } from "../../page/settings.js";
 import { Median } from "../../page/smooth.js";
@@ -14,6 +14,11 @@ test("a field shows four digits, and its exponent whole", () => {
   assert.equal(plain(-3.75616e73), "-3.756e+73");
   assert.equal(plain(1234567), "1235000");
   assert.equal(plain(NaN), "");
+});
+
+test("a figure in a caption keeps its digits few", () => {
+  assert.deepEqual([short(-0.0421, 3), short(2271.893, 3), short(-7450.32, 2), short(123456.7, 2), short(1e9, 3), short(0, 3), short(NaN, 3)],
+    ["−0.042", "2271.9", "−7450.3", "123457", "1e9", "0.000", "–"]);
 });
 
 test("a link keeps all digits", () => {
