@@ -58,6 +58,11 @@ class Controls(PageTest):
         said = self.runtime.call("/ik_action/send_goal", x=9, y=0)["status"]
         self.assertEqual(refusal.split(" ")[0], said.split(" ")[0])
         self.page.until("document.querySelector('#announce-assertive').textContent !== ''")
+
+    def test_a_refusal_goes_with_the_next_goal(self):
+        self.tab("tasks")
+        self.page.fill("#goal-body input", "9")
+        self.page.until("document.querySelector('#goal-body .refusal').textContent !== ''", why="y is missing")
         self.runtime.call("/ik_action/send_goal", x=0.7, y=1.2)
         self.page.until("document.querySelector('#goal-body .refusal').textContent === ''", why="another goal was accepted")
 
