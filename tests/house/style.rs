@@ -225,3 +225,18 @@ fn comments_say_end_effector() {
     }
     assert_none("comments that say hand or tip", &found);
 }
+
+/// What people read there is in texts, and names of code go over into tests of the browser.
+#[test]
+fn the_page_says_end_effector() {
+    let mut found = Vec::new();
+    for path in files_in("page", &["js", "html", "css"]) {
+        let text = fs::read_to_string(&path).unwrap();
+        for (number, line) in (1..).zip(text.lines()) {
+            if words(line).any(|word| ["tip", "tips", "Tip", "Tips"].contains(&word)) {
+                found.push(format!("{}:{number}: {line}", path.display()));
+            }
+        }
+    }
+    assert_none("lines of the page that say tip", &found);
+}
