@@ -15,9 +15,9 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
-mod plan;
+mod request;
 
-pub use plan::{MAX_SAMPLES, MAX_STEPS, Plan, RolloutError};
+pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
 
 use super::follower::Follower;
 use crate::math::arm::{Arm, State};
@@ -83,17 +83,17 @@ impl<const N: usize> Rollout<N> {
     ///
     /// # Errors
     /// The first value that is out of bounds.
-    pub fn new(plan: Plan<N>) -> Result<Self, RolloutError> {
-        let steps = plan.check()?;
-        let simulation = plan.control.simulation(plan.start);
-        let references = plan.reference.then(|| {
+    pub fn new(request: RolloutRequest<N>) -> Result<Self, RolloutError> {
+        let steps = request.check()?;
+        let simulation = request.control.simulation(request.start);
+        let references = request.reference.then(|| {
             [1, 2].map(|cuts| Reference {
                 arm: if cuts == 1 {
-                    plan.control.arm
+                    request.control.arm
                 } else {
-                    neighbour(&plan.control.arm)
+                    neighbour(&request.control.arm)
                 },
-                follower: Follower::new(plan.start).cut(cuts),
+                follower: Follower::new(request.start).cut(cuts),
                 pid: simulation.pid().clone(),
                 lost: false,
                 behind: Behind::default(),
@@ -102,7 +102,7 @@ impl<const N: usize> Rollout<N> {
         let mut rollout = Self {
             simulation,
             steps,
-            samples: plan.samples.min(steps + 1),
+            samples: request.samples.min(steps + 1),
             references,
             times: vec![],
             positions: vec![],
@@ -154,7 +154,8 @@ impl<const N: usize> Rollout<N> {
     }
 
     /// Steps that are made in one go: a reference without control is asked for spans of [`MAX_SPAN`] at most, and
-    /// nothing runs for longer than a slice may last. It depends on the plan alone, so that slices don't change bits.
+    /// nothing runs for longer than a slice may last. It depends on the request
+    /// alone, so that slices don't change bits.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

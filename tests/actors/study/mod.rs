@@ -41,7 +41,7 @@ use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::protocol::op::Arguments;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
-use pendularm::study::gains::{GainsSearch, Wish};
+use pendularm::study::gains::{GainsRequirements, GainsSearch};
 use pendularm::study::linear::no_control;
 use pendularm::study::motion::Motion;
 use pendularm::study::planner::{Planning, Task};

@@ -17,7 +17,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::study::control_loop::ControlLoop;
-use crate::study::gains::{GainsError, GainsSearch, SuggestedGains, Wish};
+use crate::study::gains::{GainsError, GainsRequirements, GainsSearch, SuggestedGains};
 use crate::study::linear::no_control;
 use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
 
@@ -282,11 +282,11 @@ fn begin_search<const N: usize>(
         timestep: ask.timestep.unwrap_or(present.timestep),
         ..*present
     };
-    let wish = Wish {
+    let requirements = GainsRequirements {
         settling_time: ask.settling_time.unwrap_or(DEFAULT_SETTLING),
         margin: ask.margin.unwrap_or(DEFAULT_MARGIN),
     };
-    Ok((GainsSearch::new(&control, wish)?, control.timestep))
+    Ok((GainsSearch::new(&control, requirements)?, control.timestep))
 }
 
 // ---- plan -----------------------------------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::streamed::StreamedResponse;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
-use crate::study::rollout::{Deviation, MAX_SAMPLES, Plan, Rollout, RolloutError};
+use crate::study::rollout::{Deviation, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -73,7 +73,7 @@ pub enum NotRun {
     Params(#[from] ArmError),
     /// There can't be such a run.
     #[error(transparent)]
-    Plan(#[from] RolloutError),
+    Rollout(#[from] RolloutError),
 }
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
@@ -236,8 +236,8 @@ pub(super) enum RolloutWork<const N: usize> {
 /// A run by itself, with the time that it took so far.
 pub(super) struct Timed<const N: usize> {
     ran: Ran<N>,
-    /// The plan to run again beside a reference, if that is wanted.
-    again: Option<Plan<N>>,
+    /// The run to be made again beside a reference, if that is wanted.
+    again: Option<RolloutRequest<N>>,
 }
 
 impl<const N: usize> RolloutWork<N> {
@@ -294,22 +294,25 @@ impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for RolloutWork<N> {
 
 /// Makes the run, which checks what concerns several fields.
 fn begin<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Timed<N>, NotRun> {
-    let plan = plan(ask, present)?;
-    let alone = Plan {
+    let request = request(ask, present)?;
+    let alone = RolloutRequest {
         reference: false,
-        ..plan
+        ..request
     };
     Ok(Timed {
         ran: Ran {
             run: Rollout::new(alone)?,
             took: Duration::ZERO,
         },
-        again: plan.reference.then_some(plan),
+        again: request.reference.then_some(request),
     })
 }
 
-/// The plan of the run, with the present settings where the question leaves something out.
-fn plan<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Plan<N>, NotRun> {
+/// The request for the run, with the present settings where the question leaves something out.
+fn request<const N: usize>(
+    ask: &RunOffline<N>,
+    present: &Present<N>,
+) -> Result<RolloutRequest<N>, NotRun> {
     let control = &present.control;
     let arm = match &ask.params {
         None => control.arm,
@@ -317,7 +320,7 @@ fn plan<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Pla
     };
     let gains = ask.gains.as_ref();
     let setpoint = ask.setpoint.map(Setpoint::at);
-    Ok(Plan {
+    Ok(RolloutRequest {
         control: ControlLoop {
             arm,
             // A part of the law that is left out is switched off, as the whole law is where all are.
