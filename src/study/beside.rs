@@ -148,10 +148,10 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
 mod tests {
     use super::*;
 
-    /// A run whose numbers have ended, and which counts how often it is asked on.
-    struct Ended<'a>(&'a std::cell::Cell<u64>);
+    /// A run that has diverged, and counts how often it is asked on.
+    struct Diverged<'a>(&'a std::cell::Cell<u64>);
 
-    impl Steppable for Ended<'_> {
+    impl Steppable for Diverged<'_> {
         fn step(&mut self) -> Option<u64> {
             self.0.set(self.0.get() + 1);
             None
@@ -171,7 +171,7 @@ mod tests {
             velocity: [0.0; 2],
         };
         let truth = Truth::Free(FreeMotion::new(arm, start, 0.01, 1e-6));
-        let mut beside = Beside::new(Ended(&asked), 1_000_000, truth, 1, f64::INFINITY);
+        let mut beside = Beside::new(Diverged(&asked), 1_000_000, truth, 1, f64::INFINITY);
         assert_eq!(beside.advance(), Some(f64::INFINITY));
         assert_eq!(beside.advance(), Some(f64::INFINITY));
         assert_eq!(asked.get(), 1);
