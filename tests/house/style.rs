@@ -25,8 +25,8 @@ const LINKS_HAVE_TIPS: &str = "math/dynamics/articulated_body.rs";
 /// Words that a sentence about code does well without: who begins with one has to be read twice.
 const DANGLING: [&str; 6] = ["What", "Whatever", "Whoever", "Of", "That", "Those"];
 /// Names for which the field or the house has a better one.
-const NAMES: [&str; 8] = [
-    "told", "Owed", "Desk", "by_hand", "ByHand", "hand", "tip", "Tip",
+const NAMES: [&str; 10] = [
+    "told", "Owed", "owe", "Settle", "Desk", "by_hand", "ByHand", "hand", "tip", "Tip",
 ];
 
 fn source() -> impl Iterator<Item = (String, String)> {

@@ -242,7 +242,7 @@ pub fn action_goal(
     frame.raw("args", args).value("feedback", &feedback).end()
 }
 
-/// The wish that a goal end, for its action server, a client.
+/// Asks the action server of a client to cancel a goal.
 #[must_use]
 pub fn cancellation(action: &str, id: &str) -> Bytes {
     Encoder::op("cancel_action_goal")

@@ -93,18 +93,18 @@ pub struct TrackGoal<const N: usize> {
     pub owner: Recipient<GoalJudged<N>>,
 }
 
-/// Answered by an owner of goals when all that reached it before has been dealt with. From the arm, before it says
-/// that it stands still, and from `ik_trial`, which so hears all that the arm had said about goals before it gave the
-/// time.
+/// A barrier in the mailbox of an owner of goals, which answers it when it has dealt with all that came before. From the
+/// arm, before it says that it stands still, and from `ik_trial`, which so hears all that the arm had said about goals
+/// before it gave the time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
-pub struct Settle;
+pub struct Barrier;
 
-/// The sender tells clients of goals, and is to be asked before the arm says that it stands still. From `ik_action` and
-/// `joint_trajectory_controller`, when they start.
+/// The sender tells clients of goals: the arm is to send it a [`Barrier`] before it says that it stands still. From
+/// `ik_action` and `joint_trajectory_controller`, when they start.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]
-pub struct SettleWith(pub Recipient<Settle>);
+pub struct AddBarrier(pub Recipient<Barrier>);
 
 /// The goal has begun.
 #[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]

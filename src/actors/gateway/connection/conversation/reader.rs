@@ -67,7 +67,7 @@ impl Reader {
     /// Reads until the client ends or is refused, then lets the connection finish; `first` has been read already.
     pub(super) async fn run<I: Inbound>(mut self, mut input: I, first: BytesMut) {
         match self.converse(&mut input, first).await {
-            Ok(()) => self.settle().await,
+            Ok(()) => self.await_responses().await,
             // A broken stream takes no answers, and nobody waits for those that don't come.
             Err(_) => self.shared.abandon_computations(),
         }
@@ -178,8 +178,8 @@ impl Reader {
     }
 
     /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
-    /// answer or withdraw, and waits for the responses that it is owed.
-    async fn settle(&self) {
+    /// answer or withdraw, and waits for the responses that are still to come.
+    async fn await_responses(&self) {
         let answered = async {
             if let Ok(handled) = self.shared.registry.send(Retire(self.id)).await {
                 handled.effect().await;

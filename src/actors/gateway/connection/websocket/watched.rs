@@ -87,7 +87,7 @@ impl<S> Watched<S> {
             unsent,
             turn: TURN,
         };
-        watched.settle(0);
+        watched.set_pending(0);
         watched
     }
 
@@ -119,7 +119,7 @@ impl<S> Watched<S> {
     /// All of a message has been read; so many bytes of it have not been dealt with.
     pub(super) fn complete(&mut self, left: usize) {
         self.is_complete = true;
-        self.settle(left);
+        self.set_pending(left);
     }
 
     /// Reading goes on after so long a time: what was complete has been dealt with.
@@ -128,17 +128,18 @@ impl<S> Watched<S> {
         if std::mem::take(&mut self.is_complete) {
             // The next message may have come with its end, in part.
             self.began = self.heads.is_within().then(Instant::now);
-            self.settle(0);
+            self.set_pending(0);
         }
     }
 
     /// A control frame with so much payload has come: it may stand between the parts of a message.
     pub(super) fn control(&mut self, payload: usize) {
         self.turn = self.turn.saturating_sub(CONTROL_COST);
-        self.settle(self.pending.saturating_sub(CONTROL_HEAD + payload));
+        self.set_pending(self.pending.saturating_sub(CONTROL_HEAD + payload));
     }
 
-    fn settle(&mut self, pending: usize) {
+    /// Counts what is kept, now that `pending` bytes belong to no complete message.
+    fn set_pending(&mut self, pending: usize) {
         self.pending = pending;
         if pending == 0 && !self.heads.is_within() {
             self.began = None;
@@ -186,7 +187,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             self.began.get_or_insert(now);
             self.follow(buffer.filled().get(before..).unwrap_or_default());
             let pending = self.pending + received;
-            self.settle(pending);
+            self.set_pending(pending);
         }
         polled
     }
