@@ -95,7 +95,7 @@ class Rollout:
     error_uncertainty: float | None
     """Largest distance of two references from each other [rad]."""
     divergence: tuple[int, float] | None
-    """Step and time [s] at which the run left the finite numbers, if it did; the samples end before."""
+    """Step and time [s] at which the run left the finite numbers or came to no later time, if it did; the samples end before."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -263,7 +263,7 @@ impl<const N: usize> Rollout<N> {
         self.references.as_ref().map(|_| &self.deviation)
     }
 
-    /// The place at which the run left the finite numbers, if it did; the samples end before.
+    /// The place at which a step led out of the finite numbers or to no later time, if one did; the samples end before.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.simulation.divergence()
