@@ -32,7 +32,7 @@ pub struct ReplayVerdict {
     pub states: u64,
     /// Inputs that took effect again.
     pub inputs: u64,
-    /// Gaps in the inputs, because the queue was full: as often did the record begin again.
+    /// Gaps in the inputs, because the queue was full. The record began again after each.
     pub losses: u64,
     /// The last step whose state was the same, or at which the record began.
     pub agreed_to: u64,

@@ -44,7 +44,7 @@ const MAX_STEPS: u64 = 4_000_000;
 /// The part of the allowed error that the truth itself may be off by.
 const PART_OF_TRUTH: f64 = 0.05;
 
-/// The next tolerance's part of one that was too large: two digits more, for less than half as much work again.
+/// A tolerance that was too large is multiplied by this: two digits more cost less than half as much work again.
 const FINER: f64 = 0.01;
 
 /// The motion to be planned.
@@ -133,7 +133,7 @@ pub struct Planning<const N: usize> {
 /// How finely a truth is followed.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
-    /// With so many steps in the longest.
+    /// Each longest timestep is cut into so many steps.
     Steps(u64),
     /// Within a tolerance.
     Tolerance(f64),
@@ -152,12 +152,12 @@ impl Fineness {
 enum PlanStage<const N: usize> {
     Comparing(Box<Beside<Truth<N>, N>>),
     Limiting(Method, Box<LimitSearch<N>>),
-    /// With so many steps in the longest.
+    /// Each longest timestep is cut into so many steps.
     Running(Bracket, u64, Box<Beside<Simulation<N>, N>>),
     Done(Result<Planned, PlanError>),
 }
 
-/// Steps in the longest: too few, and enough once they are known.
+/// Numbers of steps in the longest timestep: one that is too few, and one that is enough, once it is known.
 #[derive(Debug, Clone, Copy)]
 struct Bracket {
     method: Method,
@@ -233,7 +233,8 @@ impl<const N: usize> Planning<N> {
         None
     }
 
-    /// The truth so finely followed, and its steps in one of a run that takes so many `steps` in the longest.
+    /// The truth, followed so finely, and how many of its steps make one of a run. The run takes `steps` steps in the
+    /// longest timestep.
     fn truth(&self, fineness: Fineness, steps: u64) -> (Truth<N>, u64) {
         let Task { control, start, .. } = self.task;
         match fineness {
@@ -321,7 +322,7 @@ impl<const N: usize> Planning<N> {
         self.run(bracket, steps);
     }
 
-    /// Runs a method with so many steps in the longest, unless there is a cheaper candidate already.
+    /// Runs a method with so many steps in the longest timestep, unless there is a cheaper candidate already.
     fn run(&mut self, bracket: Bracket, steps: u64) {
         let Bracket { method, .. } = bracket;
         let all = steps.saturating_mul(self.fewest);

@@ -307,8 +307,8 @@ impl<const N: usize> Proof<N> {
         (cap > 0.0 && cap.is_finite()).then_some(cap)
     }
 
-    /// As far as `P₁ P₂ > P₃ P₀` for all shorter timesteps too: in every part, the factors that fall are taken at its
-    /// end and P₃, which falls too, at its beginning.
+    /// The largest timestep up to which `P₁ P₂ > P₃ P₀` holds. Each part of the way is tried at its worst: falling factors
+    /// of P₁ P₂ are taken at its end, and P₃, which falls too, at its beginning.
     fn largest_for_integrals(&self, end: f64) -> f64 {
         let stretched = mass_matrix(&self.arm, &[0.0; N]);
         let mass: [f64; N] = dominating(|i, j| stretched[i][j], |j| stretched[j][j]);

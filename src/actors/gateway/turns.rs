@@ -148,7 +148,7 @@ impl<W: Waits> TurnQueue<W> {
         }
     }
 
-    /// Takes some of what is free; false if there is not enough of it, and then nothing is left.
+    /// Takes `cost` of what is free. If there is less, it takes all of it and returns false.
     fn take(self: &Rc<Self>, cost: usize) -> bool {
         let left = self.left.get().checked_sub(cost);
         self.left.set(left.unwrap_or(0));

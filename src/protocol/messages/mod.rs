@@ -50,13 +50,13 @@ impl Level {
     }
 }
 
-/// As what a response with `result: false` says in `values` why it failed.
+/// The form in which `values` of a response with `result: false` gives the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ErrorForm {
-    /// An object, like that of any other response: what holds over raw TCP until the client says otherwise.
+    /// An object, like that of any other response. It holds over raw TCP until the client says otherwise.
     #[default]
     Object,
-    /// The text of `status`, as `rosbridge_suite` has it and its clients expect: the same for WebSocket.
+    /// The text of `status`, as `rosbridge_suite` has it. It holds over WebSocket until the client says otherwise.
     Text,
 }
 

@@ -47,9 +47,9 @@ impl Outbox {
             .extend(held.into_iter().map(|(_, frame)| frame));
     }
 
-    /// Drops topic messages, the oldest first, until those that are left take at most so many bytes, and `place` more
-    /// each. The oldest is the queue's first or the one that was held back first. Of a series, as many messages go at
-    /// once as have to, and of those that are held back as many as are older than all others.
+    /// Drops topic messages, the oldest first, until the rest costs at most `most` bytes, `place` of them for each
+    /// message. The oldest is the queue's first or the one that was held back first. A series loses as many messages at
+    /// once as have to go; held-back messages go at once as far as they are older than the queue's first.
     fn drop_oldest(&mut self, most: usize, place: usize) {
         loop {
             let cost = self.topic_bytes() + self.topic_count() * place;

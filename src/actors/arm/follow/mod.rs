@@ -295,7 +295,7 @@ impl<const N: usize> PathFollower<N> {
         }
     }
 
-    /// Ends the goal, whose setpoint somebody else's has replaced, or a reset that came since the arm was looked at.
+    /// Ends the goal: another setpoint or a reset has replaced its own since the arm was last looked at.
     fn tell_why(&self, ctx: &mut Context<Self>) {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, _| {

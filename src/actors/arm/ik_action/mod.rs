@@ -274,7 +274,7 @@ impl<const N: usize> IkAction<N> {
         }))
     }
 
-    /// Publishes the goal's result, if the goal is still the active one, which then it is no more.
+    /// Publishes the result of the goal, and forgets the goal. Does nothing if another goal is active.
     fn conclude(&mut self, judged: &GoalJudged<N>) {
         let Some(goal) = self.active.take_if(|goal| goal.is(judged)) else {
             return;

@@ -84,8 +84,8 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     /// Takes up to `steps` steps; fewer if a goal is reached on the way, or if the simulation diverges. For a caller
-    /// that `waits` they end at feedback too, which the caller finds `underway`: a step by hand may be longer than a
-    /// sixtieth of a second, and each has feedback for every subscriber.
+    /// that `waits` they end at feedback too, which the caller finds `underway`: a single step while paused may be
+    /// longer than a sixtieth of a second, and each has feedback for every subscriber.
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> u64 {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();

@@ -71,8 +71,8 @@ pub struct Pose<const N: usize> {
     pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
-    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It runs backwards only with
-    /// a reset, where it had become longer than a clock can tell.
+    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It falls only
+    /// at a reset that forgets a past of thirty years.
     pub simulated: f64,
 }
 

@@ -23,14 +23,14 @@ pub const FREE_ATTEMPTS: u32 = 5;
 /// Addresses that are kept in mind, some 64 KiB of them. Who has more of them is not slowed down by this.
 pub const MAX_ADDRESSES: usize = 1024;
 
-/// Addresses with failed attempts of late. For each, when all of them would have been answered at one every
-/// [`ATTEMPT_INTERVAL`]: it runs ahead of now with every attempt.
+/// Addresses with recent failed attempts. Each has the time at which all its attempts are answered, at one every
+/// [`ATTEMPT_INTERVAL`]; every attempt moves it further ahead of now.
 #[derive(Debug, Default)]
 pub(crate) struct FailedAttempts(Mutex<HashMap<IpAddr, Instant>>);
 
 impl FailedAttempts {
-    /// How long the answer to a wrong token waits that came from there now; `None` if there are so many that it is
-    /// not answered.
+    /// How long the answer to a wrong token waits that came from there now; `None` if it is not answered, because
+    /// too many came before.
     pub(crate) fn wait(&self, from: IpAddr) -> Option<Duration> {
         let (now, from) = (Instant::now(), network(from));
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);

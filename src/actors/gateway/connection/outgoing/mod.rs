@@ -206,8 +206,8 @@ impl Outgoing {
         self.patience.note_taken();
     }
 
-    /// Until when a client that has taken nothing since `last_byte` is borne with: while responses wait, or while it
-    /// is finishing.
+    /// When a client that has taken nothing since `last_byte` is given up; none while no response waits and it is not
+    /// finishing.
     pub(super) fn patience(&self, last_byte: Instant, is_finishing: bool) -> Option<Instant> {
         self.patience.end(last_byte, is_finishing)
     }
@@ -226,7 +226,7 @@ impl Outgoing {
 
     // ---- the writer -------------------------------------------------------------------------------------------------
 
-    /// From now on this is the writer, until what is given is dropped.
+    /// Makes this the writer, until the returned guard is dropped.
     pub(super) fn begin_writing(
         self: &Rc<Self>,
         writer: impl Future<Output = ()> + 'static,

@@ -15,7 +15,7 @@ pub(super) struct WritersTurn {
     in_queue: Cell<bool>,
     /// Messages whose publishers wait until they have been offered to the socket.
     underway: RefCell<Vec<Underway>>,
-    /// Some of what waits has been encoded: that is of clients, and goes to many at one moment.
+    /// Some of what waits has been encoded: such messages come from clients, and go to many at one moment.
     is_encoded: Cell<bool>,
 }
 

@@ -28,7 +28,7 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
-    /// Goes with the message to a subscriber.
+    /// Makes the guard that goes with the message to a subscriber.
     fn underway(&mut self) -> Underway {
         self.deliveries += 1;
         let (underway, _) = self.underway.get_or_insert_with(|| {
@@ -38,7 +38,7 @@ impl Pace {
         Arc::clone(underway)
     }
 
-    /// The message's publisher waits for `handled`, and until it is underway to nobody any more.
+    /// Has the message's publisher wait for `handled`, and until every subscriber has the message.
     pub(crate) fn and(self, handled: Handled) -> Handled {
         let end = self.underway.map(|(_, end)| end);
         handled.and_by_subscribers(end, self.deliveries)

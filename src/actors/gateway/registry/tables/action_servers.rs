@@ -41,7 +41,7 @@ pub(crate) struct ActionServers {
 }
 
 impl ActionServers {
-    /// Makes `server` the one who serves the action; the newest registration wins. Gives the one before.
+    /// Makes `server` the one who serves the action; the newest registration wins. Returns the former server.
     pub(crate) fn serve(&mut self, action: &str, server: Provider) -> Option<Provider> {
         self.servers.insert(action.into(), server)
     }
