@@ -5,10 +5,10 @@
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //!
-//! The truth is followed with ever smaller steps, that of an arm left to itself within ever smaller tolerances, until
-//! two of them agree to a part of the allowed error. Then each method is run beside it as the live arm runs it, with
-//! ever smaller steps until it is within the rest after each of them, and a little larger again by bisection. The
-//! cheapest run, in evaluations of the dynamics, is the plan: it has been run, and its error is that which was seen. A
+//! The truth is followed with ever smaller steps, or, for an arm left to itself, within ever smaller tolerances, until
+//! two truths agree to a part of the allowed error. Then each method is run beside the truth, as the live arm runs it.
+//! Its steps are made smaller until it stays within the rest of the error after each of them, and then larger again by
+//! bisection. The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A
 //! run that could only be dearer than another is not made.
 //!
 //! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
@@ -50,7 +50,7 @@ const FINER: f64 = 0.01;
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task<const N: usize> {
-    /// The loop; its method and timestep are what is looked for. Gains of zero: an arm left to itself.
+    /// The loop; its method and timestep are looked for. Gains of zero mean an arm left to itself.
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
@@ -119,7 +119,7 @@ pub struct Planning<const N: usize> {
     task: Task<N>,
     /// The longest timestep \[s\], a whole part of the duration; others are whole parts of it.
     longest: f64,
-    /// Steps of that length.
+    /// Number of steps of that length.
     fewest: u64,
     /// How finely the truth is followed.
     fineness: Fineness,
@@ -183,10 +183,10 @@ impl<const N: usize> Planning<N> {
         }
         let fewest = whole(duration / LONGEST).max(whole(FEWEST_STEPS));
         let fineness = if task.control.is_free() {
-            // So much of half a turn moves the end effector of the stretched arm by the part of the error.
+            // This part of half a turn moves the end effector of the stretched arm by the truth's part of the error.
             let reach = task.control.arm.reach();
             let tolerance = PART_OF_TRUTH * task.error / (PI * reach);
-            // The one that it is compared with first must be finer.
+            // The truth that it is first compared with must be finer.
             Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
             Fineness::Steps(4)
@@ -207,7 +207,7 @@ impl<const N: usize> Planning<N> {
         Ok(planning)
     }
 
-    /// Goes on by one piece; the plan, once it is made.
+    /// Goes on by one piece. Returns the plan once it is made.
     pub fn advance(&mut self) -> Option<Result<Planned, PlanError>> {
         match &mut self.stage {
             PlanStage::Done(answer) => return Some(answer.clone()),
@@ -256,7 +256,7 @@ impl<const N: usize> Planning<N> {
         }
     }
 
-    /// Begins to compare the truth with the one that is followed more finely.
+    /// Begins to compare the truth with one that is followed more finely.
     fn compare_truths(&mut self) {
         let steps = match self.fineness {
             Fineness::Steps(steps) => steps,
@@ -268,7 +268,7 @@ impl<const N: usize> Planning<N> {
         self.stage = PlanStage::Comparing(Box::new(truths));
     }
 
-    /// Goes on with the finer of two truths that came so far apart \[m\], if that is near enough or can't be nearer.
+    /// Goes on with the finer of two truths that came so far apart \[m\], if they are near enough or can't come nearer.
     fn judge_truths(&mut self, apart: f64) {
         if apart.is_finite() {
             self.uncertainty = apart;
@@ -375,7 +375,7 @@ impl<const N: usize> Planning<N> {
     }
 }
 
-/// How well a motion is known of which two truths differ by so much.
+/// Says how well a motion is known if two truths differ by so much.
 fn known(uncertainty: f64) -> String {
     if uncertainty.is_finite() {
         format!("the motion itself can only be known to {uncertainty:.1e} m for so long")

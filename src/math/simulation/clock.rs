@@ -27,14 +27,15 @@ impl<const N: usize> Simulation<N> {
         next.is_finite() && next > self.time()
     }
 
-    /// Whether each of the next `steps` surely leads to a later time. Asked once for all of them: where a timestep is
-    /// more than four units in the last place of the time at the end, which no finite one is of an infinite time, the
-    /// roundings of product and sum cannot hold the clock anywhere on the way.
+    /// Whether each of the next `steps` surely leads to a later time. It is asked once for all of them: if the timestep
+    /// is more than four units in the last place of the time at the end, the roundings of product and sum cannot hold
+    /// the clock anywhere on the way. No timestep is, if that time is infinite.
     pub(super) fn has_time_for(&self, steps: u64) -> bool {
         self.timestep > 4.0 * f64::EPSILON * self.time_after(steps)
     }
 
-    /// As [`Simulation::advance_with`] near the end of time: asks before each step whether it leads to a later one.
+    /// Does what [`Simulation::advance_with`] does, near the end of time: asks before each step whether it leads to a
+    /// later time.
     #[cold]
     pub(super) fn take_last_steps(
         &mut self,

@@ -86,7 +86,7 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
 /// A message that a client sent, which only passes through; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
-    // Exact: slow subscribers' outboxes keep these by the ten thousand, and count their text alone.
+    // The capacity is exact: outboxes of slow subscribers keep ten thousands of these, and count their text alone.
     let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
     Encoder::with_room("publish", head + topic.len() + msg.line().len())
         .text("topic", topic)
@@ -334,7 +334,7 @@ impl Encoder {
 
     fn end(mut self) -> Bytes {
         self.text.extend_from_slice(b"}\n");
-        // It may wait for long: its spare room is given back, and only its bytes are counted.
+        // The frame may wait for long, and only its bytes are counted: its spare room is given back.
         self.text.shrink_to_fit();
         Bytes::from(self.text)
     }

@@ -9,11 +9,11 @@ use bytes::{Buf, Bytes};
 use super::{FRAME_BYTES, MAX_TOPIC_BYTES, Outbox, PLACE_BYTES};
 use crate::protocol::wire::series::first_messages;
 
-/// Messages that are freed where they are given up: that takes some tens of microseconds.
+/// Most messages that are freed where they are given up, which takes some tens of microseconds.
 const FEW: usize = 256;
 
 impl Outbox {
-    /// Whether there is room for it once all else has gone; if not, it counts as dropped.
+    /// Whether there is room for a message once all else has gone; if not, it counts as dropped.
     pub(super) fn may_fit(&mut self, frame: &Bytes) -> bool {
         let fits = frame.len() <= MAX_TOPIC_BYTES;
         self.dropped += u64::from(!fits);

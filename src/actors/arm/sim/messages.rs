@@ -93,9 +93,9 @@ pub struct TrackGoal<const N: usize> {
     pub owner: Recipient<GoalJudged<N>>,
 }
 
-/// A barrier in the mailbox of an owner of goals, which answers it when it has dealt with all that came before. From the
-/// arm, before it says that it stands still, and from `ik_trial`, which so hears all that the arm had said about goals
-/// before it gave the time.
+/// A barrier in the mailbox of an owner of goals, which answers it when it has dealt with all that came before. From
+/// the arm, before it says that it stands still, and from `ik_trial`, which so hears all that the arm had said about
+/// goals before it gave the time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
 pub struct Barrier;

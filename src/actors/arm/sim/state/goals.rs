@@ -36,8 +36,8 @@ pub(crate) struct Past {
 }
 
 impl Past {
-    /// A longer past is forgotten \[s\]: after thirty years a clock no longer tells parts of a second. Long timesteps lead
-    /// there soon.
+    /// A longer past is forgotten \[s\]: after thirty years a clock no longer tells parts of a second. Long timesteps
+    /// lead there soon.
     const LONGEST: f64 = 1e9;
 
     /// A reset comes, so long after the one before \[s\].

@@ -8,7 +8,7 @@ use std::cell::{Cell, RefCell};
 use crate::actors::gateway::messages::Underway;
 use crate::actors::gateway::turns::WritersQueue;
 
-/// Whether the writer waits, in which queue it would, and who waits for it.
+/// Whether the writer waits, in which queue it does so, and which publishers wait for it.
 #[derive(Default)]
 pub(super) struct WritersTurn {
     /// The writer waits in its queue.

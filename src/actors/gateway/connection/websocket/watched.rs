@@ -27,8 +27,8 @@ pub(super) const READ_BUFFER: usize = 8 * 1024;
 /// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.
 const TURN: usize = 32 * 1024;
 
-/// A stream that notes when its other side last gave a sign of life: sent a byte, or took one after having taken
-/// none. And what it has sent of a message that is not complete yet.
+/// A stream that notes when its other side last gave a sign of life, and how much it has sent of a message that is not
+/// complete. To send a byte is a sign of life, and so is to take one after a write found no room.
 pub(super) struct Watched<S> {
     stream: S,
     /// Bytes that have come before, and are read first.
@@ -36,7 +36,7 @@ pub(super) struct Watched<S> {
     life: Rc<Cell<Instant>>,
     /// Hears of every byte that the other side takes.
     outgoing: Rc<Outgoing>,
-    /// The last write found no room: the next that does shows that there is somebody.
+    /// Whether the last write found no room: the next that does find some is a sign of life.
     is_blocked: bool,
     unfinished: Unfinished,
     /// Bytes that belong to no complete message yet, or to one that has just been read.
@@ -48,7 +48,7 @@ pub(super) struct Watched<S> {
     longest: usize,
     /// Arrival time of the first byte of what is not complete, plus all time spent not reading.
     began: Option<Instant>,
-    /// They belong to one that has just been read.
+    /// Whether the pending bytes belong to a message that has just been read.
     is_complete: bool,
     /// Bytes that wait to be written, and their buffer, which may be twice as long.
     unsent: Share,
@@ -111,12 +111,12 @@ impl<S> Watched<S> {
         self.turn == 0
     }
 
-    /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
+    /// Bytes that the library has to look at once their message has come, if it is a long one.
     pub(super) fn long(&self) -> Option<usize> {
         (self.pending > TURN).then_some(self.pending)
     }
 
-    /// All of a message has been read; so many bytes of it have not been dealt with.
+    /// Notes that all of a message has been read; `left` bytes of it have not been dealt with.
     pub(super) fn complete(&mut self, left: usize) {
         self.is_complete = true;
         self.set_pending(left);
@@ -144,7 +144,7 @@ impl<S> Watched<S> {
         if pending == 0 && !self.heads.is_within() {
             self.began = None;
         }
-        // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
+        // Input is kept twice, as it came and as a message. The heads of empty frames are part of neither, and are not
         // kept.
         let unfinished = (2 * pending).min(3 * MAX_FRAME);
         let behind = if self.behind.is_empty() { 0 } else { CHUNK };
@@ -163,7 +163,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
         cx: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        // Nobody is woken for it: who reads begins the next turn.
+        // No waker is needed: the reader itself begins the next turn.
         if self.is_turn_over() {
             return Poll::Pending;
         }
@@ -174,7 +174,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             let length = self.behind.len().min(buffer.remaining());
             buffer.put_slice(&self.behind.split_to(length));
             if self.behind.is_empty() {
-                // Its memory goes.
+                // The memory is freed.
                 self.behind = Bytes::new();
             }
             Poll::Ready(Ok(()))
