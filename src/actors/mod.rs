@@ -53,8 +53,8 @@
 //! - [`Tell`], from `recorder`: who hears of everything that the steps depend on, while it is recorded.
 //! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
 //! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
-//! - [`AddBarrier`], from `ik_action` and `follow` when they start: who is to be asked before it says that it stands
-//!   still.
+//! - [`AddBarrier`], from `ik_action` and `follow` when they start: each is sent a [`Barrier`] before the arm says that
+//!   it stands still.
 //!
 //! To `arm_sim`, `ik_action`, `follow` and `tf_web`, from the runtime: [`node::ShutDown`], the end, at which steps that
 //! are still to be taken are refused and goals are aborted.
@@ -72,7 +72,7 @@
 //! - [`node::Call`] of [`SendGoal`], [`CancelGoal`], from the registry and `ik_trial`: a goal, by service, action or
 //!   trial, and its end, by the goal's id or as the client knows it that has sent it.
 //! - [`GoalJudged`], from `arm_sim`: how a goal goes, or how it ended.
-//! - [`Barrier`], from `arm_sim` and `ik_trial`: whether all that came before has been dealt with.
+//! - [`Barrier`], from `arm_sim` and `ik_trial`: it is answered when all that came before has been dealt with.
 //!
 //! To `ik_trial`: [`node::Call`] of [`StartTrial`], [`SkipTarget`], [`StopTrial`], from the registry; [`GoalNews`],
 //! from `ik_action`: how a goal goes, or how it ended, for the node that sent it.

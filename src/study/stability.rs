@@ -38,7 +38,8 @@ pub(super) const NEUTRAL: f64 = 1e-11;
 /// under Euler (1e-3) and midpoint (2.5e-10).
 const SEARCH_START: f64 = 1e-3;
 
-/// Until here the search doubles the timestep: so far below the fast mode's own limit only slow, regular things happen.
+/// Up to here the search doubles the timestep: so far below the fast mode's own limit growth changes slowly and
+/// regularly.
 const SEARCH_FINE: f64 = 0.1;
 
 /// Step of the search beyond, as a factor: an unstable window narrower than this may be missed.

@@ -87,8 +87,8 @@ fn alone<const N: usize>(
     }
 }
 
-/// As many registers at a time as there is room for: a second one hides what the first waits for, and costs more than
-/// that where there are 16.
+/// Takes as many registers at a time as there is room for: a second one hides what the first waits for, and costs more
+/// than that where there are 16.
 #[inline(always)]
 fn in_registers<S: Simd, const N: usize>(
     simd: S,

@@ -29,7 +29,7 @@ impl Heard {
     /// Reads the setpoint as [`joint_trajectory`] does, and names its fields as they were in the whole message.
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`joint_trajectory`].
     pub fn setpoint(&self, joints: &[&str]) -> Result<SetpointRequest, TrajectoryError> {
         read(self.msg.raw(), self.left_out, joints)
     }

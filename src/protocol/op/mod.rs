@@ -276,7 +276,7 @@ pub enum ActionServerOp {
     End {
         /// Any value.
         values: Payload,
-        /// As `action_msgs/msg/GoalStatus` counts.
+        /// The status, as `action_msgs/msg/GoalStatus` counts.
         status: u8,
         /// Whether it has come to a result.
         result: bool,

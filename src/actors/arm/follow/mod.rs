@@ -99,7 +99,7 @@ pub struct FollowPath<const N: usize> {
     pub at_the_end: Tolerance<N>,
     /// How long after the end they may take for that \[s\].
     pub patience: f64,
-    /// Who sent it.
+    /// The client that sent it.
     pub client: ActionClient,
     /// Dropped when the arm is on its way, or the goal refused.
     pub done: Done,
@@ -109,7 +109,7 @@ pub struct FollowPath<const N: usize> {
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct StopFollowing {
-    /// Who wants it; an error status goes there where no such goal is active.
+    /// The client that wants it; it gets an error status if no such goal is active.
     pub from: Canceller,
     /// Dropped when the goal has ended.
     pub done: Done,

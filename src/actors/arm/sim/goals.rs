@@ -136,7 +136,7 @@ impl<const N: usize> ArmSim<N> {
         }
         let passed = async move {
             for one in asked {
-                // Who has ended publishes nothing either.
+                // An owner that has ended publishes nothing either.
                 let _ = one.await;
             }
         };

@@ -47,7 +47,7 @@ pub struct Present<const N: usize> {
 #[rtype(result = "Option<f64>")]
 pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 
-/// Whom to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
+/// The node to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);

@@ -15,7 +15,7 @@ use crate::protocol::wire::payload::Payload;
 
 /// A goal that was forwarded to its server and has not ended yet.
 pub(crate) struct ForwardedGoal {
-    /// Who sent it.
+    /// The client that sent it.
     pub(crate) sender: ConnectionId,
     /// The sender's id for it.
     pub(crate) id: Option<Payload>,

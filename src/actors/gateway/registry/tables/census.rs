@@ -34,7 +34,7 @@ struct Users {
     subscribers: usize,
     /// The first type that was named and is known: messages are encoded by it.
     known: Option<Type>,
-    /// As it is told; its type as the first that named one has it.
+    /// The topic as rosapi lists it, with the first type that was named.
     listed: Arc<ListedTopic>,
 }
 

@@ -28,7 +28,7 @@ pub(crate) struct Forwarded {
     pub(crate) _share: Share,
 }
 
-/// Who provides a service.
+/// The provider of a service.
 #[derive(Clone)]
 pub(crate) struct Provider {
     pub(crate) connection: ConnectionId,

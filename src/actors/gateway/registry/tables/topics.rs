@@ -1,4 +1,4 @@
-//! Who subscribes to what: the registry's table of topics.
+//! The registry's table of topics and their subscribers.
 //!
 //! **Invariant:** a connection stands at most once under a topic, however often it subscribed.
 
