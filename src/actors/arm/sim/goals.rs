@@ -128,7 +128,7 @@ impl<const N: usize> ArmSim<N> {
 
     /// Answers once all that the arm has said of goals is published: news of a goal go by way of its owner, and none
     /// may come after the answer that the arm stands still.
-    pub(super) fn behind_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
+    pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
         let owners = self.goals.owners.iter();
         let asked: Vec<_> = owners.map(|owner| owner.send(Barrier)).collect();
         if asked.is_empty() {
