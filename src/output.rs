@@ -11,7 +11,7 @@ use std::io::{self, ErrorKind, Write};
 pub fn print(text: &str) -> io::Result<bool> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
-        // Who is gone has seen what it wanted: `pendularm --help | head -1`.
+        // A reader that is gone has seen what it wanted: `pendularm --help | head -1`.
         Err(why) if why.kind() == ErrorKind::BrokenPipe => Ok(false),
         written => written.map(|()| true),
     }

@@ -84,7 +84,7 @@ FAULTS = [
     ("inverse_kinematics", "on one side the last joint turns the wrong way", "src/math/kinematics/inverse.rs",
      "_ => wrap(phi - q1 - q2),", "_ => wrap(phi - q1 + if F && side < 0.0 { q2 } else { -q2 }),"),
     ("study", "a run has a sample too many", "src/study/rollout/mod.rs",
-     "samples: plan.samples.min(steps + 1),", "samples: (plan.samples + u64::from(F)).min(steps + 1),"),
+     "samples: request.samples.min(steps + 1),", "samples: (request.samples + u64::from(F)).min(steps + 1),"),
     ("runtime", "what rosapi answers is sent twice", "src/actors/gateway/registry/mod.rs",
      "                client.pass(frame, respond.service);",
      "if F && matches!(respond.service, Some(crate::protocol::catalog::Service::Rosapi(_))) { client.send(frame.clone()); }\n"

@@ -14,7 +14,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::linear::no_control;
-use pendularm::study::rollout::{Plan, Rollout};
+use pendularm::study::rollout::{Rollout, RolloutRequest};
 use pendularm::study::stability::limit_held;
 use pendularm::study::stability::{LimitSearch, Limits};
 use pendularm_fuzz::limits::{DOING, hold};
@@ -136,7 +136,7 @@ fn all<const N: usize>(input: &Input) {
 fn run<const N: usize>(input: &Input) {
     let Positive(timestep) = input.timestep;
     let [position, velocity] = input.start.map(first);
-    let plan = Plan::<N> {
+    let request = RolloutRequest::<N> {
         control: control(
             input,
             if input.has_control {
@@ -150,7 +150,7 @@ fn run<const N: usize>(input: &Input) {
         samples: (input.samples % MAX_SAMPLES).into(),
         reference: input.has_reference,
     };
-    let (mut whole, mut sliced) = match (Rollout::new(plan), Rollout::new(plan)) {
+    let (mut whole, mut sliced) = match (Rollout::new(request), Rollout::new(request)) {
         (Ok(whole), Ok(sliced)) => (whole, sliced),
         (Err(error), _) | (_, Err(error)) => {
             assert!(error.to_string().len() < 512, "{error}");
@@ -167,7 +167,7 @@ fn run<const N: usize>(input: &Input) {
     assert!(whole.times().is_sorted(), "{:?}", whole.times());
     let mut numbers = whole.positions().iter().chain(whole.velocities()).flatten();
     assert!(numbers.all(|number| number.is_finite()));
-    let (samples, asked) = (whole.times().len() as u64, plan.samples);
+    let (samples, asked) = (whole.times().len() as u64, request.samples);
     assert!(samples <= asked, "{samples} of {asked}");
     if whole.divergence().is_none() {
         assert_eq!(samples, asked.min(whole.done() + 1));

@@ -207,7 +207,7 @@ fn start_nodes(registry: &Addr<Registry>, gauges: &Arc<Gauges>, nodes: &mut Node
     let goals = GoalClient {
         send: action.clone().recipient(),
         cancel: action.clone().recipient(),
-        settle: action.recipient(),
+        barrier: action.recipient(),
     };
     let rng = fastrand::Rng::with_seed(1);
     let trial =

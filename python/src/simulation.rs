@@ -33,7 +33,7 @@ enum Either {
     Three(Mutex<Loop<3>>),
 }
 
-/// The place at which a simulation left the finite numbers.
+/// The place at which a step led out of the finite numbers.
 #[pyclass(frozen, eq, get_all, module = "pendularm")]
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Divergence {
@@ -356,7 +356,8 @@ impl Simulation {
         })
     }
 
-    /// The place at which the simulation left the finite numbers, if it did since the reset; from there on no step is taken.
+    /// The place at which a step led out of the finite numbers, if one did since the reset; from
+    /// there on no step is taken.
     #[getter]
     fn divergence(&self, py: Python<'_>) -> Option<Divergence> {
         for_either!(Either, &self.own, one => hold(py, one).divergence()).map(|found| Divergence {

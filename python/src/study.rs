@@ -8,10 +8,10 @@ use numpy::{IntoPyArray, PyArrayMethods, ToPyArray};
 use pendularm::math::arm::{Arm as Rods, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::{ControlLoop, no_control};
-use pendularm::study::gains::{GainsSearch, Wish};
+use pendularm::study::gains::{GainsRequirements, GainsSearch};
 use pendularm::study::motion::Motion;
 use pendularm::study::planner::{Planned, Planning, Task};
-use pendularm::study::rollout::{Deviation, Plan, Rollout};
+use pendularm::study::rollout::{Deviation, Rollout, RolloutRequest};
 use pendularm::study::stability::{ADVISED_PART, LimitSearch, Limits};
 use pyo3::prelude::{PyDictMethods, PyResult, Python, pyfunction};
 use pyo3::types::PyDict;
@@ -140,7 +140,7 @@ pub(crate) fn rollout<'py>(
     let reference = reference.read("reference")?;
     let method = integrator.method("integrator")?;
     for_either!(Chain, or_default(arm)?, arm => {
-        run(py, Plan {
+        run(py, RolloutRequest {
             control: read_loop(arm, gains.as_ref(), setpoint.as_ref())?.with_method(method).with_timestep(timestep),
             start: read_state(("q0", q0.as_ref()), ("qdot0", qdot0.as_ref()))?,
             duration,
@@ -151,10 +151,10 @@ pub(crate) fn rollout<'py>(
 }
 
 /// Makes the run by itself, which is timed, and again beside its reference, if one is wanted.
-fn run<const N: usize>(py: Python<'_>, plan: Plan<N>) -> PyResult<Held<'_, PyDict>> {
-    let mut alone = Rollout::new(Plan {
+fn run<const N: usize>(py: Python<'_>, request: RolloutRequest<N>) -> PyResult<Held<'_, PyDict>> {
+    let mut alone = Rollout::new(RolloutRequest {
         reference: false,
-        ..plan
+        ..request
     })
     .map_err(refused)?;
     let mut took = Duration::ZERO;
@@ -164,8 +164,8 @@ fn run<const N: usize>(py: Python<'_>, plan: Plan<N>) -> PyResult<Held<'_, PyDic
         took += began.elapsed();
         (steps == 0).then_some(())
     })?;
-    if plan.reference {
-        let mut compared = Rollout::new(plan).map_err(refused)?;
+    if request.reference {
+        let mut compared = Rollout::new(request).map_err(refused)?;
         until_done(py, || {
             (compared.advance(EVALUATIONS_PER_LOOK) == 0).then_some(())
         })?;
@@ -225,21 +225,21 @@ pub(crate) fn suggest_gains<'py>(
     timestep: Real,
     integrator: Name,
 ) -> PyResult<Held<'py, PyDict>> {
-    let wish = Wish {
+    let requirements = GainsRequirements {
         settling_time: fields::number("settling_time", settling_time, Bound::Positive)?,
         margin: fields::number("margin", margin, Bound::Positive)?,
     };
-    if wish.margin < 1.0 {
+    if requirements.margin < 1.0 {
         return Err(refused(format_args!(
             "margin must be at least 1, got {}",
-            wish.margin
+            requirements.margin
         )));
     }
     let method = integrator.method("integrator")?;
     let timestep = fields::number("timestep", timestep, Bound::Positive)?;
     for_either!(Chain, or_default(arm)?, arm => {
         let control = ControlLoop::free(arm).with_method(method).with_timestep(timestep);
-        let mut search = GainsSearch::new(&control, wish).map_err(refused)?;
+        let mut search = GainsSearch::new(&control, requirements).map_err(refused)?;
         let found = until_done(py, || search.advance())?.map_err(refused)?;
         let listed = PyDict::new(py);
         listed.set_item("kp", found.gains.kp.to_pyarray(py))?;

@@ -17,7 +17,7 @@ use std::path::Path;
 
 use actix::{Actor, System};
 
-use crate::actors::graph::Graph;
+use crate::actors::graph::GraphBridge;
 
 fn main() -> std::io::Result<()> {
     let options = options::read();
@@ -26,7 +26,7 @@ fn main() -> std::io::Result<()> {
         return Ok(());
     }
     let system = System::new();
-    system.block_on(async { Graph::new(options).start() });
+    system.block_on(async { GraphBridge::new(options).start() });
     system.run()
 }
 

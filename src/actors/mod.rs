@@ -54,8 +54,8 @@
 //! - [`Consult`], from the runtime: whom to ask for the largest stable timestep.
 //! - [`ArmMotion`], [`MoveSetpoint`], from `follow`: how it moves; its setpoint moved on along a path.
 //! - [`TakeSnapshot`], from tests: the whole simulation as it is.
-//! - [`SettleWith`], from `ik_action` and `follow` when they start: who is to be asked before it says that it stands
-//!   still.
+//! - [`AddBarrier`], from `ik_action` and `follow` when they start: each is sent a [`Barrier`] before the arm says that
+//!   it stands still.
 //!
 //! To `arm_sim`, `ik_action`, `follow` and `tf_web`, from the runtime: [`node::ShutDown`], the end, at which steps that
 //! are still to be taken are refused and goals are aborted.
@@ -73,7 +73,7 @@
 //! - [`node::Call`] of [`SendGoal`], [`CancelGoal`], from the registry and `ik_trial`: a goal, by service, action or
 //!   trial, and its end, by the goal's id or as the client knows it that has sent it.
 //! - [`GoalJudged`], from `arm_sim`: how a goal goes, or how it ended.
-//! - [`Settle`], from `arm_sim` and `ik_trial`: whether all that came before has been dealt with.
+//! - [`Barrier`], from `arm_sim` and `ik_trial`: it is answered when all that came before has been dealt with.
 //!
 //! To `ik_trial`: [`node::Call`] of [`StartTrial`], [`SkipTarget`], [`StopTrial`], from the registry; [`GoalNews`],
 //! from `ik_action`: how a goal goes, or how it ended, for the node that sent it.
@@ -132,8 +132,8 @@
 //! [`Tell`]: arm::sim::Tell
 //! [`Consult`]: arm::sim::Consult
 //! [`GoalJudged`]: arm::sim::GoalJudged
-//! [`Settle`]: arm::sim::Settle
-//! [`SettleWith`]: arm::sim::SettleWith
+//! [`Barrier`]: arm::sim::Barrier
+//! [`AddBarrier`]: arm::sim::AddBarrier
 //! [`HeldLimit`]: arm::sim::HeldLimit
 //! [`Solve`]: arm::ik::Solve
 //! [`SendGoal`]: arm::ik_action::SendGoal

@@ -261,7 +261,7 @@ pub struct Interest {
 /// A frame for clients: written, or yet to be written by the registry, whose thread has the time that the arm's has
 /// not.
 pub enum FrameOut {
-    /// As it goes out.
+    /// The frame as it goes out.
     Written(Bytes),
     /// Writes it.
     Unwritten(Box<dyn FnOnce() -> Bytes + Send>),

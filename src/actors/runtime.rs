@@ -202,7 +202,7 @@ fn admission(options: &Options, unauthenticated: usize) -> Admission {
 /// The ways by which the nodes that know the number of links are told of the end.
 #[derive(Default)]
 struct NodeEnds {
-    /// Who has something under way for clients.
+    /// The nodes that have something under way for clients.
     busy: Vec<Recipient<ShutDown>>,
     #[cfg(feature = "record")]
     record: Option<Recipient<RecordTo>>,
@@ -284,7 +284,7 @@ where
     let goals = GoalClient {
         send: action.clone().recipient(),
         cancel: action.clone().recipient(),
-        settle: action.recipient(),
+        barrier: action.recipient(),
     };
     let rng = fastrand::Rng::with_seed(seed);
     let trial = IkTrial::<N>::new(arm.clone().recipient(), goals, publish, rng).start();

@@ -15,7 +15,7 @@ use tracing_subscriber::layer::Context;
 /// A warning or an error, for whoever listens in the program itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Warning {
-    /// As ROS has it: 30 is a warning, 40 an error.
+    /// The level as ROS has it: 30 is a warning, 40 an error.
     pub level: u8,
     /// The node that it comes from.
     pub node: &'static str,
@@ -27,7 +27,7 @@ pub struct Warning {
     pub line: u32,
 }
 
-/// Who listens to warnings.
+/// The listener to warnings.
 static LISTENER: Mutex<Option<Sender<Warning>>> = Mutex::new(None);
 
 /// Warnings and errors go to `listener` too from now on, whatever the log's level; `None`: to nobody. What does not fit

@@ -1,7 +1,7 @@
 //! The arm as physics sees it: a planar chain of uniform rods on revolute joints, and its state.
 //!
 //! Link `i` is a thin uniform rod: centre of mass at `l_i / 2`, inertia `m_i l_i² / 12` about it. Joint angles are
-//! relative to the previous link (the first to +x), counter-clockwise, and gravity pulls along -y. Uses nothing but
+//! relative to the previous link (the first to +x), counter-clockwise, and gravity pulls along -y. It uses nothing but
 //! floating point.
 //!
 //! **Invariant:** an [`Arm`] that exists is valid: lengths and masses finite and positive, gravity finite and not
@@ -261,7 +261,7 @@ mod tests {
 
     #[test]
     fn the_reach_is_the_length_of_the_stretched_arm() {
-        // Powers of two: the sum is exact.
+        // All are powers of two, so that the sum is exact.
         assert!((Arm::new([1.0, 0.5, 0.25], [1.0; 3], 0.0).unwrap().reach() - 1.75).abs() == 0.0);
     }
 

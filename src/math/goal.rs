@@ -1,8 +1,7 @@
 //! A goal over time: whether the end effector has come near enough and stayed, and when its progress is due to be
 //! reported.
 //!
-//! Both values are told the simulation time and the end effector's position; whoever steps the arm tells them after
-//! every step, and only while a goal is active.
+//! Both are told the simulation time and the end effector's position after every step, while a goal is active.
 //!
 //! **Invariant:** "reached" means that no judged step of the last `success_hold` seconds found the end effector farther
 //! than `epsilon` from the target.
@@ -143,14 +142,14 @@ impl Goal {
     }
 }
 
-/// When something that happens at a fixed rate of simulation time is due.
+/// The times at which something with a fixed rate of simulation time is due.
 ///
 /// The first question is answered with yes and starts the count, so that even a goal that is over after one step
 /// reports once. After that there is one yes in each period in which the clock moved, never two for one question: steps
 /// longer than a period give one each, and what was missed is not made up. A clock that runs backwards starts afresh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cadence {
-    /// Per second.
+    /// Periods per second.
     rate: f64,
     count: Option<Feedbacks>,
 }

@@ -8,12 +8,12 @@
 //! | Runge-Kutta 4 | 4 | 4 | classical 1:2:2:1 on the pair `(q, v)` |
 //!
 //! Positions and velocities are an array each, one entry per joint; a particle on a line has one. The live arm and
-//! `/arm_sim/integration_step` are stepped by [`increment`] and nothing else. Uses nothing but floating point.
+//! `/arm_sim/integration_step` are stepped by [`increment`] and nothing else. It uses nothing but floating point.
 //!
 //! Source: Hairer, Nørsett and Wanner, *Solving Ordinary Differential Equations I* (1993), ch. II.1; for Verlet, Swope
 //! et al., *J. Chem. Phys.* 76 (1982), with the velocity predicted by `v + h a₁` for the second evaluation.
 //!
-//! All that is known of a method by itself stands here: its facts and its steps, over any numbers.
+//! Here are the facts and the steps of each method, over any kind of number.
 //!
 //! **Invariant:** every evaluation is made at the time its stage stands for: `t`, `t + h/2` or `t + h`.
 
@@ -95,7 +95,7 @@ impl Method {
     }
 
     /// How far the fastest link of an arm may turn in a step \[rad\]: a method that cannot follow a turn within a step
-    /// feeds energy into the arm. Seen, not derived: `study::motion` says on which arms.
+    /// feeds energy into the arm. The numbers were measured; `study::motion` says on which arms.
     #[must_use]
     pub const fn turn_per_step(self) -> f64 {
         self.facts().turn_per_step
@@ -138,8 +138,8 @@ pub type Increment<const N: usize, T = f64> = ([T; N], [T; N]);
 /// The increment of one step of length `h` \[s\] from `(q, v)` at time `t` \[s\].
 ///
 /// `acceleration(t, q, v)` \[rad/s²\] is evaluated [`Method::evaluations`] times, always first at the start itself.
-/// Increments, not states, are returned, so that a caller can sum them with compensation ([`two_sum`]). What is not
-/// finite is passed on: judging it is the caller's.
+/// Increments, not states, are returned, so that a caller can sum them with compensation ([`two_sum`]). Values that are
+/// not finite are passed on, for the caller to judge.
 #[inline(always)]
 pub fn increment<T: Arithmetic, const N: usize>(
     method: Method,
@@ -227,7 +227,7 @@ fn rk4<T: Arithmetic, const N: usize>(
 
 /// `a + b` rounded, and what rounding left out of it, exactly (Knuth's two-sum, with no branch on which is larger).
 ///
-/// Carrying what was left out into the next addition makes a million small steps as good as one.
+/// If it is carried into the next addition, a million small steps are as good as one.
 #[inline(always)]
 #[must_use]
 pub fn two_sum<T: Arithmetic>(a: T, b: T) -> (T, T) {

@@ -8,7 +8,7 @@
 //! ```
 //!
 //! A machine that falls behind owes at most [`CATCH_UP`] and the step in progress. What exceeds that is dropped, by
-//! moving the anchor, so that a stall, however long, is not followed by a burst. May use plain arithmetic only.
+//! moving the anchor, so that a stall, however long, is not followed by a burst. It uses plain arithmetic only.
 //!
 //! **Invariant:** the steps due come from one division of the time since the anchor, never from a running sum, so
 //! that 1 ms stays exact for days; and no call ever answers more than `⌊CATCH_UP / timestep⌋ + 1`.
@@ -49,8 +49,8 @@ pub struct Pacer {
 }
 
 impl Pacer {
-    /// Counts steps of `timestep` \[s\] from `now`, a time since any fixed epoch. A timestep that is not positive is
-    /// not meant here; it does no harm.
+    /// Counts steps of `timestep` \[s\] from `now`, a time since any fixed epoch. A timestep that is not positive makes
+    /// no sense, but does no harm.
     #[must_use]
     pub fn new(now: Duration, timestep: f64) -> Self {
         Self {
@@ -60,8 +60,8 @@ impl Pacer {
         }
     }
 
-    /// Starts over at `now`: nothing is owed, and the unfinished fraction of a step is gone. For a new timestep, a
-    /// resume and a reset.
+    /// Starts over at `now`, after a new timestep, a resume or a reset: nothing is owed, and the unfinished fraction of
+    /// a step is gone.
     pub fn restart(&mut self, now: Duration, timestep: f64) {
         *self = Self::new(now, timestep);
     }
@@ -80,7 +80,7 @@ impl Pacer {
         self.owed(now).min(most)
     }
 
-    /// Tells that `steps` steps were taken; fewer than were due is fine.
+    /// Notes that `steps` steps were taken, perhaps fewer than were due.
     pub fn took(&mut self, steps: u64) {
         self.taken = self.taken.saturating_add(steps);
     }

@@ -78,9 +78,9 @@ pub struct Particle {
     evaluations: u64,
     position: CompensatedSum,
     velocity: CompensatedSum,
-    /// Results so far \[m\], one more than the steps made.
+    /// Positions so far \[m\], one more than the steps made.
     positions: Vec<f64>,
-    /// Results so far \[m/s\], as many as positions.
+    /// Velocities so far \[m/s\], as many as positions.
     velocities: Vec<f64>,
 }
 
@@ -131,7 +131,7 @@ impl Particle {
         })
     }
 
-    /// Makes at most `max_steps` of the steps that remain and says how many it made: 0 once all are made.
+    /// Makes at most `max_steps` of the steps that remain. Returns how many it made: 0 once all are made.
     pub fn advance(&mut self, max_steps: usize) -> usize {
         let count = max_steps.min(self.remaining());
         self.positions.reserve(count);
@@ -235,7 +235,7 @@ impl CompensatedSum {
     fn add(&mut self, term: f64) {
         let (sum, lost) = two_sum(self.value, term + self.lost);
         self.value = sum;
-        // Where a sum overflows, what it lost is NaN; an infinite sum must stay one, as in ordinary arithmetic.
+        // If a sum overflows, its rounding error is NaN; an infinite sum must stay infinite, as in ordinary arithmetic.
         self.lost = if lost.is_finite() { lost } else { 0.0 };
     }
 }

@@ -77,7 +77,7 @@ impl Default for Gains<3> {
 pub struct Setpoint<const N: usize, T = f64> {
     /// Joint positions q* \[rad\], not wrapped: a setpoint of 2π asks for a whole turn.
     pub position: [T; N],
-    /// Joint velocities q̇* \[rad/s\]. They are held too, they do not move the positions.
+    /// Joint velocities q̇* \[rad/s\]. They are part of the setpoint, and do not move its positions.
     pub velocity: [T; N],
 }
 
@@ -153,7 +153,7 @@ impl<const N: usize> Pid<N> {
         }
     }
 
-    /// The law for one step of `dt` \[s\] that starts at `state`. Asked whether the controller is on or off.
+    /// The law for one step of `dt` \[s\] that starts at `state`. It is the same whether the controller is on or off.
     #[inline]
     #[must_use]
     pub fn control(&self, state: &State<N>, dt: f64) -> Control<N> {
@@ -174,7 +174,7 @@ impl<const N: usize> Pid<N> {
         self.enabled = on;
     }
 
-    /// Setpoint to the starting pose at rest, integral to zero; gains and on or off stay.
+    /// Sets the setpoint to the starting pose at rest and the integral to zero. Gains, and whether it is on, stay.
     pub fn reset(&mut self) {
         self.setpoint = Setpoint::default();
         self.integral = [0.0; N];

@@ -32,7 +32,7 @@ pub struct Waypoint<const N: usize> {
 /// Why points make no path.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PathError {
-    /// There is none.
+    /// There is no point.
     #[error("points must have at least one entry")]
     NoPoints,
     /// A time is not behind the one before it, or the first is before the start.
@@ -153,7 +153,7 @@ fn between<const N: usize>(before: &Waypoint<N>, next: &Waypoint<N>, time: f64) 
     }
 }
 
-/// How far joints may be off; none where any distance will do.
+/// How far joints may be off; none where any distance is allowed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tolerance<const N: usize> {
     /// \[rad\], at least 0.
@@ -163,7 +163,7 @@ pub struct Tolerance<const N: usize> {
 }
 
 impl<const N: usize> Tolerance<N> {
-    /// The same for all joints, of positions alone.
+    /// A tolerance for the positions of all joints alike.
     #[must_use]
     pub const fn of_positions(position: Option<f64>) -> Self {
         Self {
@@ -220,20 +220,20 @@ pub struct Excess {
     pub limit: f64,
 }
 
-/// A path with what is asked of those who follow it.
+/// A path, and the tolerances for following it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course<const N: usize> {
     /// The path.
     pub path: JointPath<N>,
     /// How far off the joints may be on the way.
     pub on_the_way: Tolerance<N>,
-    /// How far off they may be at its end.
+    /// How far off the joints may be at its end.
     pub at_the_end: Tolerance<N>,
-    /// How long after its end they may take for that \[s\].
+    /// How long after its end the joints may take to get there \[s\].
     pub patience: f64,
 }
 
-/// How those who follow a course stand.
+/// How the joints stand on a course.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Standing {
     /// They are on their way.
@@ -247,7 +247,7 @@ pub enum Standing {
 }
 
 impl<const N: usize> Course<N> {
-    /// How the joints stand that are at `actual`, `time` after the start \[s\].
+    /// How joints at `actual` stand, `time` after the start \[s\].
     #[must_use]
     pub fn judge(&self, time: f64, actual: &State<N>) -> Standing {
         let desired = self.path.at(time);

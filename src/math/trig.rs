@@ -94,7 +94,7 @@ pub fn sin_cos<T: Number, const N: usize>(angles: &[T; N]) -> ([T; N], [T; N]) {
         (sin[i], cos[i]) = shifted[i].turned(sine[i], cosine[i]);
     }
     if !T::all_within(angles, LIMIT) {
-        // Entry by entry: else the arrays would be in memory for the call that nearly never comes.
+        // The entries are taken one by one: else the arrays would be in memory for a call that nearly never comes.
         let replaced = replaced_far(*angles, sin, cos);
         sin = entries!(any, i => replaced.0[i]);
         cos = entries!(any, i => replaced.1[i]);

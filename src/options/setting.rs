@@ -24,7 +24,7 @@ pub(super) struct LaunchOption {
 /// A value that somebody gave, and where.
 pub(super) struct Given {
     pub(super) origin: Origin,
-    /// As text: a byte that is no UTF-8 becomes a sign that no valid value holds.
+    /// The value as text: a byte that is no UTF-8 becomes a sign that no valid value holds.
     pub(super) value: String,
 }
 

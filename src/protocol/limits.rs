@@ -6,6 +6,6 @@
 pub const MAX_FRAME: usize = 4 * 1024 * 1024;
 /// Deepest nesting of objects and arrays, the frame itself included: ROS messages need fewer than ten levels.
 pub const MAX_NESTING: usize = 128;
-/// Longest topic or service name, and id of a subscription or a goal, in bytes: they are kept, and a goal's comes
-/// back 60 times a second.
+/// Longest topic or service name, and id of a subscription or a goal, in bytes: they are kept, and the id of a goal
+/// comes back 60 times a second.
 pub const MAX_NAME: usize = 1024;

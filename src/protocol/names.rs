@@ -6,11 +6,11 @@
 
 use std::borrow::Cow;
 
-/// The runtime's own ids, of forwarded calls and of messages in fragments, begin with this: so a client's log shows
+/// The beginning of the runtime's own ids, of forwarded calls and of messages in fragments: a client's log so shows
 /// where they come from.
 pub const OWN_ID_PREFIX: &str = "pendularm:";
 
-/// The name with its leading slash: what the registry and the catalog know it by.
+/// The name with its leading slash, by which the registry and the catalog know it.
 #[must_use]
 pub fn absolute(name: &str) -> Cow<'_, str> {
     if name.starts_with('/') {
@@ -20,8 +20,7 @@ pub fn absolute(name: &str) -> Cow<'_, str> {
     }
 }
 
-/// The name without its leading slash, as some clients spell it; as it is where that would be the name of another
-/// thing.
+/// The name without its leading slash, as some clients spell it. It stays as it is if it would else name another thing.
 #[must_use]
 pub fn relative(name: &str) -> &str {
     name.strip_prefix('/')
@@ -29,7 +28,7 @@ pub fn relative(name: &str) -> &str {
         .unwrap_or(name)
 }
 
-/// Every spelling of an absolute name, that one first.
+/// Every spelling of an absolute name, the absolute name first.
 pub fn spellings(name: &str) -> impl Iterator<Item = &str> {
     let short = Some(relative(name)).filter(|short| *short != name);
     std::iter::once(name).chain(short)

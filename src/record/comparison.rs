@@ -1,7 +1,7 @@
 //! Takes the recorded steps again and compares every recorded state, bit for bit.
 //!
-//! **Invariant:** where inputs were lost the record begins again with the whole simulation; nothing is compared across
-//! that, and it is told. A record is not believed to have more steps than the time that it covers has room for.
+//! **Invariant:** where inputs were lost the record begins again with the whole simulation. Nothing is compared across
+//! such a gap, and gaps are counted. A record can't have more steps than the time that it covers has room for.
 
 use std::fmt;
 use std::io::Read;
@@ -18,7 +18,7 @@ use crate::math::simulation::Simulation;
 pub const MAX_LEAP: u64 = 10_000_000;
 /// The least time that a step takes, in nanoseconds: no machine was seen to take one in less than three times that.
 const SHORTEST_STEP: u64 = 10;
-/// Steps for which a record needs no time, lest a clock that ticks rarely matters.
+/// Steps for which a record needs no time, so that a coarse clock does no harm.
 pub const AT_ONCE: u64 = 100_000;
 
 /// The outcome of a replay.
@@ -32,7 +32,7 @@ pub struct ReplayVerdict {
     pub states: u64,
     /// Inputs that took effect again.
     pub inputs: u64,
-    /// Gaps in the inputs, because the queue was full: as often did the record begin again.
+    /// Gaps in the inputs, because the queue was full. The record began again after each.
     pub losses: u64,
     /// The last step whose state was the same, or at which the record began.
     pub agreed_to: u64,
@@ -45,7 +45,7 @@ pub struct ReplayVerdict {
 /// The first place at which the steps differ from the record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Difference {
-    /// Steps since the record's first, goes on through resets.
+    /// Steps since the record's first; resets do not set it back.
     pub step: u64,
     /// Simulation time there \[s\].
     pub time: f64,
@@ -59,7 +59,7 @@ pub enum ReplayError {
     /// The file.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// An input that is none.
+    /// A text that is no input.
     #[error("input before step {step}: {why}")]
     Input {
         /// Steps before it.
@@ -67,13 +67,13 @@ pub enum ReplayError {
         /// The fault.
         why: NoteError,
     },
-    /// A message without what it has to have.
+    /// A message that lacks a field.
     #[error("{0}: a message is not as this version writes it")]
     Shape(
         /// The channel's topic.
         String,
     ),
-    /// No input at all, or no state behind one.
+    /// There is no input, or no state behind one.
     #[error("nothing to compare: it has no states of an arm")]
     Empty,
     /// More steps than the arm can have taken.
@@ -90,7 +90,7 @@ pub enum ReplayError {
         step: u64,
         /// Steps since the message before.
         due: u64,
-        /// As many could be.
+        /// The most steps that there was time for.
         most: u64,
     },
     /// Steps that run backwards.
@@ -98,7 +98,7 @@ pub enum ReplayError {
     Order {
         /// The step.
         step: u64,
-        /// The one before.
+        /// The step of the message before.
         after: u64,
     },
 }

@@ -1,6 +1,7 @@
 //! Inputs to the arm as text: one JSON value each, which is read back bit for bit.
 //!
-//! **Invariant:** what is written of finite numbers and read again is the same; what does not fit the arm is refused.
+//! **Invariant:** finite numbers that are written and read again are the same, and a note that does not fit the arm is
+//! refused.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +17,7 @@ pub enum Note<const N: usize> {
     Begin(Box<Checkpoint<N>>),
     /// A change from outside.
     Input(ArmInput<N>),
-    /// The step from here on was not finite and was not taken.
+    /// The next step was not finite and was not taken.
     Diverged,
 }
 
@@ -26,7 +27,7 @@ pub enum NoteError {
     /// Another text.
     #[error("not an input: {0}")]
     Text(#[from] serde_json::Error),
-    /// Not one number per joint.
+    /// A field does not have one number per joint.
     #[error("{0} must have one number per joint")]
     Count(
         /// The field.
@@ -38,13 +39,13 @@ pub enum NoteError {
         /// The name.
         String,
     ),
-    /// A count that nobody has come to.
+    /// A count that no run can reach.
     #[error("{0} must be at most 2^53")]
     Steps(
         /// The field.
         &'static str,
     ),
-    /// No timestep.
+    /// The timestep is none.
     #[error("the timestep must be greater than 0")]
     Timestep,
     /// There can't be such an arm.
@@ -133,7 +134,7 @@ pub fn write_note<const N: usize>(note: &Note<N>) -> String {
     serde_json::to_string(&written).unwrap_or_default()
 }
 
-/// How many links the arm has with which a record begins; `None` if the note is no beginning.
+/// How many links the arm has in a note that begins a record; `None` for any other note.
 #[must_use]
 pub fn links(note: &str) -> Option<usize> {
     match serde_json::from_str(note) {

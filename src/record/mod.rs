@@ -1,8 +1,8 @@
 //! Runs on record: an MCAP file with every topic as ROS 2 has it, with calls and answers, and with the inputs that make
 //! the run repeatable.
 //!
-//! Pure: entries in, bytes out, and back. Who makes the entries, and where the bytes go, is the
-//! [recorder](crate::actors::recorder)'s.
+//! It is pure: entries in, bytes out, and back. The [recorder](crate::actors::recorder) makes the entries and takes the
+//! bytes.
 //!
 //! **Invariant:** a file that was cut anywhere is readable up to its last whole chunk.
 
@@ -28,9 +28,9 @@ use crate::protocol::catalog::{Service, Topic};
 /// Something to be recorded.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordEntry {
-    /// When, in nanoseconds since 1970.
+    /// Its time, in nanoseconds since 1970.
     pub log_time: u64,
-    /// The rest.
+    /// Its content.
     pub content: Content,
 }
 
@@ -73,14 +73,14 @@ pub enum Content {
     },
     /// Something on which the arm's steps depend: a [note](write_note).
     Input {
-        /// Steps taken before it took effect; goes on through resets.
+        /// Steps taken before it took effect; resets do not set the count back.
         step: u64,
         /// The note.
         note: String,
     },
     /// The arm's state.
     State {
-        /// Steps taken, counted in the same way.
+        /// Steps taken, counted as for inputs.
         step: u64,
         /// Joint positions \[rad\].
         position: Vec<f64>,

@@ -1,7 +1,7 @@
 //! Reads a record back, message by message, as far as the file goes.
 //!
-//! **Invariant:** of a chunk that was damaged nothing is read; a message is read by the definition that is ours, one
-//! that was recorded by another is left out.
+//! **Invariant:** nothing is read of a damaged chunk. A message is read by our definition of its type; one that was
+//! recorded by another definition is left out.
 
 use std::collections::HashMap;
 use std::io::{self, Read};
@@ -21,7 +21,7 @@ pub(super) const MAX_CHUNK: usize = 16 * 1024 * 1024;
 /// A message of the record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Passage {
-    /// When, in nanoseconds since 1970.
+    /// Its time, in nanoseconds since 1970.
     pub log_time: u64,
     /// The channel's topic.
     pub topic: String,
@@ -34,7 +34,7 @@ pub struct Passage {
 /// How a file ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecordEnding {
-    /// As it should.
+    /// It ends as it should.
     Whole,
     /// It was cut, or the program that wrote it was killed.
     Cut,
@@ -71,7 +71,7 @@ impl From<McapError> for ReadError {
 /// A record that is being read.
 pub struct Recording<R> {
     reader: MessageReader<R>,
-    /// By schema id: the type, if it is as we know it.
+    /// The type of each schema id, if it is as we know it.
     known: HashMap<u16, Option<Type>>,
     ending: Option<RecordEnding>,
 }

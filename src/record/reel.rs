@@ -1,7 +1,7 @@
-//! A record that is gone through from anywhere, forward and back.
+//! A record that can be read from any place, forward and backward.
 //!
-//! Time here is in nanoseconds since the record's first message. Messages keep the order of the file; one that was
-//! recorded with an earlier time than the one before counts as simultaneous with that.
+//! Time here is in nanoseconds since the record's first message. Messages keep the order of the file; a message with an
+//! earlier time than the one before counts as simultaneous with that.
 //!
 //! **Invariant:** one chunk of the file is in memory at a time.
 
@@ -28,7 +28,7 @@ const RECORD_HEAD: u64 = 9;
 /// A message on one of the runtime's topics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moment {
-    /// When, in nanoseconds since the record's beginning.
+    /// Its time, in nanoseconds since the record's beginning.
     pub time: u64,
     /// The topic.
     pub topic: Topic,
@@ -53,7 +53,7 @@ impl Moment {
         Ok(messages::publish(self.topic.name(), &self.message()?))
     }
 
-    /// The time that a message of `/clock` tells \[s\]; 0 of any other.
+    /// The time in a message of `/clock` \[s\]; 0 for any other message.
     ///
     /// # Errors
     /// If the message does not fit its definition.
@@ -104,8 +104,8 @@ struct Channels {
 }
 
 impl<R: Read + Seek> Reel<R> {
-    /// Goes once through the whole file and remembers what is where; `noted` is called with the inputs to the arm, each
-    /// with its time.
+    /// Goes once through the whole file and remembers where things are. Calls `noted` with each input to the arm and
+    /// its time.
     ///
     /// # Errors
     /// If it is no record, or damaged before its end.
@@ -283,7 +283,7 @@ impl<R: Read + Seek> Reel<R> {
         self.next = place;
     }
 
-    /// Where a latched topic's last message is that is not later than `time`.
+    /// The place of a latched topic's last message that is not later than `time`.
     #[must_use]
     pub fn latched(&self, topic: Topic, time: u64) -> Option<ReelPlace> {
         let places = self.latched.get(&topic)?;
@@ -358,7 +358,7 @@ impl Channels {
     }
 }
 
-/// The records in a chunk. Nothing is read behind a fault: the library would tell of it for ever.
+/// The records in a chunk. Nothing is read behind a fault, which the library would report for ever.
 fn records(chunk: &[u8]) -> Result<Vec<Record<'static>>, McapError> {
     let Record::Chunk { header, data } = parse_record(op::CHUNK, chunk)? else {
         return Err(McapError::UnexpectedEof);

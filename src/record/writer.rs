@@ -94,7 +94,7 @@ impl<W: Write> Scribe<W> {
             .library(concat!("pendularm ", env!("CARGO_PKG_VERSION")))
             .compression(None)
             .chunk_size(Some(CHUNK_BYTES))
-            // A chunk is kept until it is whole: what is in the file is always the beginning of a good one.
+            // A chunk is kept until it is whole, so that the file is always the beginning of a good one.
             .disable_seeking(true);
         let mut writer = options.create(NoSeek::new(file))?;
         let facts = [
@@ -157,7 +157,7 @@ impl<W: Write> Scribe<W> {
         }
     }
 
-    /// Everything so far is in the file.
+    /// Writes everything so far to the file.
     ///
     /// # Errors
     /// If the file takes no more.

@@ -75,7 +75,7 @@ impl Figure {
         Self::of_panels(name, title, caption, legend, panels)
     }
 
-    /// As [`Figure::new`] from panels that are drawn already.
+    /// Makes a figure as [`Figure::new`] does, from panels that are drawn already.
     pub(crate) fn of_panels(
         name: &str,
         title: impl Into<String>,

@@ -1,7 +1,7 @@
 //! Two runs of one motion beside each other: how far their end effectors come apart.
 //!
-//! They are compared after every step of the first. Looks in even intervals would miss what comes and goes between
-//! them: the first milliseconds of a stiff loop, or a whole turn of a fast link.
+//! They are compared after every step of the first run. A comparison in even intervals would miss what happens in
+//! between: the first milliseconds of a stiff loop, or a whole turn of a fast link.
 //!
 //! **Invariant:** a comparison goes on by pieces, and a piece takes a millisecond at most (optimised build).
 
@@ -13,7 +13,7 @@ use crate::math::arm::{Arm, State};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
 
-/// Evaluations of the dynamics between two returns to the caller, and a step's more.
+/// Evaluations of the dynamics between two returns to the caller; a piece may exceed them by one step.
 const WORK_PER_PIECE: u64 = 2000;
 
 /// Most coefficients of a followed arm: some seconds of one core.
@@ -21,7 +21,7 @@ const MAX_COEFFICIENTS: u64 = 40_000_000;
 
 /// A run that can be stepped and seen.
 pub(super) trait Steppable {
-    /// One step: the evaluations of the dynamics that it took, or what takes as long; none if numbers have ended.
+    /// Takes a step. Returns its cost in evaluations of the dynamics; none if the run has diverged.
     fn step(&mut self) -> Option<u64>;
     fn end_effector(&self) -> DVec2;
 }
@@ -94,7 +94,7 @@ pub(super) struct Beside<R, const N: usize> {
     truth_steps: u64,
     /// Steps of the run that are still to be taken.
     left: u64,
-    /// How far the end effectors may come apart \[m\]; beyond that nobody asks.
+    /// How far the end effectors may come apart \[m\]; the comparison ends beyond that.
     allowed: f64,
     apart: f64,
 }
@@ -111,8 +111,8 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
         }
     }
 
-    /// Goes on by a piece: the largest distance \[m\] once it is known, or known to be too large; infinite where
-    /// numbers have ended.
+    /// Goes on by a piece. Returns the largest distance \[m\] once it is known, or known to be too large; infinite if a
+    /// run has diverged.
     pub(super) fn advance(&mut self) -> Option<f64> {
         let mut work = 0;
         while self.left > 0 && self.apart <= self.allowed {
@@ -120,7 +120,7 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
                 return None;
             }
             let Some(more) = self.step() else {
-                // Nothing that goes on would be counted as work.
+                // A run that has diverged costs nothing, so the loop would not end.
                 self.left = 0;
                 self.apart = f64::INFINITY;
                 break;
@@ -148,10 +148,10 @@ impl<R: Steppable, const N: usize> Beside<R, N> {
 mod tests {
     use super::*;
 
-    /// A run whose numbers have ended, and which counts how often it is asked on.
-    struct Ended<'a>(&'a std::cell::Cell<u64>);
+    /// A run that has diverged, and counts how often it is asked on.
+    struct Diverged<'a>(&'a std::cell::Cell<u64>);
 
-    impl Steppable for Ended<'_> {
+    impl Steppable for Diverged<'_> {
         fn step(&mut self) -> Option<u64> {
             self.0.set(self.0.get() + 1);
             None
@@ -171,7 +171,7 @@ mod tests {
             velocity: [0.0; 2],
         };
         let truth = Truth::Free(FreeMotion::new(arm, start, 0.01, 1e-6));
-        let mut beside = Beside::new(Ended(&asked), 1_000_000, truth, 1, f64::INFINITY);
+        let mut beside = Beside::new(Diverged(&asked), 1_000_000, truth, 1, f64::INFINITY);
         assert_eq!(beside.advance(), Some(f64::INFINITY));
         assert_eq!(beside.advance(), Some(f64::INFINITY));
         assert_eq!(asked.get(), 1);

@@ -26,8 +26,8 @@ pub struct ContinuousLoop<const N: usize> {
 }
 
 impl<const N: usize> ContinuousLoop<N> {
-    /// One step; `false`, and nothing changes, if its result would not be finite. Integrals are stepped for up
-    /// to three joints; more are not, which is `false` too.
+    /// Takes a step. Returns `false`, and changes nothing, if the result would not be finite, or if integrals of more
+    /// than three joints would have to be stepped.
     pub fn step(&mut self) -> bool {
         let integrates = self.control.integrating().contains(&true);
         match N {

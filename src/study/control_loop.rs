@@ -119,7 +119,7 @@ pub const fn no_control<const N: usize>() -> Gains<N> {
     }
 }
 
-/// Whether the gains are all zero, so that on or off is the same.
+/// Whether the gains are all zero, so that the controller does nothing even when it is on.
 #[must_use]
 #[allow(
     clippy::float_cmp,

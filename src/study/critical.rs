@@ -1,7 +1,7 @@
 //! The motion that a loop loses first: the eigenvalue that leaves the unit circle at the limit, and the joint that
 //! moves with it.
 //!
-//! **Invariant:** bounded; none where something is not finite.
+//! **Invariant:** the work is bounded, and there is no answer where something is not finite.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +10,7 @@ use super::matrix::{Complex, Matrix, largest};
 use super::stability::{Modes, Sampling, Stepping};
 use crate::math::integrator::Method;
 
-/// How far beyond its limit a loop is looked at: at the limit itself nothing grows yet.
+/// The factor beyond its limit at which a loop is looked at: nothing grows at the limit itself.
 pub const BEYOND: f64 = 1.1;
 
 /// Steps of the inverse iteration; each brings the vector nearer by the ratio of two distances between eigenvalues.
@@ -56,7 +56,7 @@ pub(super) fn critical(linear: &Linear, method: Method, limit: f64) -> Option<Cr
 /// Source: Golub and Van Loan, *Matrix Computations* (2013), ch. 7.6, on inverse iteration.
 fn furthest(generator: &Matrix, mu: Complex, joints: usize) -> Option<usize> {
     let n = generator.size();
-    // A hair beside the eigenvalue, or there would be nothing to solve.
+    // The shift lies a hair beside the eigenvalue, where the matrix would be singular.
     let shift = mu.re + 1e-6 * mu.modulus();
     let shifted = Matrix::from_fn(n, |i, j| {
         generator[(i, j)] - if i == j { shift } else { 0.0 }

@@ -1,8 +1,8 @@
 //! Resting poses of an arm under its control law.
 //!
 //! Joints that integrate stay at the setpoint. The others go downhill on the potential of the arm and of its springs,
-//! `V = U + ½ kp (q - q*)² - c q`, and come to rest in one of its minima: a place without slope at which it curves down
-//! in some direction is a saddle, which a real arm leaves.
+//! `V = U + ½ kp (q - q*)² - c q`, and come to rest in one of its minima. A saddle, which has no slope either but
+//! curves down in some direction, is left, as a real arm leaves it.
 //!
 //! **Invariant:** whatever the arm and the gains, a pose is found in bounded time.
 
@@ -22,19 +22,19 @@ use crate::math::pid::{Gains, INTEGRAL_LIMIT, Setpoint};
 /// Newton steps before an equilibrium is given up. From a setpoint nearby five do.
 const MAX_NEWTON: usize = 200;
 
-/// Saddles that are left before the search is given up; an arm has no more of them one above the other.
+/// Saddles that are left before the search is given up; an arm has no more of them on one way down.
 const MAX_SADDLES: usize = 8;
 
 /// First length of a step that is trusted \[rad\]: within half a radian an arm's potential is not far from a parabola.
 const TRUSTED: f64 = 0.5;
 
-/// A step so short changes no angle any more \[rad\].
+/// A step shorter than this changes no angle \[rad\].
 const SMALLEST_TRUSTED: f64 = 1e-18;
 
 /// How far a saddle is left before going downhill again \[rad\]: a fall that stands out from rounding.
 const LEAVING: f64 = 1e-3;
 
-/// A sag that is none \[rad\]: some units of rounding of an angle of many turns.
+/// A sag that counts as none \[rad\]: some units of rounding of an angle of many turns.
 const BALANCED: f64 = 1e-9;
 
 /// Curvature, in parts of the largest, that rounding can feign.
@@ -168,7 +168,7 @@ impl<const N: usize> Descent<'_, N> {
             .fold(0.0, |max: f64, i| max.max(gradient[i].abs()))
     }
 
-    /// Downhill from no sag to a pose in which the arm rests, and whether no sag at all was an exact balance, from
+    /// Goes downhill from no sag to a pose in which the arm rests. Also says whether no sag was an exact balance, from
     /// which an arm falls to either side.
     fn settle(&self) -> ([f64; N], bool) {
         let mut sag = self.descend([0.0; N]);
@@ -186,8 +186,8 @@ impl<const N: usize> Descent<'_, N> {
         (sag, balanced)
     }
 
-    /// Downhill to where the slope ends, by Newton steps within a trusted radius. Along directions in which the
-    /// potential curves down, the step is turned about, so that it leads down there too.
+    /// Goes downhill to where the slope ends, by Newton steps within a trusted radius. Where the potential curves down,
+    /// the step is turned about, so that it leads down there too.
     ///
     /// Source: Nocedal and Wright, *Numerical Optimization* (2006), ch. 3.4 and 4.
     fn descend(&self, mut sag: [f64; N]) -> [f64; N] {
@@ -212,7 +212,7 @@ impl<const N: usize> Descent<'_, N> {
             } else if radius > SMALLEST_TRUSTED {
                 radius = 0.25 * radius.min(length);
             } else {
-                // As near as rounding lets it come, or nowhere to rest at all.
+                // This is as near as rounding lets it come, or there is no place to rest.
                 break;
             }
         }

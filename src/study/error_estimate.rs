@@ -30,7 +30,8 @@ pub struct ErrorEstimate {
     pub error_per_second: f64,
 }
 
-/// The error of the step that a simulation is about to take; `None` if that step is not finite, or a thing of the past.
+/// The error of the step that a simulation is about to take; `None` if that step is not finite, or if the simulation
+/// has diverged before.
 #[must_use]
 pub fn estimate<const N: usize>(simulation: &Simulation<N>) -> Option<ErrorEstimate> {
     if simulation.divergence().is_some() {
@@ -68,7 +69,7 @@ pub fn estimate_step<const N: usize>(
     } else {
         1.0
     };
-    // Differences of increments, not of states: a wound joint would drown them.
+    // Increments are compared, not states: in those of a wound joint the difference would drown.
     let off = |whole: &[f64; N], first: &[f64; N], second: &[f64; N]| {
         (0..N)
             .map(|i| (whole[i] - (first[i] + second[i])).abs() * whole_of)

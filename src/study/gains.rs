@@ -70,7 +70,7 @@ const STEPS_PER_PIECE: u64 = 1000;
 
 /// The demands on gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Wish {
+pub struct GainsRequirements {
     /// Time in which every move is to settle \[s\].
     pub settling_time: f64,
     /// How many timesteps the smallest timestep limit over all poses is to be.
@@ -120,7 +120,7 @@ pub enum GainsError {
 pub struct GainsSearch<const N: usize> {
     /// Arm, method and timestep; its gains are those that are being tried.
     control: ControlLoop<N>,
-    wish: Wish,
+    requirements: GainsRequirements,
     shape: usize,
     pace: f64,
     paces: u32,
@@ -154,18 +154,21 @@ impl<const N: usize> GainsSearch<N> {
     ///
     /// # Errors
     /// A settling time of too many steps.
-    pub fn new(control: &ControlLoop<N>, wish: Wish) -> Result<Self, GainsError> {
-        let steps = wish.settling_time / control.timestep;
+    pub fn new(
+        control: &ControlLoop<N>,
+        requirements: GainsRequirements,
+    ) -> Result<Self, GainsError> {
+        let steps = requirements.settling_time / control.timestep;
         if steps > MAX_STEPS {
             return Err(GainsError::TooManySteps { steps });
         }
         let mut search = Self {
             control: *control,
-            wish,
+            requirements,
             shape: 0,
             pace: 1.0,
             paces: 0,
-            stage: GainsStage::Done(Err(wish.not_found(control.timestep))),
+            stage: GainsStage::Done(Err(requirements.not_found(control.timestep))),
         };
         search.control.setpoint = Setpoint::default();
         search.begin_shape(0);
@@ -182,7 +185,7 @@ impl<const N: usize> GainsSearch<N> {
                 }
             }
             GainsStage::Moving(trial) => {
-                match trial.advance(&self.control, self.wish.settling_time) {
+                match trial.advance(&self.control, self.requirements.settling_time) {
                     None => {}
                     Some(None) => self.go_faster(),
                     Some(Some(settled_after)) => {
@@ -202,7 +205,7 @@ impl<const N: usize> GainsSearch<N> {
     /// Goes on to the moves if the limit leaves the margin. Where it does not, the loop is too fast, or its springs
     /// hardly hold the load: some faster paces tell.
     fn judge(&mut self, limit: Option<f64>, certified: bool) {
-        let least = self.wish.margin * self.control.timestep;
+        let least = self.requirements.margin * self.control.timestep;
         match limit {
             Some(0.0) => self.go_faster(),
             Some(limit) if limit < least && self.paces < SOFT_PACES => self.go_faster(),
@@ -238,7 +241,7 @@ impl<const N: usize> GainsSearch<N> {
             self.pace = self.slowest_pace();
             self.try_pace();
         } else {
-            self.stage = GainsStage::Done(Err(self.wish.not_found(self.control.timestep)));
+            self.stage = GainsStage::Done(Err(self.requirements.not_found(self.control.timestep)));
         }
     }
 
@@ -273,11 +276,11 @@ impl<const N: usize> GainsSearch<N> {
             let integrals = (2.0 * load[i].abs() / (INTEGRAL_LIMIT * ki[i])).cbrt();
             springs.max(integrals)
         });
-        largest(carries).max(DEFAULT_SETTLING / self.wish.settling_time)
+        largest(carries).max(DEFAULT_SETTLING / self.requirements.settling_time)
     }
 }
 
-impl Wish {
+impl GainsRequirements {
     fn not_found(self, timestep: f64) -> GainsError {
         GainsError::NotFound {
             settling_time: self.settling_time,

@@ -106,7 +106,8 @@ pub fn limits<const N: usize>(control: &ControlLoop<N>) -> Limits<N> {
     }
 }
 
-/// [`limits`], to be paused: no advance takes longer than a millisecond or so of one core (optimised build).
+/// A search for [`limits`] that can be paused: no advance takes longer than about a millisecond of one core (optimised
+/// build).
 #[derive(Debug, Clone)]
 pub struct LimitSearch<const N: usize> {
     control: ControlLoop<N>,
@@ -155,7 +156,7 @@ impl<const N: usize> LimitSearch<N> {
         }
     }
 
-    /// Goes on by one piece; the limits, once they are all found.
+    /// Goes on by one piece. Returns the limits once they are all found.
     pub fn advance(&mut self) -> Option<Limits<N>> {
         let method = self.control.method;
         let limits = &mut self.limits;
@@ -163,7 +164,7 @@ impl<const N: usize> LimitSearch<N> {
             LimitStage::Setpoint => LimitStage::Held(self.settle()),
             LimitStage::Held(linear) => {
                 limits.held = largest_timestep(&linear, method, Sampling::Held);
-                // A joint that nothing draws back drifts; what is stable at some timestep does not run away.
+                // A joint that nothing draws back drifts, but a loop that is stable at some timestep does not run away.
                 if limits.held == Some(0.0) && Modes::of(&linear).run_away() {
                     limits.rest = Rest::Unstable;
                 }
@@ -211,8 +212,7 @@ impl<const N: usize> LimitSearch<N> {
         linear
     }
 
-    /// Compares what is proven with the limit in the worst pose of the proof; where they agree there is nothing to
-    /// search.
+    /// Compares the proven limit with that in the worst pose of the proof. If they agree there is nothing to search.
     fn compare(&mut self, proven: Option<Proven<N>>) -> LimitStage<N> {
         let control = &self.control;
         let mut found = (self.limits.held, Judged::as_it_is(self.limits.equilibrium));
@@ -233,7 +233,7 @@ impl<const N: usize> LimitSearch<N> {
         }
         self.limits.bound = Some(timestep);
         if self.limits.held == Some(0.0) {
-            // Beside rates a trillion times their own, slow modes seem to grow by rounding alone. A proof does not
+            // Rounding alone can make slow modes seem to grow beside rates a trillion times their own. A proof does not
             // round.
             self.limits.held = Some(timestep);
             self.limits.rest = self.at_rest;
@@ -245,7 +245,7 @@ impl<const N: usize> LimitSearch<N> {
         search(Sampling::Held, found)
     }
 
-    /// Takes in the smallest limit over all poses, and goes on with the next search, if there is one.
+    /// Notes the smallest limit over all poses, and goes on with the next search, if there is one.
     fn conclude(
         &mut self,
         sampling: Sampling,
@@ -274,19 +274,19 @@ impl<const N: usize> LimitSearch<N> {
     }
 }
 
-/// Whether a proven bound and the smallest limit found are one. A limit may fall short of the bound by what the growth
-/// that counts makes of it.
+/// Whether a proven bound and the smallest limit found agree. The limit may fall short of the bound a little, since
+/// growth counts only from some size on.
 fn agree(bound: f64, least: f64) -> bool {
     (least / bound - 1.0).abs() <= AGREEMENT
 }
 
-/// [`Limits::held`] alone: what the live arm is up against at its present setpoint. Half a millisecond of one core for
-/// two links, one for three (optimised build).
+/// The limit [`Limits::held`] alone, for the live arm at its present setpoint. Half a millisecond of one core for two
+/// links, one for three (optimised build).
 #[must_use]
 pub fn limit_held<const N: usize>(control: &ControlLoop<N>) -> Option<f64> {
     let linear = Linear::at_setpoint(control);
     match largest_timestep(&linear, control.method, Sampling::Held) {
-        // As in the search for all limits.
+        // This is as in the search for all limits.
         Some(0.0) => Proof::new(control)
             .and_then(|mut proof| proof.advance(BOXES))
             .map_or(Some(0.0), |proven| Some(proven.timestep)),

@@ -85,7 +85,7 @@ impl Linear {
         Self::at(control, &rest.position, &rest.integrating)
     }
 
-    /// The loop at any pose, every integral moving.
+    /// The loop at any pose, with every integral moving.
     #[must_use]
     pub fn at_pose<const N: usize>(control: &ControlLoop<N>, position: &[f64; N]) -> Self {
         Self::at(control, position, &control.integrating())
@@ -103,7 +103,7 @@ impl Linear {
         }
     }
 
-    /// The same loop without gravity.
+    /// The loop without gravity.
     #[must_use]
     pub fn weightless(mut self) -> Self {
         self.gravity = Matrix::zeros(self.gravity.size());

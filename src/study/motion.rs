@@ -1,7 +1,7 @@
-//! The largest timestep that a motion bears: what linearisation about a pose at rest knows nothing of.
+//! The largest timestep that a motion bears, which linearisation about a pose at rest can't tell.
 //!
 //! A method that cannot follow a turn within a step feeds energy into the arm, which turns faster still, and so on
-//! until numbers end. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
+//! until the run diverges. When that begins depends on the angle turned in a step alone: `h Ω`, with Ω the speed of the
 //! fastest link. [`turn_per_step`] is what every method was seen to carry.
 //!
 //! | motion | speed Ω assumed |
@@ -17,7 +17,7 @@
 //! these angles, and half of them bore two and a half times as much. On moves of up to 25 rad a joint with gains of all
 //! dampings the speed assumed was 0.5 to 2.9 times the true one.
 //!
-//! **Invariant:** pure and cheap, some 3 µs: it is asked for at every tick that somebody hears of.
+//! **Invariant:** pure and cheap, some 3 µs, since every published tick asks for it.
 //!
 //! [`turn_per_step`]: crate::math::integrator::Method::turn_per_step
 
@@ -71,7 +71,7 @@ impl Motion {
         } else {
             by_energy
         };
-        // NaN, of an arm too extreme to compute with, limits nothing.
+        // An arm too extreme to compute with gives NaN, which limits nothing.
         let timestep = method.turn_per_step() / speed;
         if speed > 0.0 && timestep > 0.0 {
             Self { speed, timestep }

@@ -5,10 +5,10 @@
 //! | an arm left to itself | its motion |
 //! | an arm under control | the loop whose law acts at every instant ([`ContinuousLoop`]): holding is an error |
 //!
-//! The truth is followed with ever smaller steps, that of an arm left to itself within ever smaller tolerances, until
-//! two of them agree to a part of the allowed error. Then each method is run beside it as the live arm runs it, with
-//! ever smaller steps until it is within the rest after each of them, and a little larger again by bisection. The
-//! cheapest run, in evaluations of the dynamics, is the plan: it has been run, and its error is that which was seen. A
+//! The truth is followed with ever smaller steps, or, for an arm left to itself, within ever smaller tolerances, until
+//! two truths agree to a part of the allowed error. Then each method is run beside the truth, as the live arm runs it.
+//! Its steps are made smaller until it stays within the rest of the error after each of them, and then larger again by
+//! bisection. The cheapest run, in evaluations of the dynamics, is the plan, and its error is the one that was seen. A
 //! run that could only be dearer than another is not made.
 //!
 //! On the live arm the control period is the timestep. Under control no timestep is planned beyond what is advised for
@@ -44,13 +44,13 @@ const MAX_STEPS: u64 = 4_000_000;
 /// The part of the allowed error that the truth itself may be off by.
 const PART_OF_TRUTH: f64 = 0.05;
 
-/// The next tolerance's part of one that was too large: two digits more, for less than half as much work again.
+/// A tolerance that was too large is multiplied by this: two digits more cost less than half as much work again.
 const FINER: f64 = 0.01;
 
 /// The motion to be planned.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Task<const N: usize> {
-    /// The loop; its method and timestep are what is looked for. Gains of zero: an arm left to itself.
+    /// The loop; its method and timestep are looked for. Gains of zero mean an arm left to itself.
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
     pub start: State<N>,
@@ -119,7 +119,7 @@ pub struct Planning<const N: usize> {
     task: Task<N>,
     /// The longest timestep \[s\], a whole part of the duration; others are whole parts of it.
     longest: f64,
-    /// Steps of that length.
+    /// Number of steps of that length.
     fewest: u64,
     /// How finely the truth is followed.
     fineness: Fineness,
@@ -133,7 +133,7 @@ pub struct Planning<const N: usize> {
 /// How finely a truth is followed.
 #[derive(Debug, Clone, Copy)]
 enum Fineness {
-    /// With so many steps in the longest.
+    /// Each longest timestep is cut into so many steps.
     Steps(u64),
     /// Within a tolerance.
     Tolerance(f64),
@@ -152,12 +152,12 @@ impl Fineness {
 enum PlanStage<const N: usize> {
     Comparing(Box<Beside<Truth<N>, N>>),
     Limiting(Method, Box<LimitSearch<N>>),
-    /// With so many steps in the longest.
+    /// Each longest timestep is cut into so many steps.
     Running(Bracket, u64, Box<Beside<Simulation<N>, N>>),
     Done(Result<Planned, PlanError>),
 }
 
-/// Steps in the longest: too few, and enough once they are known.
+/// Numbers of steps in the longest timestep: one that is too few, and one that is enough, once it is known.
 #[derive(Debug, Clone, Copy)]
 struct Bracket {
     method: Method,
@@ -183,10 +183,10 @@ impl<const N: usize> Planning<N> {
         }
         let fewest = whole(duration / LONGEST).max(whole(FEWEST_STEPS));
         let fineness = if task.control.is_free() {
-            // So much of half a turn moves the end effector of the stretched arm by the part of the error.
+            // This part of half a turn moves the end effector of the stretched arm by the truth's part of the error.
             let reach = task.control.arm.reach();
             let tolerance = PART_OF_TRUTH * task.error / (PI * reach);
-            // The one that it is compared with first must be finer.
+            // The truth that it is first compared with must be finer.
             Fineness::Tolerance(tolerance.max(ROUNDING / FINER))
         } else {
             Fineness::Steps(4)
@@ -207,7 +207,7 @@ impl<const N: usize> Planning<N> {
         Ok(planning)
     }
 
-    /// Goes on by one piece; the plan, once it is made.
+    /// Goes on by one piece. Returns the plan once it is made.
     pub fn advance(&mut self) -> Option<Result<Planned, PlanError>> {
         match &mut self.stage {
             PlanStage::Done(answer) => return Some(answer.clone()),
@@ -233,7 +233,8 @@ impl<const N: usize> Planning<N> {
         None
     }
 
-    /// The truth so finely followed, and its steps in one of a run that takes so many `steps` in the longest.
+    /// The truth, followed so finely, and how many of its steps make one of a run. The run takes `steps` steps in the
+    /// longest timestep.
     fn truth(&self, fineness: Fineness, steps: u64) -> (Truth<N>, u64) {
         let Task { control, start, .. } = self.task;
         match fineness {
@@ -255,7 +256,7 @@ impl<const N: usize> Planning<N> {
         }
     }
 
-    /// Begins to compare the truth with the one that is followed more finely.
+    /// Begins to compare the truth with one that is followed more finely.
     fn compare_truths(&mut self) {
         let steps = match self.fineness {
             Fineness::Steps(steps) => steps,
@@ -267,7 +268,7 @@ impl<const N: usize> Planning<N> {
         self.stage = PlanStage::Comparing(Box::new(truths));
     }
 
-    /// Goes on with the finer of two truths that came so far apart \[m\], if that is near enough or can't be nearer.
+    /// Goes on with the finer of two truths that came so far apart \[m\], if they are near enough or can't come nearer.
     fn judge_truths(&mut self, apart: f64) {
         if apart.is_finite() {
             self.uncertainty = apart;
@@ -321,7 +322,7 @@ impl<const N: usize> Planning<N> {
         self.run(bracket, steps);
     }
 
-    /// Runs a method with so many steps in the longest, unless there is a cheaper candidate already.
+    /// Runs a method with so many steps in the longest timestep, unless there is a cheaper candidate already.
     fn run(&mut self, bracket: Bracket, steps: u64) {
         let Bracket { method, .. } = bracket;
         let all = steps.saturating_mul(self.fewest);
@@ -374,7 +375,7 @@ impl<const N: usize> Planning<N> {
     }
 }
 
-/// How well a motion is known of which two truths differ by so much.
+/// Says how well a motion is known if two truths differ by so much.
 fn known(uncertainty: f64) -> String {
     if uncertainty.is_finite() {
         format!("the motion itself can only be known to {uncertainty:.1e} m for so long")

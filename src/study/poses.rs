@@ -2,7 +2,7 @@
 //!
 //! Inertia depends on every joint but the first, the pull of gravity on all of them. At every pose of a grid over the
 //! outer joints the loop is judged without gravity, and, where there is gravity, at a ring of first joints with it.
-//! Then the poses between are looked for: from every cell of the grid that stands out among its neighbours, uphill on
+//! Then the poses in between are searched: a climb from every cell that stands out among its neighbours goes uphill on
 //! the growth at the smallest limit so far. Wherever something grows, that pose has a smaller limit. Poses that gravity
 //! makes run away even in continuous time say nothing about timesteps and are left out; without gravity they count,
 //! since then it is the gains that run away.
@@ -65,7 +65,7 @@ impl<const N: usize> Judged<N> {
     }
 }
 
-/// Uphill on the growth, one look a move.
+/// A climb uphill on the growth, one judgement a move.
 #[derive(Debug, Clone, Copy)]
 struct Climb<const N: usize> {
     at: Judged<N>,
@@ -80,7 +80,7 @@ struct Climb<const N: usize> {
 #[derive(Debug, Clone)]
 enum PoseStage<const N: usize> {
     Grid(usize),
-    /// The growth of every cell at the smallest limit, where it is largest.
+    /// The largest growth of every cell at the smallest limit.
     Rating(usize, Vec<(Judged<N>, f64)>),
     Climbing(Vec<Judged<N>>, Option<Climb<N>>),
     Done,
@@ -233,9 +233,9 @@ impl<const N: usize> PoseSearch<N> {
         }
     }
 
-    /// One move of a climb; none once it is at its top.
+    /// Makes one move of a climb; none once it is at its top.
     fn climb(&mut self, mut climb: Climb<N>) -> Option<Climb<N>> {
-        // The first joint counts only where something weighs.
+        // The first joint counts only where there is gravity.
         let first = usize::from(!climb.at.weighs);
         let directions = 2 * N.saturating_sub(first);
         if climb.stride < SMALLEST_STRIDE || climb.moves >= MAX_MOVES || directions == 0 {
@@ -295,7 +295,7 @@ fn summits<const N: usize>(cells: &[(Judged<N>, f64)]) -> Vec<Judged<N>> {
         .collect()
 }
 
-/// Poses of the outer joints: all of the grid, or, beyond three links, as many as there may be.
+/// Number of poses of the outer joints: all of the grid, or the most allowed beyond three links.
 fn cells<const N: usize>() -> (usize, usize) {
     let half = grid::<N>() / 2 + 1;
     let outer = u32::try_from(N.saturating_sub(2)).unwrap_or(u32::MAX);

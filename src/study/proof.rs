@@ -29,7 +29,7 @@
 //! matrices mix (`P₂` loses its sign for one joint before the loop is unstable), and it is only safe.
 //!
 //! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 7, on quadratic forms of a pencil; Lawler and
-//! Wood, *Branch-and-bound methods* (1966), on the search. Putting the two together is our own.
+//! Wood, *Branch-and-bound methods* (1966), on the search. Their combination is our own.
 //!
 //! **Invariant:** whenever the search ends, its bound holds; boxes are bounded.
 
@@ -49,16 +49,16 @@ use crate::math::dynamics::{coupling, mass_matrix, weight_moment};
 use crate::math::integrator::Method;
 use crate::math::pid::Gains;
 
-/// How near the bound comes to the least pose's own: half of the 1 % that is promised.
+/// How near the bound comes to the limit of the worst pose: half of the 1 % that is promised.
 const SHARPNESS: f64 = 0.004;
 
-/// Boxes that are cut before the search ends with what it has: some 50 ms of one core (optimised build).
+/// Boxes that are cut before the search ends with the bound so far: some 50 ms of one core (optimised build).
 const MAX_BOXES: u32 = 20_000;
 
 /// Halvings of an interval of timesteps.
 const HALVINGS: u32 = 60;
 
-/// Where gravity's part in a stage is larger than this, nothing is proven.
+/// Nothing is proven if gravity's part in a stage is larger than this.
 const LARGEST_STAGE: f64 = 0.01;
 
 /// Parts of the timesteps in which two factors that both fall are bounded apart.
@@ -83,7 +83,7 @@ pub(super) struct Proof<const N: usize> {
     weight: [f64; N],
     /// The largest timestep that all but the poses allow \[s\].
     cap: f64,
-    /// The least that a pose allows of those looked at \[s\], and that pose.
+    /// The least timestep that any pose so far allows \[s\], and that pose.
     least: Proven<N>,
     boxes: BinaryHeap<Angles<N>>,
     cut: u32,
@@ -92,7 +92,7 @@ pub(super) struct Proof<const N: usize> {
 /// A box of joint angles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Angles<const N: usize> {
-    /// Proven for every pose in it \[s\].
+    /// The timestep that is proven for every pose in it \[s\].
     bound: f64,
     middle: [f64; N],
     half: [f64; N],
@@ -148,7 +148,7 @@ impl<const N: usize> Proof<N> {
         Some(proof)
     }
 
-    /// Cuts up to `boxes` boxes; the proven timestep once it is as sharp as it can be.
+    /// Cuts up to `boxes` boxes. Returns the proven timestep once it is as sharp as it can be.
     pub(super) fn advance(&mut self, boxes: u32) -> Option<Proven<N>> {
         for _ in 0..boxes {
             let Some(first) = self.boxes.peek().copied() else {
@@ -287,7 +287,7 @@ impl<const N: usize> Proof<N> {
     /// The largest timestep that springs, damping and integrals allow, whatever the pose \[s\].
     fn largest_for_gains(&self) -> Option<f64> {
         let Gains { kp, ki, kd } = &self.gains;
-        // A weight that is not a number, as of springs without any strength, is not less than a gain.
+        // A weight that is not a number, as springs without any strength have it, is not less than a gain.
         if !(0..N).all(|j| kp[j] > self.weight[j] && kd[j] > 0.0) {
             return None;
         }
@@ -307,8 +307,8 @@ impl<const N: usize> Proof<N> {
         (cap > 0.0 && cap.is_finite()).then_some(cap)
     }
 
-    /// As far as `P₁ P₂ > P₃ P₀` for all shorter timesteps too: in every part, the factors that fall are taken at its
-    /// end and P₃, which falls too, at its beginning.
+    /// The largest timestep up to which `P₁ P₂ > P₃ P₀` holds. Each part of the way is tried at its worst: falling
+    /// factors of P₁ P₂ are taken at its end, and P₃, which falls too, at its beginning.
     fn largest_for_integrals(&self, end: f64) -> f64 {
         let stretched = mass_matrix(&self.arm, &[0.0; N]);
         let mass: [f64; N] = dominating(|i, j| stretched[i][j], |j| stretched[j][j]);
@@ -339,7 +339,7 @@ impl<const N: usize> Proof<N> {
     }
 }
 
-/// The largest of the timesteps up to `end` at which it holds, of something that holds up to some timestep.
+/// The largest timestep up to `end` at which `holds` does; it does so up to some timestep and not beyond.
 fn largest(end: f64, holds: impl Fn(f64) -> bool) -> f64 {
     if holds(end) {
         return end;

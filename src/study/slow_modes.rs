@@ -10,7 +10,7 @@
 //!
 //! Source: Lancaster, *Lambda-Matrices and Vibrating Systems* (1966), ch. 5.
 //!
-//! **Invariant:** bounded work; a mode that does not settle says nothing.
+//! **Invariant:** the work is bounded, and a mode that does not converge counts for nothing.
 
 #![allow(
     clippy::indexing_slicing,
@@ -27,10 +27,10 @@ const SLOWER: f64 = 1e-4;
 /// apart from others.
 const GROWTH: f64 = 1e-9;
 
-/// Rounds of Newton's rule: begun with two right digits it takes five.
+/// Rounds of Newton's rule, which takes five if two digits are right at the start.
 const ROUNDS: u32 = 30;
 
-/// A mode has settled if it moves by no more than this part of itself.
+/// A mode has converged if it moves by no more than this part of itself.
 const SETTLED: f64 = 1e-12;
 
 /// Whether a mode grows that is slow beside the fastest `rate` \[1/s\], and whose growth is less than `doubtful`
@@ -108,7 +108,7 @@ fn settled(linear: &Linear, guess: Complex) -> Option<Complex> {
     for _ in 0..ROUNDS {
         let step = slope(linear, mode)?.reciprocal();
         mode = mode - step;
-        // Not finite never settles.
+        // A value that is not finite never converges.
         if step.modulus() <= SETTLED * mode.modulus() {
             return Some(mode);
         }

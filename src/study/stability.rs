@@ -38,7 +38,8 @@ pub(super) const NEUTRAL: f64 = 1e-11;
 /// under Euler (1e-3) and midpoint (2.5e-10).
 const SEARCH_START: f64 = 1e-3;
 
-/// Until here the search doubles the timestep: so far below the fast mode's own limit only slow, regular things happen.
+/// Up to here the search doubles the timestep: so far below the fast mode's own limit growth changes slowly and
+/// regularly.
 const SEARCH_FINE: f64 = 0.1;
 
 /// Step of the search beyond, as a factor: an unstable window narrower than this may be missed.
@@ -47,10 +48,10 @@ const SEARCH_STEP: f64 = 1.05;
 /// End of the search. No explicit method reaches beyond 3.
 const SEARCH_END: f64 = 30.0;
 
-/// When the control law looks at the state.
+/// When the control law is evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Sampling {
-    /// Once a step; the effort is held through all of the step's stages. What the live arm does.
+    /// Once a step; the effort is held through all of its stages, as the live arm does it.
     Held,
     /// In every stage, as if the law were part of the arm.
     Continuous,
@@ -77,7 +78,7 @@ pub fn largest_timestep(linear: &Linear, method: Method, sampling: Sampling) -> 
     stepping.search(&Modes::of(linear))
 }
 
-/// As [`largest_timestep`] with the effort held over `substeps` steps of the method: the limit of the control period.
+/// The largest stable control period \[s\] if the effort is held over `substeps` steps of the method.
 #[must_use]
 pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
     let stepping = Stepping {
@@ -87,8 +88,8 @@ pub fn largest_period(linear: &Linear, method: Method, substeps: u32) -> Option<
     stepping.search(&Modes::of(linear))
 }
 
-/// As [`largest_period`] with every effort acting one period late, as a bus or a slow controller would have it. There
-/// is no integral in it.
+/// The largest stable control period \[s\] if every effort acts one period late, as over a bus or with a slow
+/// controller. There is no integral in it.
 #[must_use]
 pub fn largest_delayed_period(linear: &Linear, method: Method, substeps: u32) -> Option<f64> {
     let stepping = Stepping {
@@ -230,7 +231,7 @@ impl<'a> Stepping<'a> {
         Matrix::zeros(size).plus(1.0 / f64::from(self.substeps), &sum)
     }
 
-    /// The law, once a period: `s ↦ s - T x`, then `u = -kp x - kd v + ki s` held.
+    /// The law acts once a period: `s ↦ s - T x`, then `u = -kp x - kd v + ki s` held.
     fn close(&self, arm: &Matrix, period: f64) -> Matrix {
         let linear = self.linear;
         let n = linear.joints();
@@ -253,7 +254,7 @@ impl<'a> Stepping<'a> {
         closed
     }
 
-    /// The law, once a period, for the period after: efforts are states, `u ↦ -kp x - kd v`.
+    /// The law acts once a period, for the next period: efforts are states, `u ↦ -kp x - kd v`.
     fn close_late(&self, mut arm: Matrix, period: f64) -> Matrix {
         let n = self.linear.joints();
         for j in 0..n {
@@ -288,20 +289,21 @@ impl<'a> Stepping<'a> {
         self.growth(period) <= NEUTRAL
     }
 
-    /// Upward from far below the fastest time constant to the first unstable period, then bisection.
+    /// Goes up from far below the fastest time constant to the first unstable period, then bisects.
     pub(super) fn search(&self, modes: &Modes) -> Option<f64> {
         let rate = modes.rate;
         if rate == 0.0 {
             return None;
         }
-        // At timesteps that the fast modes bear, a step is as good as an instant to the slow ones.
+        // At timesteps that the fast modes bear, the slow ones do not notice the length of a step.
         if modes.slow_growth && !self.delayed {
             return Some(0.0);
         }
         let start = SEARCH_START / rate;
         if !self.is_stable(start) {
-            // Almost no damping may still carry periods a thousand times shorter. It must show as decay there: what
-            // only seems neutral is growth too small to see, as of an undamped swing under midpoint.
+            // A loop with almost no damping may still be stable at periods a thousand times shorter. It must show decay
+            // there: a loop that only seems neutral may grow too slowly to be seen, as an undamped swing does under
+            // midpoint.
             let tiny = 1e-3 * start;
             return if self.growth(tiny) < -NEUTRAL {
                 Some(self.bisect(tiny, start))

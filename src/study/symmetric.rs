@@ -12,7 +12,7 @@
 /// A symmetric matrix, row by row.
 pub(super) type Symmetric<const N: usize> = [[f64; N]; N];
 
-/// Sweeps over all pairs: convergence is quadratic, five do.
+/// Sweeps over all pairs; convergence is quadratic, so that five are enough.
 const SWEEPS: usize = 20;
 
 /// Eigenvalues, each with its unit vector, in no particular order.
@@ -65,7 +65,7 @@ pub(super) fn is_positive<const N: usize>(matrix: &Symmetric<N>) -> bool {
                 *entry -= factor * above;
             }
         }
-        // NaN is not above zero either.
+        // This refuses NaN too.
         pivot[k] > 0.0 && pivot[k].is_finite()
     })
 }

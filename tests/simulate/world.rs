@@ -236,7 +236,7 @@ where
     let goals = GoalClient {
         send: action.clone().recipient(),
         cancel: action.clone().recipient(),
-        settle: action.recipient(),
+        barrier: action.recipient(),
     };
     let rng = fastrand::Rng::with_seed(seed);
     let trial = IkTrial::<N>::new(arm.recipient(), goals, publish, rng).start();

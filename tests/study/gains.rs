@@ -5,14 +5,16 @@ use std::f64::consts::TAU;
 use pendularm::math::arm::{Arm, State};
 use pendularm::math::pid::{Gains, Setpoint};
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::gains::{GainsError, GainsSearch, SETTLED, SuggestedGains, Wish};
+use pendularm::study::gains::{
+    GainsError, GainsRequirements, GainsSearch, SETTLED, SuggestedGains,
+};
 use pendularm::study::stability::limits;
 
 fn find<const N: usize>(
     control: &ControlLoop<N>,
-    wish: Wish,
+    requirements: GainsRequirements,
 ) -> Result<SuggestedGains<N>, GainsError> {
-    let mut search = GainsSearch::new(control, wish)?;
+    let mut search = GainsSearch::new(control, requirements)?;
     loop {
         if let Some(answer) = search.advance() {
             return answer;
@@ -45,7 +47,7 @@ fn settles_after<const N: usize>(
 /// The default gains never settle a heavy arm, and are unstable on a light one.
 #[test]
 fn arms_that_the_default_gains_fail_get_gains_of_their_own() {
-    let wish = Wish {
+    let requirements = GainsRequirements {
         settling_time: 4.0,
         margin: 1.25,
     };
@@ -60,7 +62,7 @@ fn arms_that_the_default_gains_fail_get_gains_of_their_own() {
             !stable || settles_after(&shipped, &mut rng, 4.0) > 4.0,
             "{length} m"
         );
-        let found = find(&shipped, wish).unwrap();
+        let found = find(&shipped, requirements).unwrap();
         let control = ControlLoop {
             gains: found.gains,
             ..shipped
@@ -73,16 +75,16 @@ fn arms_that_the_default_gains_fail_get_gains_of_their_own() {
 #[test]
 fn what_cannot_be_had_is_refused_with_its_reason() {
     let slow = ControlLoop::free(Arm::<2>::default()).with_timestep(0.5);
-    let wish = Wish {
+    let requirements = GainsRequirements {
         settling_time: 4.0,
         margin: 2.0,
     };
-    let why = find(&slow, wish).unwrap_err().to_string();
+    let why = find(&slow, requirements).unwrap_err().to_string();
     assert!(
         why.contains("within 4 s") && why.contains("margin of 2"),
         "{why}"
     );
     let tiny = ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6);
-    let why = find(&tiny, wish).unwrap_err();
+    let why = find(&tiny, requirements).unwrap_err();
     assert_eq!(why, GainsError::TooManySteps { steps: 4.0 / 1e-6 });
 }

@@ -15,7 +15,7 @@ use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate_step;
 use pendularm::study::follower::Follower;
 use pendularm::study::motion::Motion;
-use pendularm::study::rollout::{Plan, Rollout};
+use pendularm::study::rollout::{Rollout, RolloutRequest};
 use pendularm::study::stability::{Rest, limit_held, limits};
 
 fn default_at<const N: usize>(setpoint: [f64; N]) -> ControlLoop<N>
@@ -205,14 +205,14 @@ fn free_arms_leave_the_numbers_where_they_did_and_are_advised_less_now() {
 }
 
 fn swing_error(start: State<2>, timestep: f64, duration: f64) -> (Option<f64>, f64, f64) {
-    let plan = Plan {
+    let request = RolloutRequest {
         control: ControlLoop::free(Arm::default()).with_timestep(timestep),
         start,
         duration,
         samples: 101,
         reference: true,
     };
-    let mut rollout = Rollout::new(plan).unwrap();
+    let mut rollout = Rollout::new(request).unwrap();
     while rollout.advance(u64::MAX) > 0 {}
     let deviation = rollout.deviation().unwrap();
     let mut before = 0.0;
@@ -220,7 +220,7 @@ fn swing_error(start: State<2>, timestep: f64, duration: f64) -> (Option<f64>, f
         .iter()
         .map(|time| time - std::mem::replace(&mut before, *time))
         .collect();
-    let truth = ReferenceMotion::between(&plan.control.arm, &start, &Law::FREE, &intervals);
+    let truth = ReferenceMotion::between(&request.control.arm, &start, &Law::FREE, &intervals);
     let off = (0..truth.len()).map(|index| {
         let position = &rollout.positions()[index + 1];
         truth.angle_error(index, position).unwrap()

@@ -7,10 +7,10 @@ use pendularm::math::simulation::Simulation;
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::{estimate, estimate_step};
 use pendularm::study::follower::Follower;
-use pendularm::study::rollout::{MAX_SAMPLES, Plan, Rollout, RolloutError};
+use pendularm::study::rollout::{MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
 
-fn swing() -> Plan<2> {
-    Plan {
+fn swing() -> RolloutRequest<2> {
+    RolloutRequest {
         control: ControlLoop::free(Arm::default()).with_timestep(0.01),
         start: State {
             position: [0.4, -0.3],
@@ -22,21 +22,21 @@ fn swing() -> Plan<2> {
     }
 }
 
-fn reach() -> Plan<2> {
+fn reach() -> RolloutRequest<2> {
     let gains = Gains {
         kp: [200.0, 100.0],
         ki: [20.0, 10.0],
         kd: [30.0, 12.0],
     };
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::at([1.0, -0.5]));
-    Plan {
+    RolloutRequest {
         control: control.with_timestep(0.01),
         ..swing()
     }
 }
 
-fn run<const N: usize>(plan: Plan<N>) -> Rollout<N> {
-    let mut rollout = Rollout::new(plan).unwrap();
+fn run<const N: usize>(request: RolloutRequest<N>) -> Rollout<N> {
+    let mut rollout = Rollout::new(request).unwrap();
     while rollout.advance(u64::MAX) > 0 {}
     assert!(rollout.is_over());
     rollout
@@ -48,13 +48,13 @@ fn run<const N: usize>(plan: Plan<N>) -> Rollout<N> {
 fn halving_the_timestep_divides_the_error_by_two_to_the_order() {
     for method in Method::ALL {
         let order = f64::from(method.order());
-        for plan in [swing(), reach()] {
+        for request in [swing(), reach()] {
             // Euler is unstable enough on a swing to need small steps for its slope.
             let timestep = if method == Method::Euler { 1e-4 } else { 2e-3 };
             // With control every timestep is another loop: its own reference each.
             let error = |timestep| {
-                let control = plan.control.with_method(method).with_timestep(timestep);
-                let rollout = run(Plan { control, ..plan });
+                let control = request.control.with_method(method).with_timestep(timestep);
+                let rollout = run(RolloutRequest { control, ..request });
                 rollout.deviation().unwrap().largest()
             };
             let slope = (error(timestep) / error(0.5 * timestep)).log2();
@@ -72,12 +72,12 @@ fn the_references_agree_to_rounding() {
         kd: [1e3; 2],
     };
     let control = ControlLoop::new(Arm::default(), stiff, Setpoint::at([1.0, -0.5]));
-    let stiff = Plan {
+    let stiff = RolloutRequest {
         control: control.with_timestep(1e-4),
         ..swing()
     };
-    for plan in [swing(), reach(), stiff] {
-        let rollout = run(plan);
+    for request in [swing(), reach(), stiff] {
+        let rollout = run(request);
         let deviation = rollout.deviation().unwrap();
         assert_eq!(deviation.uncertainties.len(), 11);
         let uncertainty = deviation.largest_uncertainty();
@@ -95,14 +95,14 @@ fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
         velocity: [0.0; 2],
     };
     let deviation = |timestep, start, duration| {
-        let plan = Plan {
+        let request = RolloutRequest {
             control: swing().control.with_timestep(timestep),
             start,
             duration,
             samples: 101,
             ..swing()
         };
-        run(plan).deviation().unwrap().clone()
+        run(request).deviation().unwrap().clone()
     };
     let tiny = deviation(1e-5, from_rest, 5.0);
     assert!(tiny.largest() > 0.0 && tiny.largest_uncertainty() > 0.0);
@@ -129,11 +129,11 @@ fn an_error_of_one_size_with_its_uncertainty_is_not_known() {
 /// A method of order 4 at a tiny step and a power series are two ways to one end.
 #[test]
 fn the_reference_is_what_small_steps_tend_to() {
-    let plan = Plan {
+    let request = RolloutRequest {
         control: swing().control.with_timestep(1e-4),
         ..swing()
     };
-    let error = run(plan).deviation().unwrap().largest();
+    let error = run(request).deviation().unwrap().largest();
     // (w h)^4 with w of some 5/s is 6e-14; what is left is rounding.
     assert!(error < 1e-13, "{error:e}");
 }
@@ -141,12 +141,12 @@ fn the_reference_is_what_small_steps_tend_to() {
 /// The run is the live loop.
 #[test]
 fn a_run_is_the_simulation_bit_for_bit() {
-    let plan = reach();
-    let rollout = run(plan);
-    let mut live = Simulation::new(plan.control.arm, plan.control.gains);
-    live.set_timestep(plan.control.timestep);
-    live.set_state(plan.start);
-    live.set_setpoint(plan.control.setpoint);
+    let request = reach();
+    let rollout = run(request);
+    let mut live = Simulation::new(request.control.arm, request.control.gains);
+    live.set_timestep(request.control.timestep);
+    live.set_state(request.start);
+    live.set_setpoint(request.control.setpoint);
     live.enable(true);
     for k in 1..=10 {
         live.advance(10);
@@ -160,9 +160,9 @@ fn a_run_is_the_simulation_bit_for_bit() {
 
 #[test]
 fn a_run_in_slices_gives_the_same_bits_as_one_made_at_once() {
-    for plan in [swing(), reach()] {
-        let whole = run(plan);
-        let mut sliced = Rollout::new(plan).unwrap();
+    for request in [swing(), reach()] {
+        let whole = run(request);
+        let mut sliced = Rollout::new(request).unwrap();
         let mut slices = 0;
         while sliced.advance(100) > 0 {
             slices += 1;
@@ -179,8 +179,8 @@ fn a_slice_is_as_short_as_it_is_asked_to_be_however_wild_the_motion() {
     const WORK: u64 = 1000;
     // A step of the run and one of each reference: 4 evaluations, and twice 22 coefficients.
     const LOOK: u64 = 4 + 2 * 22;
-    for plan in [swing(), reach()] {
-        let mut wild = plan;
+    for request in [swing(), reach()] {
+        let mut wild = request;
         wild.control.timestep = 0.5;
         wild.duration = 20.0;
         wild.start.velocity = wild.start.velocity.map(|_| 40.0);
@@ -206,7 +206,7 @@ fn a_slice_is_as_short_as_it_is_asked_to_be_however_wild_the_motion() {
 
 #[test]
 fn samples_are_spread_evenly_over_whole_steps() {
-    let rollout = run(Plan {
+    let rollout = run(RolloutRequest {
         duration: 0.1,
         samples: 4,
         ..swing()
@@ -214,7 +214,7 @@ fn samples_are_spread_evenly_over_whole_steps() {
     let times: Vec<f64> = rollout.times().to_vec();
     assert_eq!(times, [0.0, 0.03, 0.06, 0.1]);
     // More samples than there are: one a step. 0.3 s hold three steps of 0.1 s, although 0.3 / 0.1 falls short of 3.
-    let rollout = run(Plan {
+    let rollout = run(RolloutRequest {
         duration: 0.3,
         control: swing().control.with_timestep(0.1),
         samples: MAX_SAMPLES,
@@ -231,7 +231,7 @@ fn a_run_that_diverges_ends_with_its_last_finite_sample() {
         kd: [0.0; 2],
     };
     let control = ControlLoop::new(Arm::default(), gains, Setpoint::default());
-    let rollout = run(Plan {
+    let rollout = run(RolloutRequest {
         control: control.with_method(Method::Euler).with_timestep(0.1),
         duration: 100.0,
         samples: 1001,
@@ -245,37 +245,37 @@ fn a_run_that_diverges_ends_with_its_last_finite_sample() {
 
 #[test]
 fn what_can_not_be_run_is_refused_by_name() {
-    let refusal = |plan: Plan<2>| Rollout::new(plan).unwrap_err().to_string();
+    let refusal = |request: RolloutRequest<2>| Rollout::new(request).unwrap_err().to_string();
     assert_eq!(
-        refusal(Plan {
+        refusal(RolloutRequest {
             control: swing().control.with_timestep(0.0),
             ..swing()
         }),
         "timestep must be greater than 0, got 0"
     );
     assert_eq!(
-        refusal(Plan {
+        refusal(RolloutRequest {
             duration: f64::NAN,
             ..swing()
         }),
         "duration must be finite, got NaN"
     );
     assert_eq!(
-        refusal(Plan {
+        refusal(RolloutRequest {
             duration: 0.001,
             ..swing()
         }),
         "duration must be at least the timestep 0.01, got 0.001"
     );
     assert_eq!(
-        refusal(Plan {
+        refusal(RolloutRequest {
             duration: 2e5,
             ..swing()
         }),
         "duration / timestep must be at most 1e7 steps, got 2e7"
     );
     assert_eq!(
-        refusal(Plan {
+        refusal(RolloutRequest {
             samples: 1,
             ..swing()
         }),
@@ -287,7 +287,7 @@ fn what_can_not_be_run_is_refused_by_name() {
         kd: [0.0; 2],
     };
     assert_eq!(
-        Rollout::new(Plan {
+        Rollout::new(RolloutRequest {
             control: ControlLoop::new(Arm::default(), gains, Setpoint::default()),
             ..swing()
         })

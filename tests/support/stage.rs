@@ -16,8 +16,8 @@ use pendularm::actors::arm::ik_action::{
 };
 use pendularm::actors::arm::ik_trial::{GoalClient, IkTrial};
 use pendularm::actors::arm::sim::{
-    ArmPose, ArmSim, CommandGoal, Enable, EndGoal, GoalJudged, Pause, Pose, Reset, SetParams,
-    SetSetpoint, SettleWith, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+    AddBarrier, ArmPose, ArmSim, CommandGoal, Enable, EndGoal, GoalJudged, Pause, Pose, Reset,
+    SetParams, SetSetpoint, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
 use pendularm::actors::gateway::connection::Connection;
 use pendularm::actors::gateway::registry::{Attach, Registry};
@@ -196,7 +196,7 @@ pub fn start_goal_nodes<const N: usize>(
     let goals = GoalClient {
         send: action.clone().recipient(),
         cancel: action.clone().recipient(),
-        settle: action.clone().recipient(),
+        barrier: action.clone().recipient(),
     };
     let rng = fastrand::Rng::with_seed(seed);
     let trial = IkTrial::<N>::new(pose, goals, publish(), rng).start();
@@ -318,7 +318,7 @@ impl SilentArm {
             track: address.clone().recipient(),
             command: address.clone().recipient(),
             end: address.clone().recipient(),
-            settle: address.clone().recipient(),
+            add_barrier: address.clone().recipient(),
         }
     }
 }
@@ -327,10 +327,10 @@ impl Actor for SilentArm {
     type Context = Context<Self>;
 }
 
-impl Handler<SettleWith> for SilentArm {
+impl Handler<AddBarrier> for SilentArm {
     type Result = ();
 
-    fn handle(&mut self, _: SettleWith, _: &mut Context<Self>) {}
+    fn handle(&mut self, _: AddBarrier, _: &mut Context<Self>) {}
 }
 
 impl Handler<ArmPose<2>> for SilentArm {

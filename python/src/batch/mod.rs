@@ -363,7 +363,8 @@ impl Batch {
         self.windows.time.view.clone_ref(py)
     }
 
-    /// Arms that have left the finite numbers since their reset, (`n_arms`,); overwritten by the next call.
+    /// Arms of which a step led out of the finite numbers since their reset, (`n_arms`,);
+    /// overwritten by the next call.
     #[getter]
     fn diverged(&self, py: Python<'_>) -> Py<PyAny> {
         self.windows.diverged.view.clone_ref(py)

@@ -13,12 +13,12 @@ use pendularm::protocol::ros::cdr;
 use serde_json::{Value, json};
 use zenoh::Session;
 
+use super::endpoints::Endpoints;
 use super::gateway::Gateway;
-use super::goals::{Goal, GoalId, Goals, Stamp};
+use super::goals::{Goal, GoalId, GoalTable, Stamp};
 use super::inlet::{Inlet, Request};
 use super::outlet::Outlet;
-use super::seats::Seats;
-use super::{Cancel, GoalEvent, GoalNews, Leave, MAILBOX, Pursue};
+use super::{Cancel, GoalEvent, GoalUpdate, Leave, MAILBOX, Pursue};
 use crate::convention::EndpointKind;
 use crate::convention::hash::type_hash;
 use crate::interfaces::{ActionInterface, ServiceInterface, cancel_goal};
@@ -35,7 +35,7 @@ pub struct ActionBridge {
     cancel_goal: ServiceInterface,
     status_type: Option<Type>,
     gateway: Addr<Gateway>,
-    goals: Goals<Request>,
+    goals: GoalTable<Request>,
     feedback: Outlet,
     status: Outlet,
     _inlets: [Inlet; 3],
@@ -63,7 +63,7 @@ impl ActionBridge {
         session: &Session,
         action: Action,
         interface: Rc<ActionInterface>,
-        seats: &mut Seats,
+        endpoints: &mut Endpoints,
         gateway: Addr<Gateway>,
     ) -> zenoh::Result<Addr<Self>> {
         let mut context = Context::new();
@@ -75,8 +75,8 @@ impl ActionBridge {
         let name = |part: &str| format!("{}/_action/{part}", action.name());
         let mut inlet = |part, called: &str, of: &ServiceInterface| {
             let address = address.clone();
-            let seat = seats.service(owner, &name(called), of);
-            Inlet::new(session, seat, move |request| {
+            let endpoint = endpoints.service(owner, &name(called), of);
+            Inlet::new(session, endpoint, move |request| {
                 let sent = address.try_send(Requested(part, request));
                 sent.err().map(|error| error.into_inner().1)
             })
@@ -86,7 +86,7 @@ impl ActionBridge {
             inlet(Part::GetResult, "get_result", &interface.get_result)?,
             inlet(Part::CancelGoal, "cancel_goal", &cancel_goal)?,
         ];
-        let feedback = seats.next(
+        let feedback = endpoints.next(
             owner,
             EndpointKind::Publisher,
             &name("feedback"),
@@ -94,7 +94,7 @@ impl ActionBridge {
             &interface.feedback_hash,
         );
         let status_hash = status_type.map(|one| type_hash(one, &[]));
-        let status = seats.next(
+        let status = endpoints.next(
             owner,
             EndpointKind::LatchedPublisher,
             &name("status"),
@@ -107,7 +107,7 @@ impl ActionBridge {
             cancel_goal,
             status_type,
             gateway,
-            goals: Goals::default(),
+            goals: GoalTable::default(),
             feedback: Outlet::new(session, feedback, false)?,
             status: Outlet::new(session, status, true)?,
             _inlets: inlets,
@@ -252,10 +252,10 @@ impl Handler<Requested> for ActionBridge {
     }
 }
 
-impl Handler<GoalNews> for ActionBridge {
+impl Handler<GoalUpdate> for ActionBridge {
     type Result = ();
 
-    fn handle(&mut self, GoalNews { id, what }: GoalNews, _: &mut Self::Context) {
+    fn handle(&mut self, GoalUpdate { id, what }: GoalUpdate, _: &mut Self::Context) {
         let Some(id) = GoalId::of_text(&id) else {
             return;
         };

@@ -11,7 +11,8 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::link::{self, Came, Ended};
 use super::{
-    Answer, ArmNews, Ask, Cancel, GoalEvent, GoalNews, Heard, Listen, MAILBOX, Pursue, Tell,
+    Answer, ArmMessage, ArmPresence, CallArm, Cancel, GoalEvent, GoalUpdate, Listen, MAILBOX,
+    PublishToArm, Pursue,
 };
 use crate::report::{self, Repeated};
 
@@ -24,21 +25,21 @@ const MAX_CALLS: usize = 1024;
 pub struct Gateway {
     address: String,
     token: Option<String>,
-    graph: Recipient<ArmNews>,
+    graph: Recipient<ArmPresence>,
     /// Which connection this is, from 1.
     link: u64,
     outgoing: Option<mpsc::Sender<String>>,
-    listeners: HashMap<&'static str, Recipient<Heard>>,
+    listeners: HashMap<&'static str, Recipient<ArmMessage>>,
     calls: HashMap<u64, oneshot::Sender<Result<Answer, String>>>,
     last_call: u64,
-    goals: HashMap<String, Recipient<GoalNews>>,
+    goals: HashMap<String, Recipient<GoalUpdate>>,
     complaint: Repeated,
 }
 
 impl Gateway {
     /// A gateway to the arm at that address, which tells the graph when the arm comes and goes.
     #[must_use]
-    pub fn new(address: String, token: Option<String>, graph: Recipient<ArmNews>) -> Self {
+    pub fn new(address: String, token: Option<String>, graph: Recipient<ArmPresence>) -> Self {
         Self {
             address,
             token,
@@ -68,7 +69,7 @@ impl Gateway {
                 Ok(outgoing) => {
                     gateway.outgoing = Some(outgoing);
                     gateway.complaint.clear();
-                    gateway.graph.do_send(ArmNews::Here);
+                    gateway.graph.do_send(ArmPresence::Here);
                 }
                 Err(why) => {
                     let line = format!("no arm at {} yet: {why}", gateway.address);
@@ -119,7 +120,7 @@ impl Gateway {
         } else {
             GoalEvent::Feedback(values)
         };
-        if to.try_send(GoalNews { id, what }).is_err() {
+        if to.try_send(GoalUpdate { id, what }).is_err() {
             report::say("what the arm says of a goal was dropped: its action is busy");
         }
     }
@@ -146,7 +147,7 @@ impl Handler<Came> for Gateway {
                 let listener = self.listeners.get(text(&frame, "topic"));
                 let msg = frame.get_mut("msg").map(Value::take);
                 if let (Some(listener), Some(msg)) = (listener, msg)
-                    && listener.try_send(Heard(msg)).is_err()
+                    && listener.try_send(ArmMessage(msg)).is_err()
                 {
                     report::say("a message of the arm's was dropped: its publisher is busy");
                 }
@@ -175,7 +176,7 @@ impl Handler<Ended> for Gateway {
         // Dropped, each says so to whoever waits.
         self.calls.clear();
         self.goals.clear();
-        self.graph.do_send(ArmNews::Gone);
+        self.graph.do_send(ArmPresence::Gone);
         ctx.run_later(RETRY, Self::connect);
     }
 }
@@ -199,10 +200,10 @@ impl Handler<Listen> for Gateway {
     }
 }
 
-impl Handler<Tell> for Gateway {
+impl Handler<PublishToArm> for Gateway {
     type Result = ();
 
-    fn handle(&mut self, Tell { topic, msg }: Tell, _: &mut Self::Context) {
+    fn handle(&mut self, PublishToArm { topic, msg }: PublishToArm, _: &mut Self::Context) {
         if let Err(why) = self.write(&json!({"op": "publish", "topic": topic, "msg": msg})) {
             report::say(&format!("{topic}: a message was dropped: {why}"));
         }
@@ -239,10 +240,14 @@ impl Handler<Cancel> for Gateway {
     }
 }
 
-impl Handler<Ask> for Gateway {
+impl Handler<CallArm> for Gateway {
     type Result = ResponseFuture<Result<Answer, String>>;
 
-    fn handle(&mut self, Ask { service, args }: Ask, _: &mut Self::Context) -> Self::Result {
+    fn handle(
+        &mut self,
+        CallArm { service, args }: CallArm,
+        _: &mut Self::Context,
+    ) -> Self::Result {
         self.last_call += 1;
         let id = self.last_call;
         let call = json!({"op": "call_service", "id": id, "service": service, "args": args});

@@ -51,9 +51,9 @@ pub struct Goal<R> {
 
 /// The goals, oldest first.
 #[derive(Debug)]
-pub struct Goals<R>(VecDeque<Goal<R>>);
+pub struct GoalTable<R>(VecDeque<Goal<R>>);
 
-impl<R> Default for Goals<R> {
+impl<R> Default for GoalTable<R> {
     fn default() -> Self {
         Self(VecDeque::new())
     }
@@ -126,7 +126,7 @@ impl Stamp {
     }
 }
 
-impl<R> Goals<R> {
+impl<R> GoalTable<R> {
     fn get(&mut self, id: GoalId) -> Option<&mut Goal<R>> {
         self.0.iter_mut().find(|goal| goal.id == id)
     }
@@ -255,8 +255,8 @@ mod tests {
         GoalId([number; 16])
     }
 
-    fn running(count: u8) -> Goals<u8> {
-        let mut goals = Goals::default();
+    fn running(count: u8) -> GoalTable<u8> {
+        let mut goals = GoalTable::default();
         for number in 1..=count {
             goals.begin(id(number), number).unwrap();
             goals.accept(id(number)).unwrap();
@@ -275,7 +275,7 @@ mod tests {
 
     #[test]
     fn a_goal_is_accepted_once_and_its_end_is_told_to_all_who_wait() {
-        let mut goals = Goals::default();
+        let mut goals = GoalTable::default();
         goals.begin(id(1), 'a').unwrap();
         assert_eq!(goals.begin(id(1), 'b'), Err('b'), "that id is taken");
         assert_eq!(goals.status(), json!({"status_list": []}), "not yet");

@@ -16,12 +16,12 @@ use zenoh::session::TransportEvent;
 use zenoh::{Config, Session, Wait};
 
 use super::action::ActionBridge;
+use super::endpoints::{Endpoints, graph_node};
 use super::gateway::Gateway;
 use super::publisher::Publisher;
-use super::seats::{Seats, graph_node};
 use super::service::ServiceBridge;
 use super::subscription::Subscription;
-use super::{ArmNews, Leave};
+use super::{ArmPresence, Leave};
 use crate::convention::hash::type_hash;
 use crate::convention::{EndpointKind, Place};
 use crate::interfaces::{ActionInterface, ServiceInterface};
@@ -32,7 +32,7 @@ use crate::report::{self, Repeated};
 const RETRY: Duration = Duration::from_secs(1);
 
 /// The graph's side.
-pub struct Graph {
+pub struct GraphBridge {
     options: Options,
     services: Vec<(Service, Rc<ServiceInterface>)>,
     actions: Vec<(Action, Rc<ActionInterface>)>,
@@ -43,7 +43,7 @@ pub struct Graph {
     nodes: Vec<LivelinessToken>,
     bridges: Vec<Recipient<Leave>>,
     /// The last number that an endpoint has had. None is used again: the one before may still be going.
-    last_seat: usize,
+    last_endpoint: usize,
     complaint: Repeated,
 }
 
@@ -54,7 +54,7 @@ struct RouterNews {
     is_here: bool,
 }
 
-impl Graph {
+impl GraphBridge {
     /// The graph's side of what was asked for.
     #[must_use]
     pub fn new(options: Options) -> Self {
@@ -82,7 +82,7 @@ impl Graph {
             nodes: Vec::new(),
             bridges: Vec::new(),
             // Behind the numbers of the nodes.
-            last_seat: Node::ALL.len(),
+            last_endpoint: Node::ALL.len(),
             complaint: Repeated::default(),
         }
     }
@@ -136,12 +136,12 @@ impl Graph {
             namespace: self.options.namespace.clone(),
             zid: session.zid().to_string(),
         };
-        let mut seats = Seats {
+        let mut endpoints = Endpoints {
             place,
-            last: self.last_seat,
+            last: self.last_endpoint,
         };
         for node in Node::ALL {
-            let token = seats.place.node_token(graph_node(node));
+            let token = endpoints.place.node_token(graph_node(node));
             self.nodes
                 .push(session.liveliness().declare_token(token).wait()?);
         }
@@ -155,30 +155,31 @@ impl Graph {
                 Direction::Published if topic.is_latched() => EndpointKind::LatchedPublisher,
                 Direction::Published => EndpointKind::Publisher,
             };
-            let seat = seats.next(topic.owner(), kind, topic.name(), one.name, &hash);
+            let endpoint = endpoints.next(topic.owner(), kind, topic.name(), one.name, &hash);
             let gateway = gateway.clone();
             self.bridges.push(match topic.direction() {
                 Direction::Published => {
-                    Publisher::join(session, topic, one, seat, gateway)?.recipient()
+                    Publisher::join(session, topic, one, endpoint, gateway)?.recipient()
                 }
                 Direction::Subscribed => {
-                    Subscription::join(session, topic, one, seat, gateway)?.recipient()
+                    Subscription::join(session, topic, one, endpoint, gateway)?.recipient()
                 }
             });
         }
         for (service, interface) in &self.services {
-            let seat = seats.service(service.owner(), service.name(), interface);
+            let endpoint = endpoints.service(service.owner(), service.name(), interface);
             let interface = Rc::clone(interface);
-            let bridge = ServiceBridge::join(session, *service, interface, seat, gateway.clone())?;
+            let bridge =
+                ServiceBridge::join(session, *service, interface, endpoint, gateway.clone())?;
             self.bridges.push(bridge.recipient());
         }
         for (action, interface) in &self.actions {
             let interface = Rc::clone(interface);
             let bridge =
-                ActionBridge::join(session, *action, interface, &mut seats, gateway.clone())?;
+                ActionBridge::join(session, *action, interface, &mut endpoints, gateway.clone())?;
             self.bridges.push(bridge.recipient());
         }
-        self.last_seat = seats.last;
+        self.last_endpoint = endpoints.last;
         self.say_joined();
         Ok(())
     }
@@ -209,7 +210,7 @@ impl Graph {
     }
 }
 
-impl Actor for Graph {
+impl Actor for GraphBridge {
     type Context = Context<Self>;
 
     fn started(&mut self, ctx: &mut Self::Context) {
@@ -221,19 +222,19 @@ impl Actor for Graph {
     }
 }
 
-impl Handler<ArmNews> for Graph {
+impl Handler<ArmPresence> for GraphBridge {
     type Result = ();
 
-    fn handle(&mut self, news: ArmNews, _: &mut Self::Context) {
-        self.is_arm_here = news == ArmNews::Here;
+    fn handle(&mut self, news: ArmPresence, _: &mut Self::Context) {
+        self.is_arm_here = news == ArmPresence::Here;
         match news {
-            ArmNews::Here => self.join(),
-            ArmNews::Gone => self.leave(),
+            ArmPresence::Here => self.join(),
+            ArmPresence::Gone => self.leave(),
         }
     }
 }
 
-impl Handler<RouterNews> for Graph {
+impl Handler<RouterNews> for GraphBridge {
     type Result = ();
 
     fn handle(&mut self, RouterNews { is_here }: RouterNews, _: &mut Self::Context) {

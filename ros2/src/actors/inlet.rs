@@ -8,7 +8,7 @@ use zenoh::liveliness::LivelinessToken;
 use zenoh::query::{Query, Queryable};
 use zenoh::{Session, Wait};
 
-use crate::convention::Seat;
+use crate::convention::Endpoint;
 use crate::convention::attachment::Attachment;
 use crate::interfaces::ServiceInterface;
 use crate::report;
@@ -23,7 +23,7 @@ impl Inlet {
     /// A service there. `take` gets every request, and gives it back if there is no room for it.
     pub(super) fn new(
         session: &Session,
-        seat: Seat,
+        endpoint: Endpoint,
         take: impl Fn(Request) -> Option<Request> + Send + Sync + 'static,
     ) -> zenoh::Result<Self> {
         let take = move |query| {
@@ -31,10 +31,10 @@ impl Inlet {
                 refuse(&query, "too many requests wait");
             }
         };
-        let queryable = session.declare_queryable(seat.key).complete(true);
+        let queryable = session.declare_queryable(endpoint.key).complete(true);
         Ok(Self {
             _queryable: queryable.callback(take).wait()?,
-            _token: session.liveliness().declare_token(seat.token).wait()?,
+            _token: session.liveliness().declare_token(endpoint.token).wait()?,
         })
     }
 }

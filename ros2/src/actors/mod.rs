@@ -4,7 +4,7 @@
 //! | actor | does |
 //! | --- | --- |
 //! | [`gateway::Gateway`] | one rosbridge connection to the arm, opened again when it ends |
-//! | [`graph::Graph`] | the Zenoh session; starts the bridges when both sides are there, stops them when the arm goes |
+//! | [`graph::GraphBridge`] | the Zenoh session; starts the bridges when both sides are there, and stops them |
 //! | [`publisher::Publisher`] | one per topic that the arm publishes |
 //! | [`subscription::Subscription`] | one per topic that the arm takes |
 //! | [`service::ServiceBridge`] | one per service |
@@ -13,6 +13,7 @@
 //! **Invariant:** mailboxes are bounded: who has no room for a message refuses it, and says so to whoever waits.
 
 pub mod action;
+mod endpoints;
 pub mod gateway;
 mod goals;
 pub mod graph;
@@ -20,7 +21,6 @@ mod inlet;
 mod link;
 mod outlet;
 pub mod publisher;
-mod seats;
 pub mod service;
 pub mod subscription;
 
@@ -34,7 +34,7 @@ const MAILBOX: usize = 1024;
 /// The arm came or went. Addressed to the graph.
 #[derive(Message, Debug, Clone, Copy, PartialEq, Eq)]
 #[rtype(result = "()")]
-pub enum ArmNews {
+pub enum ArmPresence {
     /// It answers.
     Here,
     /// Its connection has ended.
@@ -44,7 +44,7 @@ pub enum ArmNews {
 /// A message of the arm's. Addressed to the topic's publisher.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
-pub struct Heard(pub Value);
+pub struct ArmMessage(pub Value);
 
 /// The arm's messages on a topic are wanted, or no longer. Addressed to the gateway.
 #[derive(Message)]
@@ -53,13 +53,13 @@ pub struct Listen {
     /// The topic, by the arm's name.
     pub topic: &'static str,
     /// Where its messages go; none ends it.
-    pub to: Option<Recipient<Heard>>,
+    pub to: Option<Recipient<ArmMessage>>,
 }
 
 /// A message for the arm. Addressed to the gateway.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
-pub struct Tell {
+pub struct PublishToArm {
     /// The topic, by the arm's name.
     pub topic: &'static str,
     /// The message.
@@ -69,7 +69,7 @@ pub struct Tell {
 /// A call of a service of the arm's. Addressed to the gateway; the error says why there is no answer.
 #[derive(Message, Debug)]
 #[rtype(result = "Result<Answer, String>")]
-pub struct Ask {
+pub struct CallArm {
     /// The service, by the arm's name.
     pub service: &'static str,
     /// The arguments.
@@ -98,7 +98,7 @@ pub struct Pursue {
     /// The goal.
     pub goal: Value,
     /// Who hears of it.
-    pub to: Recipient<GoalNews>,
+    pub to: Recipient<GoalUpdate>,
 }
 
 /// A goal is no longer wanted. Addressed to the gateway.
@@ -114,7 +114,7 @@ pub struct Cancel {
 /// News of a goal from the arm. Addressed to the action.
 #[derive(Message, Debug)]
 #[rtype(result = "()")]
-pub struct GoalNews {
+pub struct GoalUpdate {
     /// The goal's id.
     pub id: String,
     /// The news.

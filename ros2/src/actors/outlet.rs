@@ -10,7 +10,7 @@ use zenoh::{Session, Wait};
 use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
 
 use crate::convention::attachment::{Attachment, GID};
-use crate::convention::{Seat, gid};
+use crate::convention::{Endpoint, gid};
 use crate::report;
 
 /// How often a latched topic says which message was its last, if there was a new one: as `rmw_zenoh` does.
@@ -35,9 +35,13 @@ pub(super) struct Outlet {
 
 impl Outlet {
     /// A publisher there. A latched one gives its last message to whoever comes late.
-    pub(super) fn new(session: &Session, seat: Seat, is_latched: bool) -> zenoh::Result<Self> {
-        let gid = gid(&seat.token);
-        let builder = session.declare_publisher(seat.key.clone()).advanced();
+    pub(super) fn new(
+        session: &Session,
+        endpoint: Endpoint,
+        is_latched: bool,
+    ) -> zenoh::Result<Self> {
+        let gid = gid(&endpoint.token);
+        let builder = session.declare_publisher(endpoint.key.clone()).advanced();
         let builder = if is_latched {
             builder
                 .publisher_detection()
@@ -48,12 +52,12 @@ impl Outlet {
         };
         let parts = Parts {
             publisher: builder.wait()?,
-            _token: session.liveliness().declare_token(seat.token).wait()?,
+            _token: session.liveliness().declare_token(endpoint.token).wait()?,
             watched: None,
         };
         Ok(Self {
             parts: Some(parts),
-            key: seat.key,
+            key: endpoint.key,
             gid,
             sequence: 0,
         })

@@ -11,8 +11,8 @@ use zenoh::Session;
 
 use super::gateway::Gateway;
 use super::outlet::Outlet;
-use super::{Heard, Leave, Listen, MAILBOX};
-use crate::convention::Seat;
+use super::{ArmMessage, Leave, Listen, MAILBOX};
+use crate::convention::Endpoint;
 
 /// A topic in the graph.
 pub struct Publisher {
@@ -36,12 +36,12 @@ impl Publisher {
         session: &Session,
         topic: Topic,
         one: Type,
-        seat: Seat,
+        endpoint: Endpoint,
         gateway: Addr<Gateway>,
     ) -> zenoh::Result<Addr<Self>> {
         let mut context = Context::new();
         context.set_mailbox_capacity(MAILBOX);
-        let mut outlet = Outlet::new(session, seat, topic.is_latched())?;
+        let mut outlet = Outlet::new(session, endpoint, topic.is_latched())?;
         if !topic.is_latched() {
             let address: Addr<Self> = context.address();
             outlet.watch(move |is_wanted| address.do_send(Watched(is_wanted)))?;
@@ -80,10 +80,10 @@ impl Handler<Watched> for Publisher {
     }
 }
 
-impl Handler<Heard> for Publisher {
+impl Handler<ArmMessage> for Publisher {
     type Result = ();
 
-    fn handle(&mut self, Heard(msg): Heard, _: &mut Self::Context) {
+    fn handle(&mut self, ArmMessage(msg): ArmMessage, _: &mut Self::Context) {
         self.outlet.put(cdr::encode(self.one, &msg));
     }
 }

@@ -10,8 +10,8 @@ use zenoh::Session;
 
 use super::gateway::Gateway;
 use super::inlet::{Inlet, Request};
-use super::{Answer, Ask, Leave, MAILBOX};
-use crate::convention::Seat;
+use super::{Answer, CallArm, Leave, MAILBOX};
+use crate::convention::Endpoint;
 use crate::interfaces::ServiceInterface;
 use crate::translation;
 
@@ -37,13 +37,13 @@ impl ServiceBridge {
         session: &Session,
         service: Service,
         interface: Rc<ServiceInterface>,
-        seat: Seat,
+        endpoint: Endpoint,
         gateway: Addr<Gateway>,
     ) -> zenoh::Result<Addr<Self>> {
         let mut context = Context::new();
         context.set_mailbox_capacity(MAILBOX);
         let address: Addr<Self> = context.address();
-        let inlet = Inlet::new(session, seat, move |request| {
+        let inlet = Inlet::new(session, endpoint, move |request| {
             let sent = address.try_send(Requested(request));
             sent.err().map(|error| error.into_inner().0)
         })?;
@@ -68,7 +68,7 @@ impl Handler<Requested> for ServiceBridge {
             Ok(read) => read,
             Err(why) => return request.refuse(&why),
         };
-        let asked = self.gateway.send(Ask {
+        let asked = self.gateway.send(CallArm {
             service: self.service.name(),
             args: translation::arguments(self.service.fields(), &mut read),
         });

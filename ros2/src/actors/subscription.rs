@@ -12,8 +12,8 @@ use zenoh::sample::Sample;
 use zenoh::{Session, Wait};
 
 use super::gateway::Gateway;
-use super::{Leave, MAILBOX, Tell};
-use crate::convention::Seat;
+use super::{Leave, MAILBOX, PublishToArm};
+use crate::convention::Endpoint;
 use crate::report::{self, Repeated};
 
 /// A topic that the arm takes.
@@ -40,7 +40,7 @@ impl Subscription {
         session: &Session,
         topic: Topic,
         one: Type,
-        seat: Seat,
+        endpoint: Endpoint,
         gateway: Addr<Gateway>,
     ) -> zenoh::Result<Addr<Self>> {
         let mut context = Context::new();
@@ -54,14 +54,17 @@ impl Subscription {
                 ));
             }
         };
-        let subscriber = session.declare_subscriber(seat.key).callback(take).wait()?;
+        let subscriber = session
+            .declare_subscriber(endpoint.key)
+            .callback(take)
+            .wait()?;
         Ok(context.run(Self {
             topic,
             one,
             gateway,
             complaint: Repeated::default(),
             _subscriber: subscriber,
-            _token: session.liveliness().declare_token(seat.token).wait()?,
+            _token: session.liveliness().declare_token(endpoint.token).wait()?,
         }))
     }
 }
@@ -76,7 +79,7 @@ impl Handler<Taken> for Subscription {
     fn handle(&mut self, Taken(sample): Taken, _: &mut Self::Context) {
         let topic = self.topic.name();
         match cdr_reader::decode(self.one, &sample.payload().to_bytes()) {
-            Ok(msg) => self.gateway.do_send(Tell { topic, msg }),
+            Ok(msg) => self.gateway.do_send(PublishToArm { topic, msg }),
             Err(why) => self
                 .complaint
                 .say(format!("{topic}: a message was dropped: {why}")),

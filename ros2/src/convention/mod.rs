@@ -63,9 +63,9 @@ pub struct Named<'a> {
     pub hash: &'a str,
 }
 
-/// Where an endpoint stands: the key expression of what it sends or takes, and the token by which the graph knows it.
+/// An endpoint: the key expression of what it sends or takes, and the token by which the graph knows it.
 #[derive(Debug, Clone)]
-pub struct Seat {
+pub struct Endpoint {
     /// The key expression.
     pub key: String,
     /// The token.
@@ -117,10 +117,16 @@ impl Place {
         )
     }
 
-    /// Where an endpoint of a node stands.
+    /// An endpoint of a node.
     #[must_use]
-    pub fn seat(&self, node: GraphNode, id: usize, kind: EndpointKind, of: Named<'_>) -> Seat {
-        Seat {
+    pub fn endpoint(
+        &self,
+        node: GraphNode,
+        id: usize,
+        kind: EndpointKind,
+        of: Named<'_>,
+    ) -> Endpoint {
+        Endpoint {
             key: self.key(of),
             token: self.token(node, id, kind, of),
         }

@@ -1,4 +1,4 @@
-//! A call on its way through the workers: room for its answer is taken, the answer is worked out, then written.
+//! A call on its way through the workers: room for its answer is taken, then the answer is computed and written.
 //!
 //! **Invariant:** a call is answered once, and works no more once its caller is gone.
 
@@ -14,10 +14,10 @@ pub(super) const NUMBER_BYTES: usize = 25 + 8;
 
 /// The work that a call asks for, done a piece at a time.
 pub(super) trait Work<T>: Send {
-    /// The most bytes that the answer can have, and its computation beside it; asked before it begins.
+    /// The most bytes that the answer and its computation can take together; it is asked before the work begins.
     fn most_bytes(&self) -> usize;
 
-    /// Does a piece, a fraction of a slice; the answer, once that was the last.
+    /// Does a piece, which is a fraction of a slice. Returns the answer after the last one.
     fn advance(&mut self) -> Option<T>;
 }
 

@@ -30,11 +30,11 @@ const ENCODING_BYTES: usize = 4;
 #[derive(Default)]
 pub struct Made {
     pub(super) messages: Vec<Bytes>,
-    /// How many could not be made: longer than any outbox takes, or beyond what their type can be.
+    /// How many could not be made: they are longer than any outbox takes, or do not fit their type.
     pub(super) lost: u64,
 }
 
-/// A message, or a series of them, in one form, each message by itself: whoever keeps one keeps none of the others in
+/// A message, or a series of them, in one form. Each message lies by itself, so that to keep one keeps no other in
 /// memory.
 pub struct Encoded {
     /// The topic, as the subscribers spell it.
@@ -75,10 +75,10 @@ impl Encoded {
         &self.plain
     }
 
-    /// The messages, if they have been made, or are so short that they can be at once.
+    /// The messages, if they have been made, or are short enough to be made at once.
     pub(super) fn at_hand(&self) -> Option<&Made> {
         if !self.made.initialized() && self.plain.len() <= SHORT {
-            // Somebody else may just be at it, which is as good.
+            // This fails if another subscriber's task is making them, which is as good.
             let _ = self.made.set(self.make());
         }
         self.made.get()

@@ -1,7 +1,7 @@
 //! Open files: as many as all clients need, or as many clients as there are files for.
 //!
 //! Every client is an open file. A process usually may have 1,024 of them and is allowed to ask for more. Where it is
-//! not, fewer clients are served: one too many must find a file to read why with.
+//! not, fewer clients are served: even one too many needs a file, to be sent the reason.
 //!
 //! **Invariant:** the clients that are served never need all files that there may be.
 
@@ -11,7 +11,7 @@ use super::limits::MAX_CONNECTIONS;
 /// Files for everything but served clients: standard streams, polls, wakers, signals, listening sockets, a file of a
 /// report, and the clients that are just being refused for being too many.
 pub const OTHER_FILES: usize = 32;
-/// Asked for beyond that, so that many clients can be refused at once.
+/// Files that are asked for beyond that, so that many clients can be refused at once.
 const REFUSED_AT_ONCE: usize = 480;
 
 /// How many connections there can be.
@@ -19,7 +19,7 @@ const REFUSED_AT_ONCE: usize = 480;
 pub struct Room {
     /// Clients that are served.
     pub clients: usize,
-    /// Connections, besides, that have not shown the token yet.
+    /// Connections that have not shown the token yet; they are counted apart.
     pub unauthenticated: usize,
 }
 
@@ -50,8 +50,8 @@ pub fn make_room(asks_token: bool) -> Room {
     }
 }
 
-/// Counts the places that there are where so many files may be open: at least one client. Where files are few, those
-/// without the token have half of them.
+/// Counts the places for so many open files: there is at least one client. Where files are few, those without the token
+/// have half of them.
 #[must_use]
 pub fn room_with(files: usize, asks_token: bool) -> Room {
     let files = files.saturating_sub(OTHER_FILES);

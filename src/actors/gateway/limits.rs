@@ -29,30 +29,31 @@ pub const REGISTRATION_BYTES: usize = 1024;
 /// Bytes of a call that waits for a client, beside its `id` and its name: its entries in the tables.
 pub const CALL_BYTES: usize = 1024;
 /// Bytes of responses that may wait for one connection before what other clients send it (calls to it as a provider,
-/// answers to its own calls) is refused: it has not been read for long then, but others would go on.
+/// answers to its own calls) is refused. The connection is not read at that point, but others would go on sending to
+/// it.
 pub const MAX_BACKLOG: usize = 2 * MAX_RESPONSES_WAITING;
 /// How long a request may take from its first bytes to the end of its head, and how long a client may take from
-/// connecting to its token: as much as a slow line needs, too little to hold a place for.
+/// connecting to its token: enough for a slow line, too little to hold a place with.
 pub const HEAD_TIME: Duration = Duration::from_secs(5);
 /// How long a client that has stopped sending may take no byte of the topic messages that are left, and how long the
 /// end of the stream itself may take.
 pub const LINGER: Duration = Duration::from_secs(5);
 /// A client that takes no byte for so long while responses wait is disconnected.
 pub const STALL_LIMIT: Duration = Duration::from_secs(20);
-/// How long a frame may take from its first byte to its last; one that is longer than a frame may be, and is skipped,
-/// as long again for every such length. Longer than the slowest line needs that anybody would steer an arm by.
+/// How long a frame may take from its first byte to its last. A frame that is too long is skipped, and has as much time
+/// again for every length that a frame may have. The slowest line by which anybody would steer an arm needs less.
 pub const FRAME_TIME: Duration = Duration::from_secs(60);
-/// How long a client that has stopped sending is owed the responses that are not ready yet: longer than other clients
-/// usually have for theirs. It may as well be gone altogether, which shows only when something is sent to it.
+/// How long responses that are not ready yet are kept for a client that has stopped sending: longer than other clients
+/// usually have for theirs. The client may be gone altogether, which shows only when something is sent to it.
 pub const RESPONSES_TIME: Duration = Duration::from_secs(15);
-/// Bytes offered in one write: after that much the other connections have a turn.
+/// Bytes offered in one write; then the other connections have a turn.
 pub(super) const WRITE_BYTES: usize = 256 * 1024;
 /// Frames in one write.
 pub(super) const WRITE_FRAMES: usize = 64;
-/// Frames of a chunk, and messages of a series that is encoded, for which nobody waits in a queue: more than a client
-/// that waits for responses has under way.
+/// Frames of a chunk, and messages of a series that is encoded, that cost no wait in a queue: a client that waits for
+/// responses has fewer under way.
 pub(super) const FREE_FRAMES: usize = 32;
-/// Subscribers of a message whose publisher waits in no queue after it.
+/// Most subscribers of a message after which its publisher waits in no queue.
 pub(super) const FREE_DELIVERIES: usize = 32;
 /// How long after their time pieces of messages are forgotten, and how often a client that has enough waiting is looked
 /// at again.

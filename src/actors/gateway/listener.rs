@@ -19,10 +19,10 @@ use crate::actors::resources::gauges::Gauges;
 
 /// How long accepting rests after an error: long enough not to spin, short enough that clients don't notice.
 const BACKOFF: Duration = Duration::from_millis(50);
-/// A client's machine from which nothing has come for so long is asked whether it is still there: seldom enough to cost
-/// nothing, often enough for a router between us to keep the connection in mind.
+/// After so long a silence a client's machine is asked whether it is still there. That is seldom enough to cost
+/// nothing, and often enough for a router in between to keep the connection.
 pub const KEEPALIVE_IDLE: Duration = Duration::from_secs(60);
-/// Time between two such questions, and how many may go unanswered: half a minute without a network is no reason to go.
+/// Time between two such questions, and how many may go unanswered: a client survives half a minute without a network.
 pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(15);
 /// See [`KEEPALIVE_INTERVAL`].
 pub const KEEPALIVE_PROBES: u32 = 4;
@@ -102,7 +102,7 @@ async fn accept(
     gauges: Arc<Gauges>,
     admission: Arc<Admission>,
 ) {
-    // Told once, not twenty times a second.
+    // The log says it once, not twenty times a second.
     let mut failing = false;
     loop {
         match socket.accept().await {

@@ -26,7 +26,7 @@ use crate::protocol::wire::payload::Payload;
 #[rtype(result = "Result<ConnectionId, Refused>")]
 pub struct Connect(pub Outlets);
 
-/// The ways to a connection; one mailbox behind all of them, so order is kept between them.
+/// The ways to a connection. One mailbox is behind all of them, so order is kept between them.
 #[derive(Clone)]
 pub struct Outlets {
     /// Topic messages.
@@ -69,7 +69,7 @@ pub(super) fn form_of(wants_text: &AtomicBool) -> ErrorForm {
 /// Why a client was not taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum Refused {
-    /// The limit is reached, which this is.
+    /// So many clients are the limit, and they are there.
     #[error("too many connections: this runtime serves {0} clients at once")]
     Full(usize),
     /// The runtime is ending.
@@ -175,11 +175,11 @@ pub struct PublishInTurn(pub Vec<Publish>);
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "Option<Arc<Census>>")]
 pub struct TakeCensus {
-    /// So many of them are wanted at most.
+    /// The answer may have at most so many of them.
     pub at_most: usize,
 }
 
-/// Something that passes the registry, for the tap.
+/// Something that passes the registry, as the tap gets it.
 pub enum Tapped<'a> {
     /// A message of the runtime, as the whole `publish` frame.
     Published(Topic, &'a Bytes),
@@ -216,8 +216,8 @@ pub type Tap = Box<dyn FnMut(Tapped<'_>) + Send>;
 #[rtype(result = "()")]
 pub struct SetTap(pub Option<Tap>);
 
-/// No call is taken any more, and waiting calls and goals for clients are refused, for the reason given. From the
-/// runtime, when it ends.
+/// The registry takes no call any more, and refuses those calls and goals that wait for clients, for the reason given.
+/// From the runtime, when it ends.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct RefuseCalls(pub &'static str);
@@ -245,7 +245,7 @@ pub struct Deliver {
 /// Shared by the deliveries of a message whose publisher waits: it goes on when the last of them is dropped.
 pub type Underway = Arc<oneshot::Sender<()>>;
 
-/// Topic messages as a subscriber wants them.
+/// Topic messages in the form that a subscriber wants.
 #[derive(Clone)]
 pub enum Frames {
     /// A whole frame, or a [series](crate::protocol::wire::series) of them.

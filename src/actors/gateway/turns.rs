@@ -1,14 +1,13 @@
 //! Turns: where many have much to do at once, a few of them go on each time around.
 //!
-//! One thread serves every client, and a light call passes it some eight times on its way. Were each of two hundred
-//! clients that send all they can, or each of a thousand subscribers of a message, to go on every time around, the
-//! call would wait for all of them eight times. So a reader with a whole chunk or many frames at hand, or whose message
-//! has gone to many, waits in one queue, and a writer in another once much has been written of late. A writer whose
-//! messages all come from nodes has a third: the arm publishes on, whatever others have sent to hundreds, and who hears
-//! it does not wait behind those.
+//! One thread serves every client, and a light call passes it some eight times on its way. If two hundred busy clients,
+//! or a thousand subscribers of a message, all went on every time around, the call would wait for all of them eight
+//! times. So a reader waits in one queue if it has a whole chunk or many frames at hand, or if its message has gone to
+//! many. A writer waits in another once much has been written of late. A writer whose messages all come from nodes has
+//! a third queue: the arm publishes on, and its subscribers do not wait behind what others have sent to hundreds.
 //!
 //! **Invariant:** between two looks at what else there is to do, each queue lets only so many go on, first come, first
-//! served, and no writer once those before it have taken [`WRITING_TIME`].
+//! served, and no writer goes on once those before it have taken [`WRITING_TIME`].
 
 use std::cell::{Cell, RefCell};
 use std::collections::VecDeque;
@@ -21,30 +20,30 @@ use tokio::sync::oneshot;
 use super::limits::WRITE_BYTES;
 use crate::actors::resources::work_clock;
 
-/// Readers that go on each time around: with a fraction of a millisecond for a chunk, or for an op of the gateway's
-/// own, about one together.
+/// Readers that go on each time around. A chunk, or an op of the gateway's own, takes a fraction of a millisecond:
+/// together they take about one.
 const READERS_AT_A_TIME: usize = 4;
 /// Bytes of chunks per pass with which no reader waits, about 0.5 ms.
 const FREE_READS: usize = WRITE_BYTES;
-/// Writers that go on each time around: a tenth of a millisecond. Fewer if together they have [`WRITE_BYTES`] to write.
-/// With twice as many, and twice [`FREE_WRITES`], a light call beside 1,000 subscribers took up to a millisecond
-/// longer.
+/// Writers that go on each time around, which takes a tenth of a millisecond. Fewer go on if together they have
+/// [`WRITE_BYTES`] to write. With twice as many, and twice [`FREE_WRITES`], a light call beside 1,000 subscribers took
+/// up to a millisecond longer.
 const WRITERS_AT_A_TIME: usize = 16;
 /// Writes per pass that never queue, about 0.5 ms; a long write counts several times. A hundred subscribers of a
 /// message wait in no queue: it costs a tenth of what writing to them does.
 const FREE_WRITES: usize = 128;
-/// Bytes of a message that count as another write.
+/// Every so many bytes of a message count as another write.
 const LONG: usize = 4096;
-/// Three times what [`WRITERS_AT_A_TIME`] take as a rule. Where the system has to find memory for what clients do not
-/// read, a write of fifty bytes was seen to take 340 µs.
+/// The time that writers have each time around: three times what [`WRITERS_AT_A_TIME`] take as a rule. Where the system
+/// has to find memory for what clients do not read, a write of fifty bytes was seen to take 340 µs.
 const WRITING_TIME: Duration = Duration::from_micros(300);
 
 /// Bytes that a delivery counts as: some five hundred of them take half a millisecond.
 const DELIVERY: usize = WRITE_BYTES / 512;
 
-/// One who waits in a queue.
+/// A reader or a writer that waits in a queue.
 trait Waits: 'static {
-    /// It is their turn; false if they wait no longer.
+    /// Tells it that its turn has come; false if it no longer waits.
     fn go_on(self) -> bool;
 }
 
@@ -55,7 +54,7 @@ impl Waits for oneshot::Sender<()> {
     }
 }
 
-/// Writes in its turn, where the queue is worked through: its actor, if that were woken, would look at its mailbox and
+/// A writer writes where the queue is worked through. To wake its actor instead would have it look at its mailbox and
 /// at all that it waits for, a thousand times for a message to a thousand subscribers.
 pub(super) trait WritesInTurn {
     /// Writes what there is to write, without waiting.
@@ -78,10 +77,10 @@ impl Waits for WaitingWriter {
 /// A queue of this thread.
 struct TurnQueue<W> {
     at_a_time: usize,
-    /// How many may go on without waiting, and how many of these still may.
+    /// How many may go on without waiting, and how many of them are left.
     free: usize,
     left: Cell<usize>,
-    /// Each with the bytes that it is going to write.
+    /// The queue, each waiter with the bytes that it is going to write.
     waiting: RefCell<VecDeque<(usize, W)>>,
     /// Whether there is a task at work.
     at_work: Cell<bool>,
@@ -98,7 +97,7 @@ pub(super) async fn read() {
     read_bytes(0).await;
 }
 
-/// As `read`, where the reader's last message went to so many subscribers, as its next may.
+/// Waits as [`read`] does; the reader's last message went to so many subscribers, and its next may too.
 pub(super) async fn read_after(deliveries: usize) {
     read_bytes(deliveries * DELIVERY).await;
 }
@@ -108,11 +107,11 @@ pub(super) fn may_read(bytes: usize) -> bool {
     bytes < LONG || READERS.with(|queue| queue.take(bytes))
 }
 
-/// As `read`, before a read that may complete a message of `bytes`, which is then scanned whole.
+/// Waits as [`read`] does, before a read that may complete a message of `bytes`, which is then scanned whole.
 pub(super) async fn read_bytes(bytes: usize) {
     let (go, goes) = oneshot::channel();
     READERS.with(|queue| queue.join(bytes, go));
-    // Where the task has ended before its time, the runtime that it ran in is ending too.
+    // A task ends early only with the runtime that it runs in.
     let _ = goes.await;
 }
 
@@ -155,7 +154,7 @@ impl<W: Waits> TurnQueue<W> {
         }
     }
 
-    /// Takes some of what is free; false if there is not enough of it, and then nothing is left.
+    /// Takes `cost` of what is free. If there is less, it takes all of it and returns false.
     fn take(self: &Rc<Self>, cost: usize) -> bool {
         let left = self.left.get().checked_sub(cost);
         self.left.set(left.unwrap_or(0));
@@ -176,7 +175,7 @@ impl<W: Waits> TurnQueue<W> {
     }
 }
 
-/// The task; where it ends before its time, with the runtime that it ran in, no reader waits in vain.
+/// The task that works through a queue. If it ends early, with the runtime that it runs in, no reader waits in vain.
 struct TurnQueueTask<W: Waits>(Rc<TurnQueue<W>>);
 
 impl<W: Waits> Drop for TurnQueueTask<W> {
@@ -198,7 +197,7 @@ impl<W: Waits> TurnQueueTask<W> {
                 let Some((wanted, next)) = queue.waiting.borrow_mut().pop_front() else {
                     break;
                 };
-                // One that has ended meanwhile takes no turn.
+                // A waiter that has ended meanwhile takes no turn.
                 if next.go_on() {
                     going += 1;
                     bytes += wanted;

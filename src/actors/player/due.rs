@@ -43,10 +43,10 @@ impl<const N: usize> Player<N> {
             } else {
                 self.position.saturating_sub(passed)
             });
-            self.attempt(Self::owe_latched);
+            self.attempt(Self::queue_latched);
         } else if now >= self.repeat {
             self.repeat = now + REPEAT;
-            self.attempt(Self::owe_all_present);
+            self.attempt(Self::queue_all_present);
         }
     }
 
@@ -87,9 +87,9 @@ impl<const N: usize> Player<N> {
         }));
     }
 
-    /// The next message that is due: one that is owed, or else the record's next up to where it is to be.
+    /// The next message that is due: one that is pending, or else the record's next up to where it is to be.
     fn next_due(&mut self) -> Result<Option<Moment>, ReadError> {
-        if let Some(moment) = self.owed.pop_front() {
+        if let Some(moment) = self.pending.pop_front() {
             return Ok(Some(moment));
         }
         while let Some(target) = self.target
@@ -115,42 +115,42 @@ impl<const N: usize> Player<N> {
         Ok(None)
     }
 
-    /// Owes the present messages of topics that have a new subscriber or were wound to another place. One look back
+    /// Queues the present messages of topics that have a new subscriber or were wound to another place. One look back
     /// costs as much for all of them as for one, so there is one a tick: nobody holds the record up by coming and
     /// going, or by winding it.
-    pub(super) fn owe_fresh(&mut self) {
+    pub(super) fn queue_fresh(&mut self) {
         if self.has_looked || self.fresh.is_empty() {
             return;
         }
         self.has_looked = true;
         let fresh = std::mem::take(&mut self.fresh);
         self.attempt(|player| {
-            player.owe_latched()?;
-            player.owe_present(&fresh)
+            player.queue_latched()?;
+            player.queue_present(&fresh)
         });
     }
 
-    /// Owes nothing any more.
-    pub(super) fn forget_owed(&mut self) {
-        for moment in self.owed.drain(..) {
+    /// Drops the messages that are pending.
+    pub(super) fn drop_pending(&mut self) {
+        for moment in self.pending.drain(..) {
             // It has not been published.
             self.latched.remove(&moment.topic);
         }
     }
 
-    /// Owes the messages that are present, and nothing else.
-    pub(super) fn owe_all_present(&mut self) -> Result<(), ReadError> {
-        self.forget_owed();
-        self.owe_latched()?;
+    /// Queues the messages that are present, and nothing else.
+    pub(super) fn queue_all_present(&mut self) -> Result<(), ReadError> {
+        self.drop_pending();
+        self.queue_latched()?;
         self.fresh.clear();
         let wanted = self.wanted.clone();
-        self.owe_present(&wanted)
+        self.queue_present(&wanted)
     }
 
-    /// Owes the last message of each of these topics, oldest first.
-    pub(super) fn owe_present(&mut self, topics: &BTreeSet<Topic>) -> Result<(), ReadError> {
+    /// Queues the last message of each of these topics, oldest first.
+    pub(super) fn queue_present(&mut self, topics: &BTreeSet<Topic>) -> Result<(), ReadError> {
         let present = self.present(topics)?;
-        self.owed.extend(present.into_iter().rev());
+        self.pending.extend(present.into_iter().rev());
         Ok(())
     }
 
@@ -195,8 +195,8 @@ impl<const N: usize> Player<N> {
         Ok(found)
     }
 
-    /// Owes the messages of latched topics that hold here and did not before.
-    pub(super) fn owe_latched(&mut self) -> Result<(), ReadError> {
+    /// Queues the messages of latched topics that hold here and did not before.
+    pub(super) fn queue_latched(&mut self) -> Result<(), ReadError> {
         let wanted: Vec<Topic> = self
             .wanted
             .iter()
@@ -210,8 +210,8 @@ impl<const N: usize> Player<N> {
             {
                 self.latched.insert(topic, place);
                 if let Some(moment) = self.tape.reel.moment(place)? {
-                    self.owed.retain(|owed| owed.topic != topic);
-                    self.owed.push_back(moment);
+                    self.pending.retain(|waiting| waiting.topic != topic);
+                    self.pending.push_back(moment);
                 }
             }
         }

@@ -77,7 +77,7 @@ pub struct Player<const N: usize> {
     /// Whether a place has been sought since the last tick.
     has_sought: bool,
     /// Messages that are published before the record goes on: what is present, for who has come.
-    owed: VecDeque<Moment>,
+    pending: VecDeque<Moment>,
     /// Where the record is to be by now, in nanoseconds since its beginning, if it is not there yet.
     target: Option<u64>,
     /// How many of its messages may still be looked at before the next tick.
@@ -129,7 +129,7 @@ impl<const N: usize> Player<N> {
             fresh: BTreeSet::new(),
             has_looked: false,
             has_sought: false,
-            owed: VecDeque::new(),
+            pending: VecDeque::new(),
             target: None,
             left: MAX_AT_ONCE,
             is_underway: false,
@@ -155,7 +155,7 @@ impl<const N: usize> Actor for Player<N> {
             player.left = MAX_AT_ONCE;
             player.has_looked = false;
             player.has_sought = false;
-            player.owe_fresh();
+            player.queue_fresh();
             player.tick();
             player.go_on(ctx);
         });
@@ -183,11 +183,11 @@ impl<const N: usize> Handler<Interest> for Player<N> {
     fn handle(&mut self, interest: Interest, ctx: &mut Context<Self>) {
         let topic = interest.topic;
         self.latched.remove(&topic);
-        self.owed.retain(|moment| moment.topic != topic);
+        self.pending.retain(|moment| moment.topic != topic);
         if interest.wanted {
             self.wanted.insert(topic);
             self.fresh.insert(topic);
-            self.owe_fresh();
+            self.queue_fresh();
             self.go_on(ctx);
         } else {
             self.wanted.remove(&topic);
@@ -266,12 +266,12 @@ impl<const N: usize> Player<N> {
         wound.inspect_err(|error| self.stand_still(error))?;
         self.position = to;
         self.target = None;
-        self.forget_owed();
+        self.drop_pending();
         // All have come to another place.
         self.fresh.clone_from(&self.wanted);
         // The first place that is sought is looked at now, whoever has come before; another at the next tick.
         self.has_looked &= std::mem::replace(&mut self.has_sought, true);
-        self.owe_fresh();
+        self.queue_fresh();
         Ok(())
     }
 

@@ -16,7 +16,7 @@ use crate::actors::resources::work_clock;
 pub const MOMENT: Duration = Duration::from_micros(50);
 
 thread_local! {
-    /// Until when this thread stays awake; none while it may sleep.
+    /// The time until which this thread stays awake; none while it may sleep.
     static UNTIL: Cell<Option<Instant>> = const { Cell::new(None) };
 }
 

@@ -22,14 +22,14 @@ pub enum ActionRequest {
     Goal {
         /// Its fields, unread.
         arguments: Arguments,
-        /// Who sent it.
+        /// The client that sent it.
         client: ActionClient,
         /// Dropped when the goal has been set in motion, or refused: the client's next frame is read then.
         done: Done,
     },
     /// The end of a goal that the same client has sent under the same id.
     Cancel {
-        /// Who wants it; an error status goes there where no such goal is active.
+        /// The client that wants it; it gets an error status if no such goal is active.
         from: Canceller,
         /// Dropped when the goal has ended.
         done: Done,
@@ -48,7 +48,7 @@ pub struct SentGoal {
     pub id: Option<Payload>,
 }
 
-/// Who wants a goal to end.
+/// The client that wants a goal to end.
 pub struct Canceller {
     /// The way back.
     pub respond: Recipient<Respond>,

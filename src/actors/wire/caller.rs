@@ -134,7 +134,7 @@ pub struct Caller {
     pub(super) address: Option<Address>,
     gone: Arc<AtomicBool>,
     pub(super) done: Option<Done>,
-    /// Since when answers that wait have left no room for one of megabytes.
+    /// The time since which waiting answers have left no room for one of megabytes.
     asked_for_room: Option<Instant>,
 }
 

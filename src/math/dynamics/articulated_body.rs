@@ -17,15 +17,15 @@
 //! | stiff part of `B'` | `φ = (B_x + 3 E_x + 3 b u + w W / 2) / X - w` |
 //! | soft part of `B'` | `ψ = u + ((1 + a) u + b w / 2 - B_y - E_y) / 2X` |
 //!
-//! A link needs one quotient, `1 / (W X)`, and nothing is waited for longer: so everything that can be is computed
-//! beside it, and the fewest operations come behind a number that is late. For the outermost link, which carries
-//! nothing, `A'` is `1/4 + 3/4 x xᵀ`.
+//! A link needs one quotient, `1 / (W X)`, whose result is waited for longest. So everything that can be is computed
+//! beside it, and few operations follow a number that is late. For the outermost link, which carries nothing, `A'` is
+//! `1/4 + 3/4 x xᵀ`.
 //!
-//! Why so: the masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares
-//! when they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the
-//! same two directions, because a heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff
-//! part would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise.
-//! Rotations are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
+//! The masses enter by sums of positive terms alone. `A'` is kept as two squares, because squares stay squares when
+//! they are turned into the frame of the link before; turned as a matrix it would cancel. `B'` is kept along the same
+//! two directions, because a heavy tip makes `x` 1e9 times `d`: as a plain vector, the rounding error of its stiff part
+//! would bury the soft one. `E` comes from these parts too. Each of the two costs up to ten digits otherwise. Rotations
+//! are taken joint by joint, so that a joint wound up by 1e8 rad costs nothing either. Gravity is an upward
 //! acceleration of the base. Without it nothing depends on where the first link points to, and
 //! [`super::weightless_dynamics`] leaves out that angle's sine and cosine.
 //!

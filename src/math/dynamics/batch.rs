@@ -19,7 +19,7 @@ use crate::math::number::{Arithmetic, Number, Registers, Wide, entries};
 pub type Columns<'a, const N: usize> = [&'a [f64]; N];
 
 impl Registers {
-    /// [`forward_dynamics`] in these.
+    /// Does [`forward_dynamics`] in these registers.
     pub fn forward_dynamics<const N: usize>(
         self,
         arm: &Arm<N>,
@@ -71,7 +71,7 @@ pub fn forward_dynamics<const N: usize>(
     Registers::widest().forward_dynamics(arm, q, qd, tau, qdd);
 }
 
-/// Too few states to fill the registers, one by one.
+/// States too few to fill the registers are taken one by one.
 fn alone<const N: usize>(
     arm: &Arm<N>,
     given: [Columns<'_, N>; 3],
@@ -87,8 +87,8 @@ fn alone<const N: usize>(
     }
 }
 
-/// As many registers at a time as there is room for: a second one hides what the first waits for, and costs more than
-/// that where there are 16.
+/// Takes as many registers at a time as there is room for: a second one hides what the first waits for, and costs more
+/// than that where there are 16.
 #[inline(always)]
 fn in_registers<S: Simd, const N: usize>(
     simd: S,

@@ -18,7 +18,7 @@ use crate::math::arm::{Arm, Rod};
 use crate::math::number::{Arithmetic, Number, Wide, entries};
 use crate::math::trig;
 
-/// As [`super::forward_dynamics`], with gravity or without.
+/// Forward dynamics as in [`super::forward_dynamics`], with gravity or without.
 #[inline(always)]
 pub(super) fn accelerations<const N: usize, const WEIGHS: bool>(
     simd: Sse2,

@@ -131,8 +131,8 @@ impl Chain {
 
     /// Refuses a target that is outside the whole arm's `reach`.
     ///
-    /// One that is only just outside needs no moving: triangles that do not close are made flat by [`half_angle`], and
-    /// the flat one is the boundary.
+    /// A target only just outside needs no moving: [`half_angle`] makes triangles flat that do not close, and the flat
+    /// one is the boundary.
     fn checked(
         &self,
         reach: Reach,
@@ -173,7 +173,7 @@ impl Chain {
         let Err(side) = self.judged(reach, distance) else {
             return Ok((wrist, wrap(phi)));
         };
-        // Where no orientation would help, that is what the sender should hear.
+        // If no orientation would help, the sender should hear that.
         self.checked(
             Reach::of(&[self.l1, self.l2, self.l3]),
             end_effector,
@@ -209,8 +209,8 @@ impl Chain {
         let present = heading(present);
         let present_phi = present.y.atan2(present.x);
 
-        // Asked first, so that a present orientation is kept bit for bit, on the very edge of what is admissible too.
-        // On the base itself all orientations are admissible or none.
+        // This is asked first, so that a present orientation is kept bit for bit, even on the edge of what is
+        // admissible. On the base itself all orientations are admissible or none.
         let reach = self.wrist_reach();
         let wrist = end_effector - self.l3 * present;
         let rounding = ROUNDING * (self.l1 + self.l2 + self.l3);

@@ -79,7 +79,7 @@ impl<S: Simd, const K: usize> Wide<S, K> {
         let Some(first) = some.first() else {
             return true;
         };
-        // Times 0 a finite number is 0, and any other is not a number.
+        // A finite number times 0 is 0; any other gives NaN.
         let mut sum = first.0[0] * 0.0;
         for value in some {
             each_register!(i => {
@@ -201,7 +201,7 @@ impl<S: Simd, const K: usize> Number for Wide<S, K> {
         let [first, rest @ ..] = values else {
             return true;
         };
-        // By the sum of all squares, which is no larger only if none is; so it asks for less than all.
+        // The sum of all squares is compared: if it is within the bound, so is every one.
         let mut sums = first.0;
         each_register!(i => {
             sums[i] = sums[i] * sums[i];

@@ -13,15 +13,15 @@ use super::register::Wide;
 pub struct Registers(Level);
 
 impl Registers {
-    /// The widest that there are.
+    /// The widest registers of the machine.
     #[must_use]
     pub fn widest() -> Self {
-        // Asked of the processor once.
+        // The processor is asked once.
         static LEVEL: OnceLock<Level> = OnceLock::new();
         Self(*LEVEL.get_or_init(Level::new))
     }
 
-    /// All that there are, the widest first; what is computed in any of them is the same.
+    /// All registers of the machine, the widest first. Results are the same in all of them.
     #[must_use]
     pub fn all() -> Vec<Self> {
         let widest = Self::widest();
@@ -41,7 +41,7 @@ impl Registers {
         all
     }
 
-    /// How many numbers one has.
+    /// How many numbers one register has.
     #[must_use]
     pub fn lanes(self) -> usize {
         dispatch!(self.0, simd => lanes_of(simd))

@@ -38,7 +38,7 @@ pub struct Checkpoint<const N: usize> {
     pub steps_since_base: u64,
     /// Steps taken since the reset.
     pub steps: u64,
-    /// Step and simulation time \[s\] at which the finite numbers were left.
+    /// Step and simulation time \[s\] at which a step led out of the finite numbers.
     pub divergence: Option<(u64, f64)>,
 }
 

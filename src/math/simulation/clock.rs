@@ -26,7 +26,8 @@ impl<const N: usize> Simulation<N> {
         self.time_after(steps).is_finite()
     }
 
-    /// As [`Simulation::advance_with`] where time ends before the last step: asks before each whether there is time for it.
+    /// Does what [`Simulation::advance_with`] does where time ends before the last step: asks before each whether there
+    /// is time for it.
     #[cold]
     pub(super) fn take_last_steps(
         &mut self,

@@ -25,8 +25,8 @@ pub fn step_under<const N: usize>(
 ) -> Increment<N> {
     let State { position, velocity } = state;
     if method == Method::Euler {
-        // In the caller's loop, where numbers stay in registers from a step to the next; of the other methods that
-        // would be four times as many copies of the dynamics.
+        // This one is inlined into the caller's loop, where numbers stay in registers from step to step. For the other
+        // methods that would make four times as many copies of the dynamics.
         increment(
             Method::Euler,
             #[inline(always)]

@@ -29,7 +29,7 @@ pub enum ArmInput<const N: usize> {
         /// Simulation time \[s\], greater than 0.
         duration: f64,
     },
-    /// Back to the starting pose.
+    /// Takes the arm back to the starting pose.
     Reset,
 }
 

@@ -7,11 +7,11 @@
 //! 2. that effort is held while the method's stages evaluate the dynamics ([`step_under`]);
 //! 3. the increments are added with their rounding errors carried, `(q, q̇)` and integral are replaced together.
 //!
-//! The arm's actor, the study, the benchmarks and the tests all step through here, so that what is live is what is
-//! studied, bit for bit. May use the rest of `math`; told no time, it is stepped.
+//! The arm's actor, the study, the benchmarks and the tests all step through here, so that the arm that is studied is
+//! the live one, bit for bit. This may use the rest of `math`, and knows no time but that of its steps.
 //!
-//! **Invariant:** state and time are finite. A step after which they would not be is not taken, in whole or in part, and
-//! nothing steps after it until [`Simulation::reset`].
+//! **Invariant:** state and time are finite. A step after which they would not be is not taken, in whole or in part,
+//! and nothing steps after it until [`Simulation::reset`].
 
 #![allow(
     clippy::indexing_slicing,
@@ -127,7 +127,7 @@ impl<const N: usize> Simulation<N> {
         }
     }
 
-    /// Takes one step; `false` if the simulation has diverged, then or before.
+    /// Takes one step; `false` if the simulation diverges or has diverged.
     pub fn step(&mut self) -> bool {
         self.advance(1) == 1
     }
@@ -137,8 +137,8 @@ impl<const N: usize> Simulation<N> {
         self.advance_with(steps, |_| ControlFlow::Continue(()))
     }
 
-    /// As [`Simulation::advance`], and shows every state that a step leads to to `observe`, which may end the advance
-    /// there. What must be judged at every physics step hooks in here; without it, it costs nothing.
+    /// Does what [`Simulation::advance`] does, and shows `observe` the state after every step. `observe` may end the
+    /// advance there. Whatever must be judged at every physics step hooks in here.
     pub fn advance_with(
         &mut self,
         steps: u64,
@@ -155,7 +155,7 @@ impl<const N: usize> Simulation<N> {
     }
 
     fn take_steps(&mut self, steps: u64, observe: impl FnMut(&Self) -> ControlFlow<()>) -> u64 {
-        // Asked once for all steps.
+        // This is asked once for all steps.
         if leaves_out_first_angle(&self.arm) {
             self.take_steps_of::<false>(steps, observe)
         } else {
@@ -189,7 +189,7 @@ impl<const N: usize> Simulation<N> {
         });
     }
 
-    /// One step, unless its result is not finite: then nothing changes, and `false`.
+    /// Takes one step. If its result is not finite, changes nothing and returns `false`.
     #[inline]
     fn take_step<const WEIGHS: bool>(&mut self) -> bool {
         let mut control = if self.pid.is_enabled() {
@@ -257,14 +257,14 @@ impl<const N: usize> Simulation<N> {
     }
 
     /// Adds `effort` \[N m\] to that of every step that begins within `duration` \[s\], greater than 0, of simulation
-    /// time from now; one that still runs ends here. With the controller off, this is all the effort there is.
+    /// time from now. A disturbance that still acts ends here. With the controller off, this is all the effort there
+    /// is.
     pub fn disturb(&mut self, effort: [f64; N], duration: f64) {
         self.disturbance = Some(Disturbance::new(effort, self.time(), duration));
     }
 
-    /// Back to the starting pose at rest, at time 0: setpoint and integral with it, effort zero, disturbance ended,
-    /// divergence cleared.
-    /// On or off, gains, arm, method and timestep stay.
+    /// Goes back to the starting pose at rest, at time 0. Setpoint and integral follow, the effort is zero, disturbance
+    /// and divergence end. Gains, arm, method, timestep, and whether the controller is on, stay.
     pub fn reset(&mut self) {
         self.set_state(State::rest());
         self.pid.reset();

@@ -29,7 +29,7 @@ pub use terms::{
 /// lengths change between sampling and solving, so that a second refusal in a row is rare already.
 pub const ATTEMPTS: u32 = 8;
 
-/// Results kept that came before the answer which says whether they are ours; more than two never wait in order.
+/// Most results that are kept until the answer says whether they are ours. No more than two wait if news come in order.
 const EARLY_RESULTS: usize = 4;
 
 /// Simulation time since a start, added up over resets of the simulation clock.
@@ -50,7 +50,7 @@ impl TrialClock {
         }
     }
 
-    /// A difference, not a running sum: what rounding there is does not grow with the number of questions.
+    /// This is a difference, not a running sum, so rounding does not grow with the number of questions.
     fn elapsed(&self) -> f64 {
         self.carried + (self.latest - self.origin)
     }
@@ -105,7 +105,7 @@ impl View {
 #[derive(Debug, Clone)]
 pub struct Trial {
     settings: Settings,
-    /// None before the first start.
+    /// There is none before the first start.
     clock: Option<TrialClock>,
     running: bool,
     targets_reached: u64,
@@ -183,7 +183,7 @@ impl Trial {
         if clock.elapsed() + rounding(now) < self.settings.duration {
             return Vec::new();
         }
-        // It is over, or the clock has run to where it tells nothing.
+        // The trial is over, or the clock has run so far that it tells nothing.
         self.end()
     }
 
@@ -295,8 +295,8 @@ impl Trial {
         vec![TrialCommand::PublishStatus]
     }
 
-    /// Feedback on a goal, anybody's: the end effector's `distance` from its target \[m\], and the `positions` it
-    /// commands \[rad\].
+    /// Takes feedback on any goal: the end effector's `distance` from its target \[m\], and the `positions` it commands
+    /// \[rad\].
     pub fn feedback(&mut self, goal_id: &str, distance: f64, positions: &[f64]) {
         if self.is_in_flight(goal_id) {
             self.view.error = Some(distance);
@@ -306,7 +306,7 @@ impl Trial {
         }
     }
 
-    /// A goal, anybody's, has ended. The one in flight is counted if it was reached, and the next target wanted.
+    /// Takes the end of any goal. The one in flight is counted if it was reached, and the next target is wanted.
     #[must_use]
     pub fn concluded(
         &mut self,
@@ -327,7 +327,7 @@ impl Trial {
         match conclusion.outcome {
             Outcome::Reached => {
                 self.targets_reached += 1;
-                // Shown until the next goal is accepted, so that it is seen at all.
+                // This is shown until the next goal is accepted, so that it is seen at all.
                 self.view.action_status = ActionStatus::Reached;
                 self.view.error = Some(conclusion.final_distance);
                 let next = sample().map(|target| self.ask(target, 1));
@@ -351,7 +351,7 @@ impl Trial {
         // The new goal would preempt the old one, but not if it is refused.
         let mut commands = self.abandon();
         commands.push(self.ask(target, 1));
-        // Shown once its goal has been accepted, with what that goal then has.
+        // The target is shown once its goal has been accepted, with that goal's setpoint.
         self.view = View::of(None, ActionStatus::Idle);
         commands
     }

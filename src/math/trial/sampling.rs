@@ -1,6 +1,6 @@
 //! Random targets that an arm can reach.
 //!
-//! **Invariant:** what is sampled has been solved; a seed makes it repeatable.
+//! **Invariant:** every target has been solved, and a seed makes the targets repeatable.
 
 use std::f64::consts::TAU;
 

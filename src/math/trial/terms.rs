@@ -28,7 +28,7 @@ impl Default for Settings {
     }
 }
 
-/// The settings that a start names; the others stay as they are. Valid ones only.
+/// The settings that a start names, all valid; the others stay as they are.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Changes {
     /// \[s\], greater than 0.
@@ -127,7 +127,7 @@ pub struct Status {
     pub duration: f64,
     /// Targets reached since the start.
     pub targets_reached: u64,
-    /// The target being pursued, or the one that was last; none once the trial has ended.
+    /// The target being pursued, or the last one; none once the trial has ended.
     pub target: Option<Target>,
     /// The end effector's distance from the target \[m\], as last heard.
     pub error: Option<f64>,
@@ -137,7 +137,7 @@ pub struct Status {
     pub action_status: ActionStatus,
 }
 
-/// The end of a goal, anybody's.
+/// The end of any goal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conclusion {
     /// The goal's id.

@@ -1,7 +1,7 @@
 //! The actions: one row each. Goals with progress and an end, as rosbridge has them beside topics and services.
 //!
-//! **Invariant:** an action has the fields of the services and topics that do the same, where there are such; others
-//! have those of ROS 2.
+//! **Invariant:** an action has the fields of the services and topics that do the same; without such, it has those of
+//! ROS 2.
 
 use super::entry::{Field, Type, message, optional, required};
 use super::node::Node;
@@ -55,7 +55,7 @@ table! {
                 required("desired", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("actual", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
                 required("error", "trajectory_msgs/msg/JointTrajectoryPoint", "rad, rad/s"),
-                // ROS 2's definition has these too. In JSON they are absent: compas_fab fails at unknown fields.
+                // These are in ROS 2's definition. JSON leaves them out, since compas_fab fails at unknown fields.
                 optional("multi_dof_joint_names", "string[]", ""),
                 optional("multi_dof_desired", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
                 optional("multi_dof_actual", "trajectory_msgs/msg/MultiDOFJointTrajectoryPoint", ""),
@@ -100,7 +100,7 @@ impl Action {
         self.entry().owner
     }
 
-    /// Whether a goal may be as long as a frame: it is read where it holds up nobody.
+    /// Whether a goal may be as long as a frame, since it is read where it holds up nobody.
     #[must_use]
     pub const fn takes_long_goals(self) -> bool {
         matches!(self, Self::FollowJointTrajectory)

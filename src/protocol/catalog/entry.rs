@@ -12,25 +12,25 @@ pub struct Field {
     /// Its type as ROS writes it: `float64`, `float64[]`, `bool`, `string`, `uint64`, `pkg/msg/Type`. ROS does not know
     /// `float64[][]`, one array per sample.
     pub kind: &'static str,
-    /// Its unit, empty where it has none. `SI` where it differs from joint to joint or depends on the controller.
+    /// Its unit: empty where it has none, `SI` where it differs from joint to joint or depends on the controller.
     pub unit: &'static str,
     /// Whether a request must have it. In messages and responses every field is there.
     pub required: bool,
 }
 
-/// How often a field's type is there.
+/// How many values of its type a field has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Count {
-    /// Once.
+    /// One.
     One,
-    /// Any number of times, perhaps up to a bound: `float64[]`, `float64[<=3]`.
+    /// Any number, perhaps up to a bound: `float64[]`, `float64[<=3]`.
     Any,
-    /// So many times: `uint8[16]`.
+    /// So many: `uint8[16]`.
     Exactly(usize),
 }
 
 impl Field {
-    /// The field's type without brackets, and how often it is there.
+    /// The field's type without brackets, and how many values it has.
     #[must_use]
     pub fn element(&self) -> (&'static str, Count) {
         let array = self.kind.strip_suffix(']');
@@ -231,7 +231,7 @@ impl ServiceEntry {
         }
     }
 
-    /// An answer makes messages of these topics old that were produced before it: none of them may follow.
+    /// An answer makes earlier messages of these topics old: none of them may follow it.
     pub(super) const fn supersedes(self, topics: &'static [&'static str]) -> Self {
         Self {
             supersedes: topics,

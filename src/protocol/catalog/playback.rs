@@ -10,7 +10,7 @@ use super::node::Node;
 use super::table::{fields, table};
 use super::topics::ARM_STATE;
 
-/// Where they stand.
+/// The prefix of the services' names.
 pub const PLAYER_PREFIX: &str = "/rosbag2_player/";
 
 table! {
@@ -20,7 +20,7 @@ table! {
         Pause = of_player("/rosbag2_player/pause", "rosbag2_interfaces/srv/Pause").supersedes(ARM_STATE),
         /// Goes on.
         Resume = of_player("/rosbag2_player/resume", "rosbag2_interfaces/srv/Resume"),
-        /// Does the other of the two.
+        /// Stands still if it goes on, and goes on if it stands still.
         TogglePaused = of_player("/rosbag2_player/toggle_paused", "rosbag2_interfaces/srv/TogglePaused")
             .supersedes(ARM_STATE),
         /// Whether it stands still.
@@ -31,7 +31,7 @@ table! {
             .request(&RATE)
             .response(&SUCCESS)
             .supersedes(ARM_STATE),
-        /// The same, asked for.
+        /// Sets how fast it goes.
         GetRate = of_player("/rosbag2_player/get_rate", "rosbag2_interfaces/srv/GetRate")
             .response(&RATE),
         /// Goes to a time since the record's beginning.
@@ -39,7 +39,7 @@ table! {
             .request(fields![required("time", "builtin_interfaces/msg/Time", "s, ns")])
             .response(&SUCCESS)
             .supersedes(ARM_STATE),
-        /// Where it is, and how long the record.
+        /// Where it is, and how long the record is.
         GetPosition = of_player("/rosbag2_player/get_position", "pendularm_interfaces/srv/GetPosition")
             .response(fields![
                 required("position", "float64", "s"),

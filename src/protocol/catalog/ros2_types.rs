@@ -1,5 +1,5 @@
-//! The types of which ROS 2 makes the parts of services and actions, and those that a standard action has inside and
-//! this arm has no use for.
+//! The types of which ROS 2 makes the parts of services and actions, and types that are inside a standard action and of
+//! no use to this arm.
 //!
 //! **Invariant:** fields stand as in the definitions of ROS 2.
 

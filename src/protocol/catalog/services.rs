@@ -341,7 +341,7 @@ impl Service {
         self.entry().is_all_or_nothing
     }
 
-    /// Topics, as clients spell them, of which no message may follow an answer that was produced before it.
+    /// Topics, as clients spell them. An older message of theirs may not follow the answer.
     #[must_use]
     pub const fn supersedes(self) -> &'static [&'static str] {
         self.entry().supersedes

@@ -3,7 +3,7 @@
 //! **Invariant:** a table is an enum, so that the compiler asks what a row is for wherever rows are told apart.
 
 /// Makes an enum of a table's rows: a variant for each, `ALL` in their order, and `entry`, which gives the row. A
-/// variant behind the rows carries another table. A row with `if` and a feature is there with that alone.
+/// variant behind the rows carries another table. A row with `if` and a feature is there only with that feature.
 macro_rules! table {
     (
         $(#[$about:meta])*

@@ -145,7 +145,7 @@ macro_rules! spellings {
     ($($topic:ident),*) => { &[$(Topic::$topic.name(), Topic::$topic.short_name()),*] };
 }
 
-/// Topics of the arm's state. News of a change on `/diagnostics` come before the answer to it, and stay.
+/// Topics of the arm's state. `/diagnostics` is not among them: its news of a change come before the answer, and stay.
 pub(super) const ARM_STATE: &[&str] = spellings![JointStates, Clock, Tf];
 /// The same, and feedback of a goal: after a pause and a reset none is due.
 pub(super) const ARM_STATE_AND_FEEDBACK: &[&str] = spellings![JointStates, Clock, Tf, IkFeedback];

@@ -1,8 +1,8 @@
 //! Messages of the nodes `ik`, `ik_action` and `ik_trial`: solutions, feedback, results, the status of a trial, and the
 //! trajectory that carries a goal's setpoint.
 //!
-//! **Invariant:** the fields are the catalog's, in its order; whatever is not there to be told is `null`, except a
-//! target's `phi`, which is left out.
+//! **Invariant:** the fields are the catalog's, in its order; a missing value is `null`, except a target's `phi`, which
+//! is left out.
 
 use serde::Serialize;
 use serde_json::value::{RawValue, to_raw_value};
@@ -95,7 +95,7 @@ pub struct TrialStatus {
     pub action_status: &'static str,
 }
 
-/// A trajectory of one point: to be at `positions` \[rad\], at rest, as soon as may be.
+/// A trajectory of one point: the arm is to be at `positions` \[rad\], at rest, as soon as possible.
 #[must_use]
 pub fn setpoint_trajectory(joint_names: &[&str], positions: &[f64]) -> Box<RawValue> {
     let velocities = vec![0.0; positions.len()];

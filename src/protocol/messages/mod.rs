@@ -50,13 +50,13 @@ impl Level {
     }
 }
 
-/// As what a response with `result: false` says in `values` why it failed.
+/// The form in which `values` of a response with `result: false` gives the reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ErrorForm {
-    /// An object, like that of any other response: what holds over raw TCP until the client says otherwise.
+    /// An object, like that of any other response. It holds over raw TCP until the client says otherwise.
     #[default]
     Object,
-    /// The text of `status`, as `rosbridge_suite` has it and its clients expect: the same for WebSocket.
+    /// The text of `status`, as `rosbridge_suite` has it. It holds over WebSocket until the client says otherwise.
     Text,
 }
 
@@ -86,7 +86,7 @@ pub fn publish(topic: &str, msg: &impl Serialize) -> Bytes {
 /// A message that a client sent, which only passes through; `msg` is valid JSON.
 #[must_use]
 pub fn publish_raw(topic: &str, msg: &Payload) -> Bytes {
-    // Exact: slow subscribers' outboxes keep these by the ten thousand, and count their text alone.
+    // The capacity is exact: outboxes of slow subscribers keep ten thousands of these, and count their text alone.
     let head = "{\"op\":\"publish\",\"topic\":\"\",\"msg\":}\n".len();
     Encoder::with_room("publish", head + topic.len() + msg.line().len())
         .text("topic", topic)
@@ -242,7 +242,7 @@ pub fn action_goal(
     frame.raw("args", args).value("feedback", &feedback).end()
 }
 
-/// The wish that a goal end, for its action server, a client.
+/// Asks the action server of a client to cancel a goal.
 #[must_use]
 pub fn cancellation(action: &str, id: &str) -> Bytes {
     Encoder::op("cancel_action_goal")
@@ -334,7 +334,7 @@ impl Encoder {
 
     fn end(mut self) -> Bytes {
         self.text.extend_from_slice(b"}\n");
-        // It may wait for long: its spare room is given back, and only its bytes are counted.
+        // The frame may wait for long, and only its bytes are counted: its spare room is given back.
         self.text.shrink_to_fit();
         Bytes::from(self.text)
     }

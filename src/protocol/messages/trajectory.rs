@@ -9,7 +9,7 @@ use crate::protocol::wire::json::Entries;
 use crate::protocol::wire::payload::Payload;
 use crate::protocol::wire::text;
 
-/// A message as the runtime's own listener hears it: of a long trajectory only what counts.
+/// A message as the runtime's own listener hears it, without the points of a long trajectory that do not count.
 #[derive(Debug, Clone)]
 pub struct Heard {
     /// The message.
@@ -29,7 +29,7 @@ impl Heard {
     /// Reads the setpoint as [`joint_trajectory`] does, and names its fields as they were in the whole message.
     ///
     /// # Errors
-    /// As there.
+    /// The errors of [`joint_trajectory`].
     pub fn setpoint(&self, joints: &[&str]) -> Result<SetpointRequest, TrajectoryError> {
         read(self.msg.raw(), self.left_out, joints)
     }
@@ -147,8 +147,8 @@ fn read(
     })
 }
 
-/// The message without what does not count, and how many points are left out: all but the last. The same setpoint comes
-/// of it, or the same complaint. `None` if there are no points.
+/// The message with its last point alone, and how many points were left out. It gives the same setpoint, or the same
+/// complaint. `None` if there are no points.
 pub(crate) fn condensed(msg: &RawValue) -> Option<(String, usize)> {
     let [names, points] = json::members(msg.get(), &["joint_names", "points"]).ok()?;
     let points = json::entries(points?, 0)?;
@@ -228,7 +228,7 @@ fn left_out(names: &Entries<'_>, joints: &[&str]) -> Vec<String> {
     missing.map(|(_, joint)| (*joint).to_owned()).collect()
 }
 
-/// For each joint of the arm, where the message has it; `None` unless `names` is a permutation of `joints`.
+/// The place in the message of each joint of the arm; `None` unless `names` is a permutation of `joints`.
 fn permutation(names: &Entries<'_>, joints: &[&str]) -> Option<Vec<usize>> {
     if names.count != joints.len() {
         return None;

@@ -4,7 +4,7 @@
 //! fields a service has, in which order a positional array gives them, and which must be there. A field that is an
 //! object is read member by member in the same way; its members are named `gains.kp`.
 //!
-//! **Invariant:** each rejected field is named once or, where entries of an array are at fault, once for each of these.
+//! **Invariant:** each rejected field is named once, or once for each entry of an array that is at fault.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -41,7 +41,7 @@ impl<'a> Fields<'a> {
         Self::of(service).filled(args)
     }
 
-    /// The same for the fields of a goal. One bad field rejects the whole goal.
+    /// Sorts the fields of a goal. One bad field rejects the whole goal.
     ///
     /// # Errors
     /// Where a positional array has more entries than a goal has fields.
@@ -87,8 +87,8 @@ impl<'a> Fields<'a> {
         Ok(read)
     }
 
-    /// The same; arguments that are rejected as a whole count as none, so that the answer can echo the values as they
-    /// are.
+    /// Sorts the arguments of a call. If they are rejected as a whole they count as none, so that the answer can echo
+    /// the values as they are.
     #[must_use]
     pub fn read_or_none(args: &'a Arguments, service: Service) -> Self {
         Self::read(args, service).unwrap_or_else(|rejection| Self {
@@ -160,7 +160,7 @@ impl<'a> Fields<'a> {
         (values.len() == count).then_some(values)
     }
 
-    /// The same as an array: one number per joint.
+    /// An array of finite numbers within `bound`, one per joint.
     pub fn array<const N: usize>(&mut self, name: &'static str, bound: Bound) -> Option<[f64; N]> {
         self.numbers(name, N, bound)?.try_into().ok()
     }
@@ -289,7 +289,7 @@ impl<'a> Fields<'a> {
         self.rejections.as_slice()
     }
 
-    /// The same, once all has been read.
+    /// Returns the rejections once all has been read.
     #[must_use]
     pub fn finish(self) -> Rejections {
         self.rejections

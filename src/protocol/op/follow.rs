@@ -1,7 +1,7 @@
 //! Reads the goal of `control_msgs/action/FollowJointTrajectory`: points with times, and tolerances.
 //!
-//! **Invariant:** a goal that is given has for every point one finite position for each joint of the arm, in the arm's
-//! order, and velocities for all of them or none; whatever is wrong is refused by name.
+//! **Invariant:** a goal that is given has in every point a finite position of each joint, in the arm's order, and
+//! velocities of all joints or none. Anything wrong is refused by name.
 
 use serde_json::value::RawValue;
 
@@ -12,7 +12,7 @@ use crate::protocol::wire::{json, text};
 
 /// Points of a path: more than any planner makes for a few joints; each takes a hundred bytes while the goal lasts.
 pub const MAX_POINTS: usize = 4096;
-/// Entries of a list of tolerances: each joint several times over.
+/// Most entries of a list of tolerances: enough for each joint several times over.
 const MAX_TOLERANCES: usize = 16;
 
 /// A goal.
@@ -22,9 +22,9 @@ pub struct FollowGoal {
     pub points: Vec<FollowPoint>,
     /// How far off joints may be on the way.
     pub path_tolerance: Vec<JointTolerance>,
-    /// How far off they may be at the end.
+    /// How far off joints may be at the end.
     pub goal_tolerance: Vec<JointTolerance>,
-    /// How long after the end they may take for that \[s\]; 0 for the default.
+    /// How long after the end joints may take to get there \[s\]; 0 for the default.
     pub goal_time_tolerance: f64,
 }
 
@@ -115,7 +115,7 @@ fn points(trajectory: &RawValue, joints: &[&str]) -> Result<Vec<FollowPoint>, Re
         .collect()
 }
 
-/// For each joint of the arm, where the message has it.
+/// The place in the message of each joint of the arm.
 fn order(names: Option<&RawValue>, joints: &[&str]) -> Result<Vec<usize>, RejectedField> {
     let field = "trajectory.joint_names";
     let expected = format!("must name {}, each once", joints.join(", "));
@@ -149,7 +149,7 @@ fn point(raw: &RawValue, field: &str, order: &[usize]) -> Result<FollowPoint, Re
     })
 }
 
-/// Whether it is an array without entries, which in a message of ROS stands for one that is not there.
+/// Whether it is an array without entries, which in a message of ROS means that there is none.
 fn is_empty(raw: &RawValue) -> bool {
     json::entries(raw, 0).is_some_and(|entries| entries.count == 0)
 }

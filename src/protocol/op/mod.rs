@@ -26,8 +26,8 @@ pub use goal_status::GoalStatus;
 pub use reader::{OPS, read};
 
 /// Longest `args` and trajectory for a node of ours, without the members that it has no use for: the gateway's thread
-/// reads them, within some tenth of a millisecond. Those of computations, which workers read, and those for other
-/// clients are as long as a frame may be.
+/// reads them, within some tenth of a millisecond. For computations, which workers read, and for other clients they may
+/// be as long as a frame.
 pub const MAX_ARGS: usize = 16 * 1024;
 /// Longest `throttle_rate`: a year; beyond it, a delivery is never due in a connection's lifetime.
 pub const MAX_THROTTLE: Duration = Duration::from_secs(365 * 24 * 3600);
@@ -47,7 +47,7 @@ pub struct Incoming {
 }
 
 impl Incoming {
-    /// Bytes that its payloads take.
+    /// Bytes of its payloads.
     #[must_use]
     pub fn allocated(&self) -> usize {
         let op = self.op.as_ref().map_or(0, Op::allocated);
@@ -79,7 +79,7 @@ pub enum Op {
         /// The part of it that the runtime's own listener needs, where the message is long.
         heard: Option<Heard>,
     },
-    /// The same for messages that go out as they have come in.
+    /// Delivers messages that go out as they have come in.
     PublishLines(Series),
     /// Registers the sender as a subscriber.
     Subscribe(Subscribe),
@@ -104,7 +104,7 @@ pub enum Op {
     CallService(CallService),
     /// A goal for an action.
     SendActionGoal(ActionGoal),
-    /// The end of the goal that has the frame's id.
+    /// Cancels the goal that has the frame's id.
     CancelActionGoal {
         /// Action name.
         action: String,
@@ -118,7 +118,7 @@ pub enum Op {
     },
     /// A piece of a longer frame.
     Fragment(Piece),
-    /// Statuses that the sender wants from now on, and how it wants to be told why a call failed.
+    /// Sets which statuses the sender wants, and how it wants to be told why a call failed.
     SetLevel {
         /// The statuses.
         verbosity: Verbosity,
@@ -195,15 +195,15 @@ pub struct Subscribe {
     pub encoding: Encoding,
 }
 
-/// How a subscriber wants its messages written.
+/// The form in which a subscriber wants its messages.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Encoding {
-    /// As what.
+    /// The encoding.
     pub compression: Compression,
-    /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. None: in one piece always, as
-    /// what is binary does.
+    /// Longest piece of a message in JSON, in bytes; longer messages come in fragments. With none, a message always
+    /// comes in one piece, as binary messages do.
     pub fragment_size: Option<usize>,
-    /// Whether stamps have the names of ROS 1 too. The registry knows: it depends on the topic.
+    /// Whether stamps have the names of ROS 1 too. The registry decides it by the topic.
     pub ros1_stamps: bool,
 }
 
@@ -224,7 +224,7 @@ impl Encoding {
 /// The encoding of a message. If a client asked for several, the last in this order counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Compression {
-    /// JSON. Also where `png` was asked for, which saves nothing on messages as short as ours.
+    /// JSON. It is used for `png` too, which saves nothing on messages as short as ours.
     #[default]
     None,
     /// CBOR, with typed arrays.
@@ -267,16 +267,16 @@ pub enum ActionServerOp {
     },
     /// Withdraws that.
     Unadvertise,
-    /// How a goal goes.
+    /// Passes on how a goal goes.
     Feedback {
         /// Any value.
         values: Payload,
     },
-    /// How a goal has ended.
+    /// Passes on how a goal has ended.
     End {
         /// Any value.
         values: Payload,
-        /// As `action_msgs/msg/GoalStatus` counts.
+        /// The status, as `action_msgs/msg/GoalStatus` counts.
         status: u8,
         /// Whether it has come to a result.
         result: bool,
@@ -290,7 +290,7 @@ pub enum Arguments {
     Object(Payload),
     /// Fields in documented order.
     Positional(Payload),
-    /// Something else, which whoever takes the call refuses: some services echo their values even then.
+    /// Something else. The node that takes the call refuses it, since some services echo their values even then.
     Neither(Payload),
 }
 
@@ -317,11 +317,10 @@ impl Arguments {
 /// Why a frame is no operation, and how its sender hears of it.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum OpError {
-    /// Answered by an error `status`.
+    /// A fault that is answered by an error `status`.
     #[error("{0}")]
     Status(Problem),
-    /// A call that can be told apart from others by its service and id: answered by `service_response` with `result:
-    /// false`.
+    /// A call whose service is known; it is answered by `service_response` with `result: false`.
     #[error("{problem}")]
     Call {
         /// The service that was called.
@@ -329,7 +328,7 @@ pub enum OpError {
         /// The fault.
         problem: Problem,
     },
-    /// A goal of a named action: answered by an error `status`, and by `action_result` with `result: false`.
+    /// A goal of a named action; it is answered by an error `status`, and by `action_result` with `result: false`.
     #[error("{problem}")]
     Goal {
         /// The action that it is for.

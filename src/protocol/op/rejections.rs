@@ -1,6 +1,6 @@
 //! Why fields of a request were not taken, by name.
 //!
-//! **Invariant:** what is told of them is one line of bounded length, whatever was sent.
+//! **Invariant:** they are reported in one line of bounded length, whatever was sent.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -56,7 +56,7 @@ pub struct RejectedField {
 /// Why a field was not taken.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Reason {
-    /// It has to be there.
+    /// A field that has to be there is absent.
     #[error("is required")]
     Missing,
     /// Another type or value was expected.
@@ -153,7 +153,7 @@ impl Rejections {
         }
     }
 
-    /// Adds those of `later` behind these.
+    /// Adds the rejections of `later` behind these.
     pub fn append(&mut self, mut later: Self) {
         self.0.append(&mut later.0);
     }

@@ -1,7 +1,7 @@
-//! The secret that a runtime which other machines can reach asks of every client.
+//! The token: a secret that a runtime asks of every client if other machines can reach it.
 //!
-//! **Invariant:** how long a comparison takes tells nothing about the secret but its length, and no log or message
-//! shows it.
+//! **Invariant:** the time of a comparison tells nothing about the secret but its length, and no log or message shows
+//! it.
 
 use std::fmt;
 

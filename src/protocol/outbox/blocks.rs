@@ -1,7 +1,7 @@
 //! A queue in blocks, for what waits for one client.
 //!
 //! **Invariant:** it grows and shrinks by one block at a time. A thousand clients that take nothing are all sent the
-//! same: were their queues doubled and copied, it would be at the same moment.
+//! same, so that their queues would all be doubled and copied at the same moment.
 
 use std::collections::VecDeque;
 
@@ -49,7 +49,7 @@ impl<T> Blocks<T> {
         if let Some(last) = self.blocks.back_mut().filter(|last| last.len() < BLOCK) {
             return last.push_back(item);
         }
-        // The first grows to its size: most queues stay short.
+        // The first block grows to its size, since most queues stay short.
         let room = if self.blocks.is_empty() { 0 } else { BLOCK };
         let mut block = VecDeque::with_capacity(room);
         block.push_back(item);

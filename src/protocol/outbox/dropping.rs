@@ -9,11 +9,11 @@ use bytes::{Buf, Bytes};
 use super::{FRAME_BYTES, MAX_TOPIC_BYTES, Outbox, PLACE_BYTES};
 use crate::protocol::wire::series::first_messages;
 
-/// Messages that are freed where they are given up: that takes some tens of microseconds.
+/// Most messages that are freed where they are given up, which takes some tens of microseconds.
 const FEW: usize = 256;
 
 impl Outbox {
-    /// Whether there is room for it once all else has gone; if not, it counts as dropped.
+    /// Whether there is room for a message once all else has gone; if not, it counts as dropped.
     pub(super) fn may_fit(&mut self, frame: &Bytes) -> bool {
         let fits = frame.len() <= MAX_TOPIC_BYTES;
         self.dropped += u64::from(!fits);
@@ -47,9 +47,9 @@ impl Outbox {
             .extend(held.into_iter().map(|(_, frame)| frame));
     }
 
-    /// Drops topic messages, the oldest first, until those that are left take at most so many bytes, and `place` more
-    /// each. The oldest is the queue's first or the one that was held back first. Of a series, as many messages go at
-    /// once as have to, and of those that are held back as many as are older than all others.
+    /// Drops topic messages, the oldest first, until the rest costs at most `most` bytes, `place` of them for each
+    /// message. The oldest is the queue's first or the one that was held back first. A series loses as many messages at
+    /// once as have to go; held-back messages go at once as far as they are older than the queue's first.
     fn drop_oldest(&mut self, most: usize, place: usize) {
         loop {
             let cost = self.topic_bytes() + self.topic_count() * place;

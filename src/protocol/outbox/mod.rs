@@ -4,10 +4,9 @@
 //! Topic messages may be lost, oldest first; responses may not. Both leave in the order in which they were produced.
 //! A message that `throttle_rate` holds back takes its place in that order when its time comes.
 //!
-//! A push may be of a [series](crate::protocol::wire::series): it is queued as one piece, and dropped and held back
-//! message by message.
+//! A [series](crate::protocol::wire::series) is queued as one piece, and dropped and held back message by message.
 //!
-//! Told the time; knows no socket and no clock.
+//! It is told the time, and knows no socket and no clock.
 //!
 //! **Invariant:** dropping removes whole messages, never reorders; at most [`MAX_TOPIC_BYTES`] of topic messages
 //! wait, held back ones included.
@@ -30,11 +29,11 @@ use crate::protocol::wire::series::{first_message, last_messages, messages};
 /// Most bytes of topic messages that wait for one connection: the longest message that a client may send (and the
 /// newline behind it), or minutes of the arm's own.
 pub const MAX_TOPIC_BYTES: usize = MAX_FRAME + 1;
-/// Bytes that a frame takes beside its own: the count of those who share it, its place in a queue (which may be twice
-/// as long as what is in it), and the allocator's own of each.
+/// Bytes that a frame takes beside its own: its reference count, its place in a queue that may be twice as long as what
+/// is in it, and what the allocator adds to each.
 pub const FRAME_BYTES: usize = 192;
-/// Bytes of a place in the queue of topic messages, that of one that is held back or to be encoded included: the queue
-/// may be twice as long as what is in it, and three times while it grows.
+/// Bytes of a place in the queue of topic messages, or among those that are held back or to be encoded. The queue may
+/// be twice as long as what is in it, and three times while it grows.
 pub const PLACE_BYTES: usize = 128;
 
 /// The outgoing queue of one connection.
@@ -45,7 +44,7 @@ pub struct Outbox {
     /// Responses and statuses in order, each with its number.
     responses: Blocks<(u64, Bytes)>,
     throttles: Throttles,
-    /// Numbers given so far. Of what is queued the lower leaves first; of what may be dropped the lower is the older.
+    /// Numbers given so far. The lower number leaves first, and is the older where messages are dropped.
     produced: u64,
     /// Bytes of queued topic messages, without those held back.
     topic_bytes: usize,
@@ -95,8 +94,8 @@ impl Outbox {
         self.keep_bounded();
     }
 
-    /// Adds feedback of a goal, which may be lost as a message may: no throttle is for it, also not one of a topic
-    /// that has the action's name.
+    /// Adds feedback of a goal. It may be lost as a message may, but no throttle holds it back, not even that of a
+    /// topic with the action's name.
     pub fn push_feedback(&mut self, frame: Bytes) {
         if !self.may_fit(&frame) {
             return;
@@ -112,8 +111,8 @@ impl Outbox {
         !self.throttles.is_empty()
     }
 
-    /// Adds a response or a status. What throttling holds back of the topics in `supersedes` is discarded: it is from
-    /// before.
+    /// Adds a response or a status. Messages of the topics in `supersedes` that throttling holds back are older, and
+    /// are discarded.
     pub fn push_response(&mut self, frame: Bytes, supersedes: &[&str]) {
         for topic in supersedes {
             let held = self.throttles.discard(topic);
@@ -142,8 +141,7 @@ impl Outbox {
         }
     }
 
-    /// After an unsubscription: discards what is held back of a topic, and its throttle. What is queued leaves as it
-    /// would have.
+    /// Forgets a topic after an unsubscription: its throttle, and what is held back. What is queued still leaves.
     pub fn forget(&mut self, topic: &str) {
         let held = self.throttles.forget(topic);
         self.give_up(held);
@@ -207,7 +205,7 @@ impl Outbox {
         }
     }
 
-    /// The next `bytes` of what was taken have been written.
+    /// Notes that the next `bytes` of what was taken have been written.
     pub fn written(&mut self, mut bytes: usize) {
         while let Some(frame) = self.in_flight.front_mut() {
             let done = bytes.min(frame.left);
@@ -265,7 +263,7 @@ impl Outbox {
         self.response_bytes
     }
 
-    /// Bytes of those responses, their places included.
+    /// Bytes of the waiting responses, their places included.
     #[must_use]
     pub const fn response_cost(&self) -> usize {
         self.response_bytes + self.response_count * FRAME_BYTES
@@ -290,7 +288,7 @@ impl Outbox {
         self.topic_bytes + self.throttles.bytes()
     }
 
-    /// Bytes of those that may be taken now: without those held back.
+    /// Bytes of topic messages that may be taken now: without those held back.
     #[must_use]
     pub const fn queued_bytes(&self) -> usize {
         self.topic_bytes

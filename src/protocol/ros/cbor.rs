@@ -130,7 +130,7 @@ fn float(out: &mut Sink, value: f64) {
     out.extend(&value.to_be_bytes());
 }
 
-/// Every field that is there, in the type's order; others, which it does not have, are left out.
+/// Writes every field that is there, in the type's order. Members that the type does not have are left out.
 fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
     if msg.members().is_none() {
         return untyped(out, msg);
@@ -141,7 +141,7 @@ fn message(out: &mut Sink, one: Type, msg: Branch<'_, '_>) {
     for (field, value) in there {
         text(out, field.name);
         let (kind, count) = field.element();
-        // Looked up once, however many entries there are.
+        // The type is looked up once, however many entries there are.
         let inner = cdr::message_type(kind);
         match count {
             Count::One => single(out, kind, inner, value),

@@ -14,7 +14,7 @@ use crate::protocol::catalog::types::{Count, Type};
 
 /// Little-endian, without options.
 const HEADER: [u8; 4] = [0, 1, 0, 0];
-/// A field that is not there: as a number, a text, an array or a message it is the zero of that.
+/// A field that is not there: it stands for the zero of a number, a text, an array or a message.
 const ABSENT: Branch<'_, '_> = Branch::FALSE;
 
 /// The bytes of a message of that type.
@@ -23,14 +23,14 @@ pub fn encode(one: Type, msg: &Value) -> Vec<u8> {
     encode_tree(one, MessageTree::from(msg).root())
 }
 
-/// The same of a message that has been read otherwise.
+/// The bytes of a message that has been read otherwise.
 #[must_use]
 pub fn encode_tree(one: Type, msg: Branch<'_, '_>) -> Vec<u8> {
-    // More than that there can't be.
+    // A message can't have more bytes than that.
     encode_within(one, msg, usize::MAX).unwrap_or_default()
 }
 
-/// The same, unless it has more than `most` bytes: two of JSON (`{}`) may be a message of a hundred.
+/// The bytes of a message, unless there are more than `most`: two bytes of JSON (`{}`) may become a hundred.
 #[must_use]
 pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<u8>> {
     let mut writer = Writer {
@@ -41,7 +41,7 @@ pub fn encode_within(one: Type, msg: Branch<'_, '_>, most: usize) -> Option<Vec<
     writer.sink.finish()
 }
 
-/// The type of that name if it is a message's, which has the name of a package in front.
+/// The type of that name, if it is a message's: such a name has a package in front.
 pub(super) fn message_type(kind: &str) -> Option<Type> {
     kind.contains('/').then(|| types::find(kind)).flatten()
 }
@@ -55,7 +55,7 @@ impl Writer {
         for field in one.fields {
             let value = msg.get(field.name).unwrap_or(ABSENT);
             let (kind, count) = field.element();
-            // Looked up once, however many entries there are.
+            // The type is looked up once, however many entries there are.
             let inner = message_type(kind);
             match count {
                 Count::One => self.single(kind, inner, value),
@@ -69,7 +69,7 @@ impl Writer {
                         self.single(kind, inner, entry);
                     }
                 }
-                // Without a count in front: the type has it.
+                // No count stands in front, since the type has it.
                 Count::Exactly(count) => {
                     let mut entries = value.entries().into_iter().flatten();
                     for _ in 0..count {

@@ -1,7 +1,7 @@
 //! Reads what [`cdr`](super::cdr) writes: a message's bytes by its type, back to JSON.
 //!
-//! **Invariant:** bytes that do not fit the type are refused; however they lie, no more is allocated than some multiple
-//! of their length.
+//! **Invariant:** bytes that do not fit the type are refused, and no more is allocated than some multiple of their
+//! length.
 
 use serde_json::{Map, Value};
 
@@ -66,7 +66,7 @@ impl<'a> CdrReader<'a> {
                 Count::One => self.single(kind, inner)?,
                 Count::Any => {
                     let count = u32::from_le_bytes(self.aligned()?);
-                    // Each entry takes a byte at least, so that a count which lies ends with the bytes.
+                    // Each entry takes a byte at least, so a false count ends with the bytes.
                     let entries = (0..count).map(|_| self.single(kind, inner));
                     Value::Array(entries.collect::<Result<_, _>>()?)
                 }

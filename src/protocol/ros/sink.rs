@@ -11,7 +11,7 @@ pub(super) struct Sink {
 }
 
 impl Sink {
-    /// Nothing yet, and at most `most` bytes.
+    /// An empty sink for at most `most` bytes.
     pub(super) fn new(most: usize) -> Self {
         Self {
             bytes: Vec::with_capacity(most.min(256)),
@@ -39,7 +39,7 @@ impl Sink {
         }
     }
 
-    /// Whether more has been written than there may be: whoever writes on does so for nothing.
+    /// Whether more has been written than there may be: to go on writing is pointless.
     pub(super) const fn is_over(&self) -> bool {
         self.is_over
     }

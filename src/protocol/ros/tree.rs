@@ -3,7 +3,7 @@
 //! A node takes [`NODE_BYTES`], one at most for every two bytes of text (`1,1,1,`, `[[[[`): the longest message takes
 //! 48 MiB at worst. Texts lie where they were read; with escapes they are made anew, 8 bytes more for every 5.
 //!
-//! **Invariant:** a value is followed by all that is in it, and that by the next value: nothing points at anything, and
+//! **Invariant:** a value is followed by all that is in it, and then by the next value. Nothing points at anything, and
 //! dropping a tree is a loop.
 
 use std::borrow::Cow;
@@ -30,7 +30,7 @@ enum TreeNode<'a> {
     Number(Number),
     Text(Cow<'a, str>),
     Array(Extent),
-    /// Each member is its name, a text, and its value.
+    /// The members: each is a text, its name, and then its value.
     Object(Extent),
 }
 
@@ -44,8 +44,8 @@ struct Extent {
 }
 
 impl<'a> MessageTree<'a> {
-    /// Bytes of memory that the tree of a JSON text takes at most. In front of every value but the first stands one of
-    /// four characters; in texts they mean nothing, and count all the same.
+    /// Bytes of memory that the tree of a JSON text takes at most. One of four characters stands in front of every
+    /// value but the first. Within texts they mean nothing, but are counted too.
     #[must_use]
     pub fn room(text: &[u8]) -> usize {
         let is_in_front = |byte: &u8| u8::from(matches!(byte, b',' | b':' | b'[' | b'{'));
@@ -232,8 +232,7 @@ impl<'t, 'a> Branch<'t, 'a> {
         found.last().map(|(_, value)| value)
     }
 
-    /// The value at the end of that way: names of members, `0` for an array's first entry, with a slash in front of
-    /// each.
+    /// The value at that path: names of members, or `0` for an array's first entry, each with a slash in front.
     #[must_use]
     pub fn pointer(self, way: &str) -> Option<Self> {
         way.split('/')
@@ -280,7 +279,7 @@ impl<'t, 'a> Branch<'t, 'a> {
         }
     }
 
-    /// The number, if it is one that is whole, not negative, and fits.
+    /// The number, if it is a whole one, not negative, and fits.
     #[must_use]
     pub fn as_u64(self) -> Option<u64> {
         self.number()?.as_u64()

@@ -154,8 +154,8 @@ const fn is_numeric(byte: u8) -> bool {
     matches!(byte, b'0'..=b'9' | b'-' | b'+' | b'.' | b'e' | b'E')
 }
 
-/// Whether a JSON number rounds to infinity, by its digits and its exponent, in one pass. Making an `f64` of
-/// it would take as long as three hundred of its bytes where it lies close to halfway between two.
+/// Whether a JSON number rounds to infinity, by its digits and its exponent, in one pass. To make an `f64` of it may
+/// take as long as three hundred of its bytes, if it lies close to halfway between two.
 fn overflows(token: &[u8]) -> bool {
     let exponent_at = token.iter().position(|byte| matches!(byte, b'e' | b'E'));
     if exponent_at.is_none() && token.len() <= SAFE_DIGITS {
@@ -168,7 +168,7 @@ fn overflows(token: &[u8]) -> bool {
     let Some(first) = mantissa.iter().position(|byte| matches!(byte, b'1'..=b'9')) else {
         return false;
     };
-    // How many digits stand before the point once the exponent has moved it; none or fewer behind zeros.
+    // How many digits stand before the point once the exponent has moved it; 0 or less where zeros follow the point.
     let shift = if first < point {
         whole(point - first)
     } else {

@@ -38,8 +38,8 @@ impl Nesting {
         }
     }
 
-    /// Goes on with `bytes`: how many were scanned, and what stopped the scan. A newline stops it before, all else
-    /// behind.
+    /// Goes on with `bytes`. Returns how many were scanned, and what stopped the scan: it stops before a newline, and
+    /// behind anything else.
     pub(super) fn scan(&mut self, bytes: &[u8]) -> (usize, Option<Event>) {
         let mut at = 0;
         while let Some(&byte) = bytes.get(at) {
@@ -109,7 +109,7 @@ impl Nesting {
 
 /// How many bytes from the start are plain inside a string: neither its end, nor an escape, nor a newline.
 pub(crate) fn plain_in_string(bytes: &[u8]) -> usize {
-    /// Most strings are keys and names: they end before a block would pay.
+    /// Most strings are keys and names, and end before a block would pay.
     const SHORT: usize = 16;
     /// Bytes that the compiler compares with a few vector instructions.
     const BLOCK: usize = 32;

@@ -1,4 +1,4 @@
-//! The first bytes of a connection, and whether they are ours to read or those of another protocol.
+//! The first bytes of a connection: are they JSON to be read here, or another protocol?
 //!
 //! **Invariant:** what opens like HTTP, TLS or BSON is never read as JSON: a web page could otherwise drive the arm by
 //! posting at the port.
@@ -86,9 +86,9 @@ pub fn opening(first: &[u8]) -> Opening {
 
 /// Whether a malformed line is one that every request of a browser has in its head: `start` is how the line begins.
 ///
-/// A page may choose its request's method where browsers think that it speaks to its own server, which a hostile name
-/// server makes them think. Then the opening is none of `METHODS`, but the head comes before the body all the same, and
-/// has a line that names the host.
+/// A page may choose the method of a request to its own server, and a hostile name server can make a browser take us
+/// for that. The opening is then none of `METHODS`, but the head still comes before the body, and has a line that names
+/// the host.
 #[must_use]
 pub fn is_host_line(start: &str) -> bool {
     let name = start.split(':').next().unwrap_or_default();

@@ -1,6 +1,6 @@
 //! The members of a JSON object and the entries of an array, as they stand in the text.
 //!
-//! **Invariant:** one pass over the text; memory for what is asked for alone.
+//! **Invariant:** the text is read in one pass, and memory is taken only for what is asked for.
 
 use std::fmt;
 

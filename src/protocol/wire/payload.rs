@@ -16,7 +16,7 @@ pub struct Payload(Arc<Inner>);
 #[derive(Debug)]
 struct Inner {
     raw: Box<RawValue>,
-    /// As it is written, where that is not as it came.
+    /// The text as it is written, if it differs from what came.
     line: Option<Box<str>>,
 }
 
@@ -33,7 +33,7 @@ impl Payload {
         self.0.raw.get()
     }
 
-    /// Bytes that it takes, whoever shares them: its text, the line where that is another text, and what keeps them.
+    /// Bytes that it takes, shared or not: its text, the line if that is another text, and what keeps them.
     #[must_use]
     pub fn allocated(&self) -> usize {
         let counts = 2 * size_of::<usize>();

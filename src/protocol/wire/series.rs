@@ -63,15 +63,15 @@ pub(super) fn leading(bytes: &[u8]) -> Option<(&str, usize)> {
     (length > 0).then_some((topic, length))
 }
 
-/// How long the first message of frames for one client is: of a series one line, of anything else (more bytes than a
-/// series has, fragments, binary) all of it. A message of megabytes takes no longer.
+/// How long the first message of frames for one client is: one line of a series, all of anything else (fragments,
+/// binary, or more bytes than a series has). A message of megabytes takes no longer.
 #[must_use]
 pub fn first_message(frames: &[u8]) -> usize {
     first_messages(frames, 0).0
 }
 
-/// The first messages of frames for one client that have so many bytes together, or all of them: how long these are,
-/// and how many. One at least.
+/// How long, and how many, the first messages of frames for one client are that have so many bytes together: one at
+/// least, and at most all of them.
 #[must_use]
 pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
     if frames.len() > MAX_SERIES || !frames.starts_with(HEAD) {
@@ -84,8 +84,8 @@ pub fn first_messages(frames: &[u8], bytes: usize) -> (usize, usize) {
     (end, lines(before) + 1)
 }
 
-/// How many lines end in `bytes`. So few at a time that their number fits into a byte: the compiler makes that many
-/// times as fast.
+/// How many lines end in `bytes`. They are counted in chunks whose count fits into a byte, of which the compiler makes
+/// much faster code.
 fn lines(bytes: &[u8]) -> usize {
     let ends = |part: &[u8]| part.iter().map(|byte| u8::from(*byte == b'\n')).sum::<u8>();
     let parts = bytes.chunks(u8::MAX.into());
@@ -184,7 +184,7 @@ fn object(bytes: &[u8], mut at: usize) -> Option<usize> {
     }
 }
 
-/// Past a key, its colon and the spaces around that.
+/// Goes past a key, its colon and the spaces around the colon.
 fn key(bytes: &[u8], at: usize) -> Option<usize> {
     if *bytes.get(at)? != b'"' {
         return None;
@@ -200,7 +200,7 @@ fn past_space(bytes: &[u8], mut at: usize) -> usize {
     at
 }
 
-/// Past `true`, `false` or `null`.
+/// Goes past `true`, `false` or `null`.
 fn word(bytes: &[u8], at: usize) -> Option<usize> {
     let rest = bytes.get(at..)?;
     let words: [&[u8]; 3] = [b"true", b"false", b"null"];
@@ -208,7 +208,7 @@ fn word(bytes: &[u8], at: usize) -> Option<usize> {
     Some(at + word.len())
 }
 
-/// Past a number without an exponent; before an exponent, which nothing that may follow a value begins with.
+/// Goes past a number. It stops before an exponent, with which nothing begins that may follow a value.
 fn number(bytes: &[u8], start: usize) -> Option<usize> {
     let mut at = start;
     if *bytes.get(at)? == b'-' {
@@ -251,12 +251,12 @@ const fn before_mark(marks: u64) -> usize {
     ((marks & all(0x80)).trailing_zeros() / 8) as usize
 }
 
-/// Past the digits at `at`, eight at a time.
+/// Goes past the digits at `at`, eight at a time.
 fn past_digits(bytes: &[u8], mut at: usize) -> usize {
     loop {
         let values = eight(bytes, at) ^ all(b'0');
-        // 10 and above reach the top bit. A carry may mark what is behind a byte that is none, never what is before
-        // one.
+        // A value of 10 or more reaches the top bit. A carry may mark bytes behind the first that is no digit, never
+        // one before it.
         let digits = before_mark(values.wrapping_add(all(0x80 - 10)) | values);
         at += digits;
         if digits < 8 {
@@ -265,7 +265,7 @@ fn past_digits(bytes: &[u8], mut at: usize) -> usize {
     }
 }
 
-/// Past the end of a string of plain ASCII whose inside begins at `at`.
+/// Goes past the end of a string of plain ASCII whose inside begins at `at`.
 fn string(bytes: &[u8], mut at: usize) -> Option<usize> {
     loop {
         let text = eight(bytes, at);

@@ -61,7 +61,7 @@ pub(crate) fn push_quoted(text: &mut String, character: char) {
     }
 }
 
-/// Names a JSON value in words a sentence can end with: the value itself if it is short, else its kind.
+/// Names a JSON value at the end of a sentence: by the value itself if it is short, else by its kind.
 pub(crate) fn found(raw: &RawValue) -> String {
     match raw.get() {
         object if object.starts_with('{') => "an object".to_owned(),

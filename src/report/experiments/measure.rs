@@ -117,7 +117,7 @@ pub fn growth<const N: usize>(control: &ControlLoop<N>, sampling: Sampling) -> O
     }
 }
 
-/// As [`growth`] of each of the loops. Arms whose efforts are held are stepped side by side.
+/// The [`growth`] of each of the loops. Arms whose efforts are held are stepped side by side.
 #[must_use]
 pub fn growths<const N: usize>(
     controls: &[ControlLoop<N>],
@@ -151,7 +151,7 @@ fn held_growths<const N: usize>(controls: &[ControlLoop<N>]) -> Vec<Option<f64>>
     watched.iter().map(|(_, _, watch)| watch.growth()).collect()
 }
 
-/// As [`growth`], per control period of `substeps` steps, each effort one period late if `delayed`.
+/// The [`growth`] per control period of `substeps` steps, each effort one period late if `delayed`.
 #[must_use]
 pub fn sampled_growth<const N: usize>(
     control: &ControlLoop<N>,

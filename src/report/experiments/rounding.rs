@@ -31,7 +31,7 @@ const START: State<2> = State {
 /// How a step's increments are added to the state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Adding {
-    /// As the live arm does: what rounding takes is carried into the next step.
+    /// Sums as the live arm does: what rounding takes is carried into the next step.
     Compensated,
     /// Plainly.
     Plain,

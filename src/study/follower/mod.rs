@@ -1,9 +1,9 @@
-//! An arm under constant efforts, followed as exactly as is asked: to rounding, or within a tolerance.
+//! An arm under constant efforts, followed to rounding or within a tolerance.
 //!
 //! Its motion is expanded in a power series (`series.rs`); a step is as long as the last terms of it are small, and
 //! the series as long as the step. Positions and velocities are summed with compensation.
 //!
-//! **Invariant:** another path than any of the methods under study; the work of a span is bounded.
+//! **Invariant:** it computes the motion differently from every method under study, and the work of a span is bounded.
 
 #![allow(
     clippy::indexing_slicing,
@@ -21,18 +21,19 @@ use series::{ORDER, PowerSeries};
 /// The least tolerance that makes a difference: below it rounding is all that is left.
 pub const ROUNDING: f64 = 1e-16;
 
-/// Coefficients after which a span is given up: the motion is too wild to be followed. They are a thousand steps.
+/// Coefficients after which a span is given up, since the motion is too wild to be followed. They make a thousand
+/// steps.
 const MAX_COEFFICIENTS: u64 = 20_000;
 
 /// Terms that have to be small before a series is believed to have come to its end. An arm that is let go at rest and
 /// stretched along the horizontal has three in a row that vanish between two that do not.
 const LAST: usize = 4;
 
-/// A step may be that much longer than the last.
+/// The factor by which a step may be longer than the last.
 const LONGER: f64 = 1.25;
 
-/// A step that its series does not bear is tried that much shorter; where its last terms are [`MUCH`] too large, the
-/// other.
+/// Factors by which a step is shortened if its series does not bear it: the second one if its last terms are [`MUCH`]
+/// too large.
 const SHORTER: [f64; 2] = [0.95, 0.25];
 const MUCH: f64 = 1e9;
 
@@ -103,7 +104,7 @@ impl<const N: usize> Follower<N> {
         }
     }
 
-    /// The same motion in steps that are so many times as short as they might be.
+    /// Follows the same motion in steps that are so many times shorter than they might be.
     #[must_use]
     pub(super) fn cut(self, cuts: u32) -> Self {
         Self {
@@ -131,7 +132,7 @@ impl<const N: usize> Follower<N> {
         self.go_on(arm, effort, u64::MAX).unwrap_or(false)
     }
 
-    /// A span \[s\] lies ahead, to be followed by [`Follower::go_on`].
+    /// Begins a span \[s\], to be followed by [`Follower::go_on`].
     pub(super) fn begin(&mut self, span: f64) {
         self.ahead = Ahead {
             span,
@@ -187,7 +188,7 @@ impl<const N: usize> Follower<N> {
         let h = if small == LAST || cut >= whole {
             whole
         } else {
-            // Two steps of one length rather than a long one and a remnant.
+            // Two steps of one length are better than a long one and a remnant.
             cut.min(0.5 * rest.0)
         };
         let (dq, dv) = self.series.change(h);
@@ -223,7 +224,7 @@ impl<const N: usize> Follower<N> {
         step
     }
 
-    /// How many times the terms of `order` in a step \[s\], of which that `power` is given, are what they may be.
+    /// How many times too large the terms of `order` are in a step \[s\], whose `power` of that order is given.
     fn excess(&self, order: usize, step: f64, power: f64) -> f64 {
         let PowerSeries { angle, rate, .. } = &self.series;
         let of_angle = self.tolerance * step * (size(&rate[0]) + step * size(&rate[1]));

@@ -12,7 +12,7 @@
 //! Source: Jorba and Zou, *A software package for the numerical integration of ODEs by means of high-order Taylor
 //! methods*, Experimental Mathematics 14 (2005).
 //!
-//! **Invariant:** nothing but sums, products, quotients and square roots, so that every machine gives the same bits.
+//! **Invariant:** it uses sums, products, quotients and square roots alone, so that every machine gives the same bits.
 
 #![allow(
     clippy::indexing_slicing,
@@ -236,7 +236,7 @@ impl<const N: usize> Equation<N> {
             for row in pivot + 1..N {
                 let factor = matrix[row][pivot] * matrix[pivot][pivot];
                 for column in row..N {
-                    // Symmetric: what stands below the diagonal is still whole.
+                    // The matrix is symmetric, and the part below the diagonal is still whole.
                     let lost = factor * matrix[column][pivot];
                     matrix[column][row] -= lost;
                 }

@@ -52,7 +52,7 @@ impl Complex {
     /// Principal square root.
     pub(super) fn sqrt(self) -> Self {
         let modulus = self.modulus();
-        // The larger of the two parts first: the other follows without cancellation.
+        // The larger of the two parts is computed first, so that the other follows without cancellation.
         let part = (0.5 * (modulus + self.re.abs())).sqrt();
         if part == 0.0 {
             return Self::ZERO;

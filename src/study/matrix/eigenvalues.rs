@@ -142,7 +142,7 @@ impl Hessenberg {
     /// Whether the entry left of the diagonal in row `i` can be taken for zero.
     fn is_negligible(&self, i: usize, sweeps: usize) -> bool {
         let beside = self.at(i, i).modulus() + self.at(i - 1, i - 1).modulus();
-        // Beside two eigenvalues that are zero nothing is small; then the size of the whole matrix has to do.
+        // Nothing is small beside two eigenvalues that are zero: then the size of the whole matrix is taken.
         let scale = if sweeps < MAX_SWEEPS / 3 {
             beside
         } else {

@@ -1,9 +1,9 @@
 //! Small dense matrices: what the step matrices of the stability predictions need, sizes up to some ten.
 //!
-//! Uses nothing but floating point.
+//! It uses nothing but floating point.
 //!
-//! **Invariant:** no input panics or loops for ever; what can't be computed comes out as NaN, which no comparison
-//! takes for stable.
+//! **Invariant:** no input panics or loops for ever. A value that can't be computed is NaN, which no comparison takes
+//! for stable.
 
 #![allow(
     clippy::indexing_slicing,

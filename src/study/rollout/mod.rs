@@ -1,11 +1,10 @@
 //! An offline run of the arm, sample by sample, with its error against a reference.
 //!
-//! The run is the live loop, [`Simulation`], from any state. Its reference obeys the very same control law, looked at
-//! on the same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]): what
-//! is left is the error of the method alone. (Against a law that acts at every instant, holding the effort would cost
-//! an error of first order that no method can mend.) A second reference, in steps half as long and of an arm
-//! that differs in its last digits, says how far the first can be trusted: on a chaotic swing not beyond some twenty
-//! seconds.
+//! The run is the live loop, [`Simulation`], from any state. Its reference obeys the same control law, evaluated at the
+//! same instants and held for the same timestep, and follows the arm in between to rounding ([`Follower`]). So the
+//! difference is the error of the method alone. (Against a law that acts at every instant, holding the effort would
+//! cost an error of first order that no method can mend.) A second reference, in steps half as long and of an arm that
+//! differs in its last digits, says how far the first can be trusted, which is some twenty seconds on a chaotic swing.
 //!
 //! **Invariant:** steps, samples and work are bounded when a run is made, and a run cut into slices gives the same bits
 //! as one made at once.
@@ -15,9 +14,9 @@
     reason = "every index comes from `array::from_fn` over arrays of the same constant length"
 )]
 
-mod plan;
+mod request;
 
-pub use plan::{MAX_SAMPLES, MAX_STEPS, Plan, RolloutError};
+pub use request::{MAX_SAMPLES, MAX_STEPS, RolloutError, RolloutRequest};
 
 use super::follower::Follower;
 use crate::math::arm::{Arm, State};
@@ -29,7 +28,7 @@ use crate::math::simulation::{Divergence, Simulation};
 /// Longest span that a reference without control is asked to follow at once \[s\].
 const MAX_SPAN: f64 = 0.05;
 
-/// How far the samples are from the reference. As long as the samples, or shorter if the reference was lost on the way.
+/// How far the samples are from the reference: an entry per sample, or fewer if the reference was lost on the way.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Deviation {
     /// Largest error of a joint position, per sample \[rad\].
@@ -38,12 +37,11 @@ pub struct Deviation {
     pub uncertainties: Vec<f64>,
 }
 
-/// How many times its uncertainty an error is at least: below that, how far the reference itself is off would show in
-/// it.
+/// How many times its uncertainty a known error is at least: in a smaller one the reference's own error would show.
 const ABOVE_UNCERTAINTY: f64 = 4.0;
 
 impl Deviation {
-    /// The largest error \[rad\], if the references know it: `None` where it is of one size with what they differ by.
+    /// The largest error \[rad\], if the references know it: `None` if it is about as large as their difference.
     #[must_use]
     pub fn known(&self) -> Option<f64> {
         let error = self.largest();
@@ -83,17 +81,17 @@ impl<const N: usize> Rollout<N> {
     ///
     /// # Errors
     /// The first value that is out of bounds.
-    pub fn new(plan: Plan<N>) -> Result<Self, RolloutError> {
-        let steps = plan.check()?;
-        let simulation = plan.control.simulation(plan.start);
-        let references = plan.reference.then(|| {
+    pub fn new(request: RolloutRequest<N>) -> Result<Self, RolloutError> {
+        let steps = request.check()?;
+        let simulation = request.control.simulation(request.start);
+        let references = request.reference.then(|| {
             [1, 2].map(|cuts| Reference {
                 arm: if cuts == 1 {
-                    plan.control.arm
+                    request.control.arm
                 } else {
-                    neighbour(&plan.control.arm)
+                    neighbour(&request.control.arm)
                 },
-                follower: Follower::new(plan.start).cut(cuts),
+                follower: Follower::new(request.start).cut(cuts),
                 pid: simulation.pid().clone(),
                 lost: false,
                 behind: Behind::default(),
@@ -102,7 +100,7 @@ impl<const N: usize> Rollout<N> {
         let mut rollout = Self {
             simulation,
             steps,
-            samples: plan.samples.min(steps + 1),
+            samples: request.samples.min(steps + 1),
             references,
             times: vec![],
             positions: vec![],
@@ -122,8 +120,8 @@ impl<const N: usize> Rollout<N> {
         let bound = before.saturating_add(work.max(1));
         while !self.is_over() {
             if !self.is_behind() {
-                // To the next sample or, if a reference has to look at every step, so far that the work stays in
-                // bounds.
+                // The run goes to the next sample, or, if a reference has to look at every step, so far that the work
+                // stays in bounds.
                 let ahead = self.next_sample().saturating_sub(self.simulation.steps());
                 let wanted = ahead.min(self.stride()).max(1);
                 let taken = self.simulation.advance(wanted);
@@ -154,7 +152,8 @@ impl<const N: usize> Rollout<N> {
     }
 
     /// Steps that are made in one go: a reference without control is asked for spans of [`MAX_SPAN`] at most, and
-    /// nothing runs for longer than a slice may last. It depends on the plan alone, so that slices don't change bits.
+    /// nothing runs for longer than a slice may last. It depends on the request
+    /// alone, so that slices don't change bits.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -262,14 +261,14 @@ impl<const N: usize> Rollout<N> {
         self.references.as_ref().map(|_| &self.deviation)
     }
 
-    /// The place at which the run left the finite numbers, if it did; the samples end before.
+    /// The place at which a step led out of the finite numbers, if one did; the samples end before.
     #[must_use]
     pub fn divergence(&self) -> Option<Divergence> {
         self.simulation.divergence()
     }
 }
 
-/// The motion that the run ought to be.
+/// The motion that the run ought to have.
 #[derive(Debug, Clone)]
 struct Reference<const N: usize> {
     arm: Arm<N>,
@@ -305,8 +304,8 @@ impl<const N: usize> Default for Behind<N> {
 }
 
 impl<const N: usize> Reference<N> {
-    /// The run has gone on by `steps` steps of `timestep` \[s\]: one at a time if there is a law to obey, else all at
-    /// once.
+    /// Notes that the run has gone on by `steps` steps of `timestep` \[s\]: one at a time if there is a law to obey,
+    /// else all at once.
     fn fall_behind(&mut self, timestep: f64, steps: u64) {
         if self.lost || steps == 0 {
             return;
@@ -347,8 +346,8 @@ impl<const N: usize> Reference<N> {
     }
 }
 
-/// An arm that differs in the last digit of a length and a mass: what the equations of motion lose by rounding their
-/// constants is of that size, and the same in every step, so that steps of another length would not show it.
+/// An arm that differs in the last digit of a length and a mass. The equations of motion lose as much by rounding their
+/// constants, and lose the same in every step, so that steps of another length would not show it.
 fn neighbour<const N: usize>(arm: &Arm<N>) -> Arm<N> {
     let (mut lengths, mut masses) = (*arm.lengths(), *arm.masses());
     if let (Some(length), Some(mass)) = (lengths.first_mut(), masses.last_mut()) {

@@ -254,7 +254,7 @@ fn a_goal_is_announced_only_when_the_one_before_is_in_motion() {
             track: noting.clone().recipient(),
             command: noting.clone().recipient(),
             end: silent.clone().recipient(),
-            settle: silent.clone().recipient(),
+            add_barrier: silent.clone().recipient(),
         };
         let ik = Ik::<2>::new(silent.recipient()).start();
         let action = IkAction::new(ik.recipient(), tracker, noting.recipient()).start();

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use pendularm::actors::arm::ik::SolveError;
 use pendularm::actors::arm::ik_action::{CancelGoal, CancelRejected, GoalNews, GoalRejected};
 use pendularm::actors::arm::ik_action::{GoalOwner, SendGoal};
-use pendularm::actors::arm::sim::{ArmPose, Pose, Settle};
+use pendularm::actors::arm::sim::{ArmPose, Barrier, Pose};
 use pendularm::actors::node::Call;
 use pendularm::math::goal::Outcome;
 use pendularm::math::kinematics::{Target, Unreachable};
@@ -83,10 +83,10 @@ impl Handler<Call<CancelGoal>> for StandIn {
     }
 }
 
-impl Handler<Settle> for StandIn {
+impl Handler<Barrier> for StandIn {
     type Result = ();
 
-    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {
         let mut script = self.script.borrow_mut();
         for news in std::mem::take(&mut script.news) {
             script.owner.as_ref().unwrap().do_send(news);
@@ -107,7 +107,7 @@ async fn between_stand_ins(script: &Rc<RefCell<Script>>) -> (Addr<IkTrial<2>>, C
     let goals = GoalClient {
         send: stand_in.clone().recipient(),
         cancel: stand_in.clone().recipient(),
-        settle: stand_in.clone().recipient(),
+        barrier: stand_in.clone().recipient(),
     };
     let publish = registry.clone().recipient();
     let rng = fastrand::Rng::with_seed(1);

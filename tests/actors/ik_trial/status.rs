@@ -113,7 +113,7 @@ fn no_status_is_encoded_while_nobody_wants_it() {
         let goals = GoalClient {
             send: action.clone().recipient(),
             cancel: action.clone().recipient(),
-            settle: action.recipient(),
+            barrier: action.recipient(),
         };
         let rng = fastrand::Rng::with_seed(1);
         let trial = IkTrial::new(arm.recipient(), goals, publish, rng).start();

@@ -35,7 +35,7 @@ use pendularm::math::simulation::Simulation;
 use pendularm::protocol::catalog::{Service, Topic};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::error_estimate::estimate;
-use pendularm::study::gains::{GainsSearch, Wish};
+use pendularm::study::gains::{GainsRequirements, GainsSearch};
 use pendularm::study::linear::no_control;
 use pendularm::study::motion::Motion;
 use pendularm::study::planner::{Planning, Task};

@@ -117,11 +117,11 @@ fn advice_is_the_studys_and_what_is_left_out_is_the_arms_own() {
         let bench = study::<2>();
         let mut client = caller_of(&bench);
         let Present { control, state } = settings::<2>();
-        let wish = Wish {
+        let requirements = GainsRequirements {
             settling_time: 4.0,
             margin: 1.25,
         };
-        let mut search = GainsSearch::new(&control, wish).unwrap();
+        let mut search = GainsSearch::new(&control, requirements).unwrap();
         let found = loop {
             if let Some(found) = search.advance() {
                 break found.unwrap();
@@ -339,6 +339,6 @@ fn every_field_that_is_wrong_is_named_members_with_their_object() {
             timestep: Some(1e-6),
             ..RunOffline::default()
         };
-        assert!(matches!(bench.ask(too_long).await, Err(NotRun::Plan(_))));
+        assert!(matches!(bench.ask(too_long).await, Err(NotRun::Rollout(_))));
     });
 }

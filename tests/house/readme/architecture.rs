@@ -37,9 +37,13 @@ fn every_word_of_the_glossary_is_carried_by_what_it_names() {
             let (file, item) = place_of(path).unwrap_or_else(|| panic!("{path}: no such module"));
             if let Some(item) = item {
                 let source = text(&file);
-                let is_there = ["struct", "enum", "const", "fn", "trait"]
-                    .iter()
-                    .any(|kind| source.contains(&format!("pub {kind} {item}")));
+                let is_public = |kind: &&str| {
+                    let name = format!(" {kind} {item}");
+                    let mut lines = source.lines().map(str::trim_start);
+                    lines.any(|line| line.starts_with("pub") && line.contains(&name))
+                };
+                let kinds = ["struct", "enum", "const", "fn", "trait"];
+                let is_there = kinds.iter().any(is_public);
                 assert!(is_there, "{file} has no {item}");
             }
         }

@@ -6,7 +6,7 @@ use pendularm::math::integrator::Method;
 use pendularm::math::kinematics::forward;
 use pendularm::math::particle::Particle;
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::rollout::{Plan, Rollout};
+use pendularm::study::rollout::{Rollout, RolloutRequest};
 use serde_json::Value;
 use serde_json::value::RawValue;
 
@@ -86,7 +86,7 @@ fn roll_out<const N: usize>(computed: &Computed) -> Option<Value> {
     else {
         return None;
     };
-    let plan = Plan::<N> {
+    let request = RolloutRequest::<N> {
         control: ControlLoop::free(Arm::default())
             .with_method(Method::ALL[*method])
             .with_timestep(*timestep),
@@ -95,7 +95,7 @@ fn roll_out<const N: usize>(computed: &Computed) -> Option<Value> {
         samples: *samples,
         reference: false,
     };
-    let mut run = Rollout::new(plan).ok()?;
+    let mut run = Rollout::new(request).ok()?;
     while run.advance(10_000) > 0 {}
     let rows = |rows: &[[f64; N]]| rows.iter().map(|row| row.to_vec()).collect::<Vec<_>>();
     Some(serde_json::json!({

@@ -6,7 +6,7 @@ use pendularm::math::arm::{Arm, State};
 use pendularm::math::integrator::Method;
 use pendularm::math::pid::Setpoint;
 use pendularm::study::control_loop::ControlLoop;
-use pendularm::study::gains::{GainsSearch, MOVES, SETTLED, Wish};
+use pendularm::study::gains::{GainsRequirements, GainsSearch, MOVES, SETTLED};
 use pendularm::study::stability::limits;
 
 use super::{Dice, Tally, cases, property, run, tells};
@@ -21,11 +21,11 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
     let arm = Arm::<N>::new(lengths, masses, 9.81).unwrap();
     let method = Method::ALL[dice.0.usize(0..Method::ALL.len())];
     let free = ControlLoop::free(arm).with_method(method);
-    let wish = Wish {
+    let requirements = GainsRequirements {
         settling_time: 4.0,
         margin: 1.0 + dice.0.f64(),
     };
-    let mut search = GainsSearch::new(&free, wish).unwrap();
+    let mut search = GainsSearch::new(&free, requirements).unwrap();
     let answer = std::iter::repeat_with(|| search.advance()).find_map(|answer| answer);
     let Some(Ok(found)) = answer else {
         tally.open += 1;
@@ -38,16 +38,16 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
         setpoint: Setpoint::at(std::array::from_fn(|_| TAU * dice.any())),
         ..free
     };
-    assert!(found.settled_after <= wish.settling_time, "{told}");
+    assert!(found.settled_after <= requirements.settling_time, "{told}");
     let least = limits(&control).trusted().unwrap();
     assert!(
-        least >= 0.999 * wish.margin * free.timestep,
+        least >= 0.999 * requirements.margin * free.timestep,
         "{told}: {least}"
     );
     let mut live = control.simulation(State::rest());
     let mut off_at = 0.0;
     // Ten moves stand for all of them: another may take a half more.
-    while live.time() < 2.0 * wish.settling_time {
+    while live.time() < 2.0 * requirements.settling_time {
         assert!(live.step(), "{told}: diverged");
         let off = |i: usize| (live.state().position[i] - control.setpoint.position[i]).abs();
         if (0..N).any(|i| off(i) > SETTLED) {
@@ -55,7 +55,7 @@ fn suggested_gains_hold<const N: usize>(case: u64, tally: &mut Tally) {
         }
     }
     assert!(
-        off_at <= 1.5 * wish.settling_time,
+        off_at <= 1.5 * requirements.settling_time,
         "{told}: {off_at} s, {control:?}"
     );
 }

@@ -9,7 +9,7 @@ use pendularm::math::kinematics::forward;
 use pendularm::report::experiments::reference::{Law, ReferenceMotion};
 use pendularm::study::control_loop::ControlLoop;
 use pendularm::study::planner::{Planning, Task};
-use pendularm::study::rollout::{Plan, Rollout};
+use pendularm::study::rollout::{Rollout, RolloutRequest};
 
 use super::{Dice, Tally, cases, property, run, tells};
 
@@ -67,14 +67,14 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
     let control =
         ControlLoop::free(arm).with_method(Method::ALL[dice.0.usize(0..Method::ALL.len())]);
     let timestep = duration / f64::from(dice.0.u32(100..4000));
-    let plan = Plan {
+    let request = RolloutRequest {
         control: control.with_timestep(timestep),
         start,
         duration,
         samples: 5,
         reference: true,
     };
-    let mut rollout = Rollout::new(plan).unwrap();
+    let mut rollout = Rollout::new(request).unwrap();
     while rollout.advance(u64::MAX) > 0 {}
     let deviation = rollout.deviation().unwrap();
     if rollout.divergence().is_some() || deviation.errors.len() < 5 {
@@ -93,7 +93,7 @@ fn an_answered_error_is_the_true_one<const N: usize>(case: u64, tally: &mut Tall
         truth.angle_error(index, position).unwrap()
     });
     let off = off.fold(0.0, f64::max);
-    let told = format!("case {case}: {off:e} {plan:?} {deviation:?}");
+    let told = format!("case {case}: {off:e} {request:?} {deviation:?}");
     match deviation.known() {
         // The reference is off by no more than some times what two of them differ by.
         Some(error) => {

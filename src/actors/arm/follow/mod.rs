@@ -14,7 +14,7 @@ use std::time::Duration;
 use actix::prelude::*;
 
 use self::answers::{ResultCode, feedback, result};
-use crate::actors::arm::sim::{ArmMotion, ArmSim, JointMotion, MoveSetpoint, Settle, SettleWith};
+use crate::actors::arm::sim::{AddBarrier, ArmMotion, ArmSim, Barrier, JointMotion, MoveSetpoint};
 use crate::actors::node::{Done, ShutDown};
 use crate::actors::wire::action_client::{ActionClient, Canceller, NOT_ACTIVE};
 use crate::math::arm::State;
@@ -45,7 +45,7 @@ pub struct PathFollower<const N: usize> {
 pub struct PathArm<const N: usize> {
     motion: Recipient<ArmMotion<N>>,
     setpoint: Recipient<MoveSetpoint<N>>,
-    settle: Recipient<SettleWith>,
+    add_barrier: Recipient<AddBarrier>,
 }
 
 impl<const N: usize> PathArm<N> {
@@ -55,7 +55,7 @@ impl<const N: usize> PathArm<N> {
         Self {
             motion: arm.clone().recipient(),
             setpoint: arm.clone().recipient(),
-            settle: arm.clone().recipient(),
+            add_barrier: arm.clone().recipient(),
         }
     }
 }
@@ -99,7 +99,7 @@ pub struct FollowPath<const N: usize> {
     pub at_the_end: Tolerance<N>,
     /// How long after the end they may take for that \[s\].
     pub patience: f64,
-    /// Who sent it.
+    /// The client that sent it.
     pub client: ActionClient,
     /// Dropped when the arm is on its way, or the goal refused.
     pub done: Done,
@@ -109,7 +109,7 @@ pub struct FollowPath<const N: usize> {
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct StopFollowing {
-    /// Who wants it; an error status goes there where no such goal is active.
+    /// The client that wants it; it gets an error status if no such goal is active.
     pub from: Canceller,
     /// Dropped when the goal has ended.
     pub done: Done,
@@ -122,7 +122,7 @@ impl<const N: usize> Actor for PathFollower<N> {
 
     fn started(&mut self, ctx: &mut Context<Self>) {
         let own = ctx.address().recipient();
-        self.arm.settle.do_send(SettleWith(own));
+        self.arm.add_barrier.do_send(AddBarrier(own));
     }
 }
 
@@ -157,11 +157,11 @@ impl<const N: usize> Handler<StopFollowing> for PathFollower<N> {
     }
 }
 
-impl<const N: usize> Handler<Settle> for PathFollower<N> {
+impl<const N: usize> Handler<Barrier> for PathFollower<N> {
     type Result = AtomicResponse<Self, ()>;
 
     /// Looks at the arm first: its goal may have ended by a reset, which is to be said before that is answered.
-    fn handle(&mut self, _: Settle, _: &mut Context<Self>) -> Self::Result {
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) -> Self::Result {
         if self.active.is_none() {
             return AtomicResponse::new(Box::pin(std::future::ready(()).into_actor(self)));
         }
@@ -295,7 +295,7 @@ impl<const N: usize> PathFollower<N> {
         }
     }
 
-    /// Ends the goal, whose setpoint somebody else's has replaced, or a reset that came since the arm was looked at.
+    /// Ends the goal: another setpoint or a reset has replaced its own since the arm was last looked at.
     fn tell_why(&self, ctx: &mut Context<Self>) {
         let motion = self.arm.motion.send(ArmMotion).into_actor(self);
         ctx.wait(motion.map(|motion, node, _| {

@@ -17,7 +17,7 @@ pub(super) struct ActiveGoal<const N: usize> {
     pub(super) target: Target,
     /// The setpoint that was sent \[rad\].
     pub(super) positions: [f64; N],
-    /// Who follows it besides the subscribers.
+    /// The one that follows the goal besides the subscribers.
     pub(super) owner: Option<GoalOwner<N>>,
     /// The status that its client hears if it ends before it is reached.
     pub(super) if_preempted: GoalStatus,

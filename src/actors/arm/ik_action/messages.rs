@@ -29,7 +29,7 @@ impl<const N: usize> Ask for SendGoal<N> {
     type Answer = Result<String, GoalRejected>;
 }
 
-/// Who follows a goal besides the subscribers.
+/// The one that follows a goal besides the subscribers.
 #[derive(Clone)]
 pub enum GoalOwner<const N: usize> {
     /// A node.

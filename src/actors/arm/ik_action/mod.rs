@@ -22,7 +22,7 @@ pub use self::messages::{
 use self::services::requests;
 use crate::actors::arm::ik::Solve;
 use crate::actors::arm::sim::{
-    ArmSim, CommandGoal, EndGoal, GoalJudged, Settle, SettleWith, TrackGoal, Tracking, joint_names,
+    AddBarrier, ArmSim, Barrier, CommandGoal, EndGoal, GoalJudged, TrackGoal, Tracking, joint_names,
 };
 use crate::actors::node::{Call, Interest, Publish, Reply, ShutDown, ask};
 use crate::actors::wire::Nodes;
@@ -54,8 +54,8 @@ pub struct GoalTracker<const N: usize> {
     pub command: Recipient<CommandGoal<N>>,
     /// Ends it.
     pub end: Recipient<EndGoal<N>>,
-    /// Hears whom to ask for news that are not passed on yet.
-    pub settle: Recipient<SettleWith>,
+    /// Hears whom to send a [`Barrier`] before it says that it stands still.
+    pub add_barrier: Recipient<AddBarrier>,
 }
 
 impl<const N: usize> GoalTracker<N> {
@@ -66,7 +66,7 @@ impl<const N: usize> GoalTracker<N> {
             track: arm.clone().recipient(),
             command: arm.clone().recipient(),
             end: arm.clone().recipient(),
-            settle: arm.clone().recipient(),
+            add_barrier: arm.clone().recipient(),
         }
     }
 }
@@ -109,7 +109,7 @@ impl<const N: usize> Actor for IkAction<N> {
 
     fn started(&mut self, ctx: &mut Context<Self>) {
         let own = ctx.address().recipient();
-        self.arm.settle.do_send(SettleWith(own));
+        self.arm.add_barrier.do_send(AddBarrier(own));
     }
 }
 
@@ -159,10 +159,10 @@ impl<const N: usize> Handler<GoalJudged<N>> for IkAction<N> {
     }
 }
 
-impl<const N: usize> Handler<Settle> for IkAction<N> {
+impl<const N: usize> Handler<Barrier> for IkAction<N> {
     type Result = ();
 
-    fn handle(&mut self, _: Settle, _: &mut Context<Self>) {}
+    fn handle(&mut self, _: Barrier, _: &mut Context<Self>) {}
 }
 
 impl<const N: usize> Handler<Interest> for IkAction<N> {
@@ -274,7 +274,7 @@ impl<const N: usize> IkAction<N> {
         }))
     }
 
-    /// Publishes the goal's result, if the goal is still the active one, which then it is no more.
+    /// Publishes the result of the goal, and forgets the goal. Does nothing if another goal is active.
     fn conclude(&mut self, judged: &GoalJudged<N>) {
         let Some(goal) = self.active.take_if(|goal| goal.is(judged)) else {
             return;

@@ -1,11 +1,11 @@
 //! How a trial moves the arm: by goals that it sends to `ik_action`.
 //!
-//! **Invariant:** each wish is done whole before the next.
+//! **Invariant:** each command is carried out whole before the next.
 
 use actix::prelude::*;
 
 use crate::actors::arm::ik_action::{CancelGoal, GoalNews, GoalOwner, Meant, SendGoal};
-use crate::actors::arm::sim::{ArmPose, Settle};
+use crate::actors::arm::sim::{ArmPose, Barrier};
 use crate::actors::node::{Call, ask};
 use crate::math::trial::TrialCommand;
 
@@ -17,7 +17,7 @@ pub struct GoalClient<const N: usize> {
     /// Cancels it.
     pub cancel: Recipient<Call<CancelGoal>>,
     /// Waits until the news so far have arrived.
-    pub settle: Recipient<Settle>,
+    pub barrier: Recipient<Barrier>,
 }
 
 /// The answer of `ik_action` to a goal that the trial sent.
@@ -29,7 +29,7 @@ pub(super) struct GoalAnswer<const N: usize> {
     pub(super) lengths: Option<[f64; N]>,
 }
 
-/// Takes the trial's wishes to `ik_action`, one after another.
+/// Takes the trial's commands to `ik_action`, one after another.
 pub(super) async fn carry_out<const N: usize>(
     commands: Vec<TrialCommand>,
     arm: Recipient<ArmPose<N>>,

@@ -18,7 +18,7 @@ use self::goals::{GoalAnswer, carry_out};
 pub use self::services::{NotStarted, SkipTarget, StartTrial, StopTrial, Terms};
 use super::ik::target_message;
 use super::ik_action::GoalNews;
-use crate::actors::arm::sim::{ArmPose, Pose, Settle};
+use crate::actors::arm::sim::{ArmPose, Barrier, Pose};
 use crate::actors::node::{Call, Interest, Publish, Reply, Unserved};
 use crate::actors::wire::Nodes;
 use crate::math::trial::{Changes, Conclusion, Rejection, Trial, TrialCommand, sample};
@@ -242,10 +242,10 @@ enum Pending {
 impl<const N: usize> IkTrial<N> {
     /// Asks the arm, and goes on when all that it said before has been heard too.
     fn ask_arm(&self, intent: Intent, ctx: &mut Context<Self>) {
-        let (arm, settle, own) = (self.arm.clone(), self.goals.settle.clone(), ctx.address());
+        let (arm, barrier, own) = (self.arm.clone(), self.goals.barrier.clone(), ctx.address());
         let question = async move {
             let pose = arm.send(ArmPose).await.ok();
-            let _ = settle.send(Settle).await;
+            let _ = barrier.send(Barrier).await;
             own.do_send(PoseKnown { pose, intent });
         };
         ctx.spawn(question.into_actor(self));

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use actix::prelude::*;
 
 use super::messages::{
-    ArmPose, CommandGoal, EndGoal, GoalJudged, Pose, Settle, SettleWith, TrackGoal, Tracking,
+    AddBarrier, ArmPose, Barrier, CommandGoal, EndGoal, GoalJudged, Pose, TrackGoal, Tracking,
 };
 use super::node::ArmSim;
 use super::state::goals::{Tracked, pose};
@@ -84,8 +84,8 @@ impl<const N: usize> Handler<EndGoal<N>> for ArmSim<N> {
 
 impl<const N: usize> ArmSim<N> {
     /// Takes up to `steps` steps; fewer if a goal is reached on the way, or if the simulation diverges. For a caller
-    /// that `waits` they end at feedback too, which the caller finds `underway`: a step by hand may be longer than a
-    /// sixtieth of a second, and each has feedback for every subscriber.
+    /// that `waits` they end at feedback too, which the caller finds `underway`: a single step while paused may be
+    /// longer than a sixtieth of a second, and each has feedback for every subscriber.
     pub(super) fn advance(&mut self, steps: u64, waits: bool) -> u64 {
         let past = self.goals.past;
         let tracked = self.goals.tracked.as_mut();
@@ -128,26 +128,26 @@ impl<const N: usize> ArmSim<N> {
 
     /// Answers once all that the arm has said of goals is published: news of a goal go by way of its owner, and none
     /// may come after the answer that the arm stands still.
-    pub(super) fn once_settled(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
+    pub(super) fn after_barriers(&self, ctx: &mut Context<Self>, answer: impl FnOnce() + 'static) {
         let owners = self.goals.owners.iter();
-        let asked: Vec<_> = owners.map(|owner| owner.send(Settle)).collect();
+        let asked: Vec<_> = owners.map(|owner| owner.send(Barrier)).collect();
         if asked.is_empty() {
             return answer();
         }
-        let settled = async move {
+        let passed = async move {
             for one in asked {
-                // Who has ended publishes nothing either.
+                // An owner that has ended publishes nothing either.
                 let _ = one.await;
             }
         };
-        ctx.spawn(settled.into_actor(self).map(move |(), _, _| answer()));
+        ctx.spawn(passed.into_actor(self).map(move |(), _, _| answer()));
     }
 }
 
-impl<const N: usize> Handler<SettleWith> for ArmSim<N> {
+impl<const N: usize> Handler<AddBarrier> for ArmSim<N> {
     type Result = ();
 
-    fn handle(&mut self, SettleWith(owner): SettleWith, _: &mut Context<Self>) {
+    fn handle(&mut self, AddBarrier(owner): AddBarrier, _: &mut Context<Self>) {
         self.goals.owners.push(owner);
     }
 }

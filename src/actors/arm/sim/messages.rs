@@ -47,7 +47,7 @@ pub struct Present<const N: usize> {
 #[rtype(result = "Option<f64>")]
 pub struct HeldLimit<const N: usize>(pub ControlLoop<N>);
 
-/// Whom to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
+/// The node to ask for [`HeldLimit`]. From the runtime, once; an arm that never hears it knows no limit.
 #[derive(Message)]
 #[rtype(result = "()")]
 pub struct Consult<const N: usize>(pub Recipient<HeldLimit<N>>);
@@ -71,8 +71,8 @@ pub struct Pose<const N: usize> {
     pub time: f64,
     /// Resets of the arm so far.
     pub resets: u64,
-    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It runs backwards only with
-    /// a reset, where it had become longer than a clock can tell.
+    /// Simulation time that has passed since the arm was started, through all resets \[s\]. It falls only
+    /// at a reset that forgets a past of thirty years.
     pub simulated: f64,
 }
 
@@ -93,18 +93,18 @@ pub struct TrackGoal<const N: usize> {
     pub owner: Recipient<GoalJudged<N>>,
 }
 
-/// Answered by an owner of goals when all that reached it before has been dealt with. From the arm, before it says
-/// that it stands still, and from `ik_trial`, which so hears all that the arm had said about goals before it gave the
-/// time.
+/// A barrier in the mailbox of an owner of goals, which answers it when it has dealt with all that came before. From
+/// the arm, before it says that it stands still, and from `ik_trial`, which so hears all that the arm had said about
+/// goals before it gave the time.
 #[derive(Message, Debug, Clone, Copy)]
 #[rtype(result = "()")]
-pub struct Settle;
+pub struct Barrier;
 
-/// The sender tells clients of goals, and is to be asked before the arm says that it stands still. From `ik_action` and
-/// `joint_trajectory_controller`, when they start.
+/// The sender tells clients of goals: the arm is to send it a [`Barrier`] before it says that it stands still. From
+/// `ik_action` and `joint_trajectory_controller`, when they start.
 #[derive(Message, Debug, Clone)]
 #[rtype(result = "()")]
-pub struct SettleWith(pub Recipient<Settle>);
+pub struct AddBarrier(pub Recipient<Barrier>);
 
 /// The goal has begun.
 #[derive(MessageResponse, Debug, Clone, Copy, PartialEq)]

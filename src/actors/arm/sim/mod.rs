@@ -20,8 +20,8 @@ mod tell;
 
 pub use self::limit::LEAST_PAUSE;
 pub use self::messages::{
-    ArmPose, ArmSettings, CommandGoal, Consult, EndGoal, GoalJudged, HeldLimit, Pose, Present,
-    Settle, SettleWith, SimulationTime, Snapshot, TakeSnapshot, TrackGoal, Tracking,
+    AddBarrier, ArmPose, ArmSettings, Barrier, CommandGoal, Consult, EndGoal, GoalJudged,
+    HeldLimit, Pose, Present, SimulationTime, Snapshot, TakeSnapshot, TrackGoal, Tracking,
 };
 pub use self::motion::{ArmMotion, JointMotion, MoveSetpoint};
 pub use self::node::{ArmSim, BREATHER, PUBLISH_RATE, WAKE_UP_BUDGET, joint_names};

@@ -73,7 +73,7 @@ pub struct ArmSim<const N: usize> {
     pub(super) steps: VecDeque<Steps>,
     /// They are being taken.
     pub(super) is_stepping: bool,
-    /// Who hears of everything that the steps depend on, if anybody does.
+    /// The listener to everything that the steps depend on, if there is one.
     pub(super) journal: Option<Journal<N>>,
 }
 

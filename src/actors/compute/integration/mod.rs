@@ -1,4 +1,4 @@
-//! `/arm_sim/integration_step`: each method on `x'' = f(t)`, done on the worker pool, apart from the live arm.
+//! `/arm_sim/integration_step`: a method integrates `x'' = f(t)` on the worker pool, apart from the live arm.
 //!
 //! The request is parsed, computed and written by a worker, in slices. A connection hands over one computation at a
 //! time.
@@ -98,7 +98,7 @@ impl Work<Result<Box<Particle>, NotIntegrated>> for Integrating {
     }
 }
 
-/// Parses the formula; every field that is wrong is named, in the order of the request, whose first it is.
+/// Parses the formula. Every field that is wrong is named, in the order of the request; the formula comes first.
 fn begin(ask: IntegrationStep) -> Result<Particle, NotIntegrated> {
     let function = ask.function.as_deref().map(Expression::parse);
     let mut rejected = match &function {

@@ -13,7 +13,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::streamed::StreamedResponse;
-/// Integrates a particle of one degree of freedom. All or nothing.
+/// Integrates a particle of one degree of freedom. One bad field rejects the whole request.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct IntegrationStep {
     /// Its acceleration as a formula \[m/s²\], of t in s.
@@ -24,9 +24,9 @@ pub struct IntegrationStep {
     pub xdot0: Option<f64>,
     /// Length of a step \[s\], greater than 0.
     pub dt: Option<f64>,
-    /// How many.
+    /// The number of steps.
     pub steps: Option<u64>,
-    /// The method that takes them.
+    /// The method that takes the steps.
     pub method: Option<Method>,
     /// Fields that were not valid.
     pub rejected: Rejections,
@@ -42,7 +42,7 @@ pub enum NotIntegrated {
     /// Fields were not valid.
     #[error("{0}")]
     Rejected(Rejections),
-    /// They do not go together.
+    /// The fields do not go together.
     #[error(transparent)]
     Particle(#[from] ParticleError),
 }
@@ -111,7 +111,7 @@ impl SamplesWriter {
         }
     }
 
-    /// Writes some more; the frame, once it is whole.
+    /// Writes some more. Returns the frame once it is whole.
     fn advance(&mut self) -> Option<Bytes> {
         let samples = self.particle.positions().len();
         let end = samples.min(self.entry + NUMBERS_PER_LOOK);

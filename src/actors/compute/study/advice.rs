@@ -17,7 +17,7 @@ use crate::protocol::catalog::Service;
 use crate::protocol::op::Arguments;
 use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::study::control_loop::ControlLoop;
-use crate::study::gains::{GainsError, GainsSearch, SuggestedGains, Wish};
+use crate::study::gains::{GainsError, GainsRequirements, GainsSearch, SuggestedGains};
 use crate::study::linear::no_control;
 use crate::study::planner::{Candidate, PlanError, Planned, Planning, Task};
 
@@ -47,7 +47,7 @@ impl<const N: usize> Ask for SuggestGains<N> {
 pub struct Suggested<const N: usize> {
     /// The gains, and how they fared.
     pub found: SuggestedGains<N>,
-    /// The timestep that they are for \[s\].
+    /// The timestep that the gains are for \[s\].
     pub timestep: f64,
 }
 
@@ -90,9 +90,9 @@ impl<const N: usize> Ask for PlanRun<N> {
 /// A plan that has been tried.
 #[derive(Debug, Clone)]
 pub struct PlannedRun {
-    /// The cheapest.
+    /// The cheapest run that was found.
     pub best: Candidate,
-    /// All that were tried and good enough.
+    /// All runs that were tried and good enough.
     pub planned: Planned,
     /// Whether a controller holds the arm: its period is then the timestep.
     pub controlled: bool,
@@ -158,7 +158,7 @@ impl<const N: usize> Callable for PlanRun<N> {
     fn read(service: Service, arguments: &Arguments) -> Result<Self, Rejections> {
         let mut fields = Fields::read(arguments, service)?;
         let ask = Self {
-            // The catalog requires it: where it is not there, the question is rejected.
+            // The catalog requires the field: without it the question is rejected.
             error: fields.number("error", Bound::Positive).unwrap_or(f64::NAN),
             duration: fields.number("duration", Bound::Positive),
             servo: fields.boolean("servo").unwrap_or(false),
@@ -223,7 +223,7 @@ const DEFAULT_SETTLING: f64 = 4.0;
 const DEFAULT_MARGIN: f64 = 1.25;
 /// How long a plan is unless it is said \[s\].
 const DEFAULT_DURATION: f64 = 10.0;
-/// The same under control: a move has settled by then.
+/// How long a plan under control is \[s\]: a move has settled by then.
 const DEFAULT_MOVE: f64 = 4.0;
 
 // ---- gains ----------------------------------------------------------------------------------------------------------
@@ -231,7 +231,7 @@ const DEFAULT_MOVE: f64 = 4.0;
 /// A search for gains on its way.
 pub(super) enum GainsWork<const N: usize> {
     Asked(Box<(SuggestGains<N>, Present<N>)>),
-    /// The timestep that the gains are for goes with it.
+    /// A search, and the timestep that the gains are for.
     Searching(Box<GainsSearch<N>>, f64),
 }
 
@@ -282,11 +282,11 @@ fn begin_search<const N: usize>(
         timestep: ask.timestep.unwrap_or(present.timestep),
         ..*present
     };
-    let wish = Wish {
+    let requirements = GainsRequirements {
         settling_time: ask.settling_time.unwrap_or(DEFAULT_SETTLING),
         margin: ask.margin.unwrap_or(DEFAULT_MARGIN),
     };
-    Ok((GainsSearch::new(&control, wish)?, control.timestep))
+    Ok((GainsSearch::new(&control, requirements)?, control.timestep))
 }
 
 // ---- plan -----------------------------------------------------------------------------------------------------------
@@ -294,7 +294,7 @@ fn begin_search<const N: usize>(
 /// A plan on its way.
 pub(super) enum PlanWork<const N: usize> {
     Asked(Box<(PlanRun<N>, Present<N>)>),
-    /// Whether the arm is controlled goes with it.
+    /// A planning, and whether the arm is controlled.
     Planning(Box<Planning<N>>, bool),
 }
 
@@ -349,7 +349,7 @@ fn task<const N: usize>(ask: &PlanRun<N>, present: &Present<N>) -> Result<Task<N
         None => control.arm,
         Some(params) => params.applied_to(&control.arm)?,
     };
-    // A servo has the gains that are set; else an arm is left to itself, as in a rollout.
+    // With the servo the gains are those that are set. Otherwise the arm is left to itself, as in a rollout.
     let missing = if ask.servo {
         control.gains
     } else {

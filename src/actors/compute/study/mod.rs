@@ -129,7 +129,7 @@ impl<const N: usize> Handler<HeldLimit<N>> for Study<N> {
 /// The arm's question for its limit: one slice.
 struct Limiting<const N: usize> {
     control: ControlLoop<N>,
-    /// Dropped unused, it says that there is no answer.
+    /// The way to the answer; if it is dropped unused, there is none.
     answer: Option<oneshot::Sender<f64>>,
 }
 

@@ -1,6 +1,6 @@
 //! How questions to `study` are read: as a whole.
 //!
-//! **Invariant:** one bad field refuses the whole question, and each that is bad is named.
+//! **Invariant:** one bad field refuses the whole question, and each bad field is named.
 
 use crate::protocol::op::fields::{Fields, Rejections};
 

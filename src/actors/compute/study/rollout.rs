@@ -1,7 +1,7 @@
 //! `/study/rollout`: an offline run of the arm, sample by sample, with its cost and its error.
 //!
 //! The run is made once by itself, against a worker's clock. If a reference is asked for, it is made again beside the
-//! reference, which costs far more than the run: so `took` is that of the run alone, whatever else was asked.
+//! reference, which costs far more than the run: so `took` is the time of the run alone, whatever else was asked.
 //!
 //! **Invariant:** the samples are the live arm's own steps, and a run in slices gives the same bits as one at once.
 
@@ -24,7 +24,7 @@ use crate::protocol::op::fields::{Bound, Fields, Rejections};
 use crate::protocol::wire::streamed::StreamedResponse;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::no_control;
-use crate::study::rollout::{Deviation, MAX_SAMPLES, Plan, Rollout, RolloutError};
+use crate::study::rollout::{Deviation, MAX_SAMPLES, Rollout, RolloutError, RolloutRequest};
 
 // ---- question -------------------------------------------------------------------------------------------------------
 
@@ -61,7 +61,7 @@ impl<const N: usize> Ask for RunOffline<N> {
 pub struct Ran<const N: usize> {
     /// The run.
     pub run: Rollout<N>,
-    /// The time of a worker that it took, alone.
+    /// The time of a worker that the run alone took.
     pub took: Duration,
 }
 
@@ -73,7 +73,7 @@ pub enum NotRun {
     Params(#[from] ArmError),
     /// There can't be such a run.
     #[error(transparent)]
-    Plan(#[from] RolloutError),
+    Rollout(#[from] RolloutError),
 }
 
 // ---- reading and writing --------------------------------------------------------------------------------------------
@@ -125,7 +125,7 @@ pub struct RolloutWriter<const N: usize> {
     writer: StreamedResponse,
     /// Index of the array that is being written.
     column: usize,
-    /// Its next entry.
+    /// Index of its next entry.
     entry: usize,
 }
 
@@ -149,7 +149,7 @@ impl<const N: usize> RolloutWriter<N> {
         }
     }
 
-    /// Writes some more; the frame, once it is whole.
+    /// Writes some more. Returns the frame once it is whole.
     fn advance(&mut self) -> Option<Bytes> {
         let Some(head) = ARRAYS.get(self.column) else {
             return Some(self.finish());
@@ -181,7 +181,8 @@ impl<const N: usize> RolloutWriter<N> {
     }
 
     fn finish(&mut self) -> Bytes {
-        // An error that is known for a part of the samples only is none that could be compared with another method's.
+        // An error that is known for some of the samples only can't be compared with another method's, and counts as
+        // unknown.
         let followed = self
             .run
             .deviation()
@@ -222,7 +223,7 @@ const DEFAULT_DURATION: f64 = 10.0;
 const DEFAULT_SAMPLES: u64 = 1001;
 /// Evaluations of the dynamics between two looks at the clock: some hundred microseconds.
 const EVALUATIONS_PER_LOOK: u64 = 2000;
-/// Numbers in a sample of the answer that are not one per joint, and as many again for brackets and commas.
+/// Numbers in a sample of the answer beside those of the joints, and as many again for brackets and commas.
 const COLUMNS: usize = 5;
 
 /// A run on its way.
@@ -236,8 +237,8 @@ pub(super) enum RolloutWork<const N: usize> {
 /// A run by itself, with the time that it took so far.
 pub(super) struct Timed<const N: usize> {
     ran: Ran<N>,
-    /// The plan to run again beside a reference, if that is wanted.
-    again: Option<Plan<N>>,
+    /// The run to be made again beside a reference, if that is wanted.
+    again: Option<RolloutRequest<N>>,
 }
 
 impl<const N: usize> RolloutWork<N> {
@@ -294,22 +295,25 @@ impl<const N: usize> Work<Result<Box<Ran<N>>, NotRun>> for RolloutWork<N> {
 
 /// Makes the run, which checks what concerns several fields.
 fn begin<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Timed<N>, NotRun> {
-    let plan = plan(ask, present)?;
-    let alone = Plan {
+    let request = request(ask, present)?;
+    let alone = RolloutRequest {
         reference: false,
-        ..plan
+        ..request
     };
     Ok(Timed {
         ran: Ran {
             run: Rollout::new(alone)?,
             took: Duration::ZERO,
         },
-        again: plan.reference.then_some(plan),
+        again: request.reference.then_some(request),
     })
 }
 
-/// The plan of the run, with the present settings where the question leaves something out.
-fn plan<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Plan<N>, NotRun> {
+/// The request for the run, with the present settings where the question leaves something out.
+fn request<const N: usize>(
+    ask: &RunOffline<N>,
+    present: &Present<N>,
+) -> Result<RolloutRequest<N>, NotRun> {
     let control = &present.control;
     let arm = match &ask.params {
         None => control.arm,
@@ -317,10 +321,10 @@ fn plan<const N: usize>(ask: &RunOffline<N>, present: &Present<N>) -> Result<Pla
     };
     let gains = ask.gains.as_ref();
     let setpoint = ask.setpoint.map(Setpoint::at);
-    Ok(Plan {
+    Ok(RolloutRequest {
         control: ControlLoop {
             arm,
-            // A part of the law that is left out is switched off, as the whole law is where all are.
+            // A part of the law that is left out is switched off; without any the whole law is.
             gains: gains.map_or(no_control(), |gains| gains.applied_to(&no_control())),
             setpoint: setpoint.unwrap_or(control.setpoint),
             method: ask.method.unwrap_or(control.method),

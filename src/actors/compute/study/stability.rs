@@ -4,7 +4,7 @@
 //! Gains that are all zero ask about the arm left to itself. The motion is the one that is ahead of the arm as it is
 //! now.
 //!
-//! **Invariant:** a limit is there only where something limits, and 0 where no timestep is stable; never made up.
+//! **Invariant:** a limit is given only where something limits, and is 0 where no timestep is stable.
 
 use bytes::Bytes;
 use serde::Serialize;

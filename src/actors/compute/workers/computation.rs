@@ -13,7 +13,7 @@ pub const SLICE: Duration = Duration::from_millis(1);
 pub enum Progress {
     /// It waits for its next turn.
     Unfinished,
-    /// It can't begin yet: it tries again when another has ended, or after a moment.
+    /// It can't begin yet, and tries again when another has ended, or after a moment.
     Waiting,
     /// It has answered and can be dropped.
     Finished,
@@ -24,7 +24,7 @@ pub trait Computation: Send {
     /// Works until `deadline` or the end, whichever is first, and answers at the end.
     fn advance(&mut self, deadline: Instant) -> Progress;
 
-    /// True once nobody waits for the answer any more: it may be dropped.
+    /// Whether nobody waits for the answer any more, so that it may be dropped.
     fn is_abandoned(&self) -> bool {
         false
     }

@@ -1,13 +1,14 @@
 //! A few threads that do the heavy requests in turns, so that no client waits for another's million steps.
 //!
-//! A computation is advanced for one slice and waits for its next turn, which goes to whoever has had least of the
-//! workers' processor time (`workers/turns.rs`): what a busy machine keeps a worker from is charged to nobody. A
-//! connection has at most one computation here at a time (the rest wait in the connection), so each connection gets the
-//! same share, and one that asks for little waits for nobody who asks for much. What they hold together is counted when
-//! room is taken for its answer ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
+//! A computation is advanced for one slice and waits for its next turn. The turn goes to the client that has had least
+//! of the workers' processor time (`workers/turns.rs`); time that a busy machine takes from a worker is charged to
+//! nobody. A connection has at most one computation here at a time (the rest wait in the connection), so each
+//! connection gets the same share, and one that asks for little does not wait for those that ask for much. The memory
+//! of a computation is counted when room is taken for its answer
+//! ([`Reply::reserve`](crate::actors::node::Reply::reserve)).
 //!
-//! At most [`MAX_ADMITTED`] are here at once, one for every connection that there can be: nobody is refused because of
-//! what others ask. Computations whose callers have gone make room.
+//! At most [`MAX_ADMITTED`] computations are here at once, one for every possible connection: nobody is refused because
+//! of what others ask. Computations whose callers have gone make room.
 //!
 //! **Invariant:** a computation that panics takes neither its worker nor anybody else's computation with it.
 
@@ -27,7 +28,7 @@ use crate::actors::resources::priority::give_way;
 
 /// Computations that may be here at once, waiting or running: one of each connection.
 pub const MAX_ADMITTED: usize = MAX_CONNECTIONS;
-/// The refusal of one too many.
+/// The refusal when there are too many computations.
 pub const BUSY: &str =
     "busy: as many computations of all clients wait as may wait; try again later";
 
@@ -56,8 +57,7 @@ impl WorkerPool {
         Ok(pool)
     }
 
-    /// A pool without workers: whoever has it calls [`WorkerPool::turn`], as a simulation does, whose only thread is
-    /// its own.
+    /// A pool without workers, whose owner calls [`WorkerPool::turn`]. It is for a simulation that has one thread only.
     #[must_use]
     pub fn without_threads() -> Self {
         let shared = Arc::default();
@@ -95,7 +95,7 @@ impl WorkerPool {
         let why = {
             let mut queue = self.shared.lock();
             if queue.admitted() >= MAX_ADMITTED {
-                // They may have many megabytes.
+                // The abandoned computations may have many megabytes.
                 free_elsewhere(queue.take_abandoned());
             }
             let has_room = of == RUNTIME || queue.admitted() < MAX_ADMITTED;

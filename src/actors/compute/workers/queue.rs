@@ -10,9 +10,9 @@ use super::turns::{Ticket, Turns};
 use crate::actors::panics::contain;
 use crate::actors::resources::work_clock;
 
-/// How often those that can't begin try again.
+/// Pause between two tries of computations that can't begin.
 const TRY_AGAIN: Duration = Duration::from_millis(10);
-/// How many of them do at a time: each looks at what every client holds.
+/// How many of them try at a time: each try looks at what every client holds.
 const FEW: usize = 32;
 
 /// The queue, and the news that it has changed.
@@ -30,24 +30,24 @@ pub(super) struct Queue {
     pub(super) turns: Turns<Job>,
     /// Computations that can't begin yet.
     waiting: Vec<(Ticket, Job)>,
-    /// When they last tried.
+    /// When the computations that can't begin last tried.
     tried: Option<Instant>,
     pub(super) closed: Option<&'static str>,
 }
 
 impl Queue {
-    /// Takes out those for whose answers nobody waits.
+    /// Takes out the computations for whose answers nobody waits.
     pub(super) fn take_abandoned(&mut self) -> Vec<Job> {
         self.retry();
         self.turns.take_waiting_if(|job| job.is_abandoned())
     }
 
-    /// Has those that could not begin try again.
+    /// Has the computations that could not begin try again.
     pub(super) fn retry(&mut self) {
         self.retry_first(self.waiting.len());
     }
 
-    /// The same for so many of them, those first that have waited longest since they tried.
+    /// Has so many of them try again. Those that have not tried for longest come first.
     fn retry_first(&mut self, most: usize) {
         self.tried = Some(Instant::now());
         let few = self.waiting.len().min(most);
@@ -90,7 +90,7 @@ impl PoolState {
     fn take(&self) -> Option<(Ticket, Job)> {
         let mut queue = self.lock();
         loop {
-            // Others may be computing for minutes.
+            // The other computations may take minutes.
             let is_time = |tried: Instant| tried.elapsed() >= TRY_AGAIN;
             if !queue.waiting.is_empty() && queue.tried.is_none_or(is_time) {
                 queue.retry_first(FEW);
@@ -114,8 +114,8 @@ impl PoolState {
         }
     }
 
-    /// Takes a computation back after its turn; gives it out again, with what it is to be refused for, if it was its
-    /// last.
+    /// Takes a computation back after its turn. If that was its last, returns it, with the reason if it is to be
+    /// refused.
     fn put_back(&self, place: Ticket, job: Job, progress: Progress, took: Duration) -> Option<End> {
         let mut queue = self.lock();
         match (progress, queue.closed) {
@@ -133,7 +133,7 @@ impl PoolState {
         None
     }
 
-    /// Ends a computation whose last turn began when this thread had had so much of a processor.
+    /// Ends a computation. Its last turn began when this thread had used so much processor time.
     fn end(&self, place: Ticket, End { mut job, why }: End, began: Duration) {
         // Dropped outside the lock: the end of a computation may free many megabytes.
         let end = contain(move || {

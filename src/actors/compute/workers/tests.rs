@@ -148,7 +148,7 @@ impl Computation for TimedTurn {
     fn refuse(&mut self, _why: &'static str) {}
 }
 
-/// Who waits in its turns has more of them: it is charged for what it has had of a processor.
+/// A computation that waits in its turns has more of them: it is charged only for the processor time that it had.
 #[test]
 fn what_a_worker_was_kept_from_is_charged_to_nobody() {
     const TURNS: usize = 40;

@@ -1,4 +1,4 @@
-//! Whose turn it is on the workers: whoever has had least of their time.
+//! Turns on the workers: the next goes to the client that has had least of their time.
 //!
 //! Fair queueing by a clock that advances, while work is done, at the pace at which each client would be served if all
 //! who are there were served at once (Demers, Keshav and Shenker, *Analysis and Simulation of a Fair Queueing
@@ -17,7 +17,7 @@ use crate::actors::ConnectionId;
 
 /// The client for which a computation is done; none for the runtime's own.
 pub type Owner = Option<ConnectionId>;
-/// For whom the runtime's own computations are done.
+/// The client that the runtime's own computations count for.
 pub const RUNTIME: Owner = None;
 
 /// Pieces of work that take turns.
@@ -50,20 +50,20 @@ impl<T> Default for Turns<T> {
 }
 
 impl<T> Turns<T> {
-    /// Takes in a client's work: behind those that have had no more than it.
+    /// Adds a client's work, behind all that have had no more time than it.
     pub(super) fn enter(&mut self, of: impl Into<Owner>, work: T) {
         let of = of.into();
         let reading = self.ahead.remove(&of).unwrap_or_default();
         self.wait(Ticket { of, reading }, work);
     }
 
-    /// Puts work back that was kept away, and so claims nothing for that time.
+    /// Puts work back that was kept away; it claims nothing for that time.
     pub(super) fn wait(&mut self, mut place: Ticket, work: T) {
         place.reading = place.reading.max(self.clock);
         self.waiting.push_back((place, work));
     }
 
-    /// Whose turn it is; to be given back by [`Turns::again`] or [`Turns::leave`].
+    /// Takes the work whose turn it is. The turn is given back by [`Turns::again`] or [`Turns::leave`].
     pub(super) fn next(&mut self) -> Option<(Ticket, T)> {
         let readings = self.waiting.iter().enumerate();
         let (least, _) = readings.min_by_key(|(_, (place, _))| place.reading)?;
@@ -96,7 +96,7 @@ impl<T> Turns<T> {
         self.running = self.running.saturating_sub(1);
     }
 
-    /// All that wait for their turn; none of them waits any more.
+    /// Takes out all work that waits for its turn.
     pub(super) fn take_waiting(&mut self) -> Vec<T> {
         self.waiting.drain(..).map(|(_, work)| work).collect()
     }

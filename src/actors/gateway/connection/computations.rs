@@ -21,7 +21,7 @@ impl Computations {
         self.waiting.push_back((request, share));
     }
 
-    /// So many wait that the client is not read.
+    /// Whether so many wait that the client is not read.
     pub(super) fn are_too_many(&self) -> bool {
         self.waiting.len() >= MAX_COMPUTATIONS_WAITING
     }
@@ -31,14 +31,14 @@ impl Computations {
         self.running.is_none() && !self.waiting.is_empty()
     }
 
-    /// Takes the next, which runs from now on.
+    /// Takes the next call; it runs from now on.
     pub(super) fn start(&mut self) -> Option<Request> {
         let (request, share) = self.waiting.pop_front()?;
         self.running = Some(share);
         Some(request)
     }
 
-    /// The one that ran has been answered.
+    /// Notes that the running call has been answered.
     pub(super) fn end(&mut self) {
         self.running = None;
     }

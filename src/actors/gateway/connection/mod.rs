@@ -5,7 +5,7 @@
 //! what they are sent into the outbox; the writer, which the same actor polls behind its handlers, drains it. A
 //! client that reads slowly fills its own outbox and nothing else.
 //!
-//! Generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
+//! The connection is generic over the stream, so that tests put an in-memory pipe in its place and run in virtual time.
 //!
 //! **Invariant:** responses and statuses are never dropped; while too many wait, the client is not read.
 

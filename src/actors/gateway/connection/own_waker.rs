@@ -3,7 +3,7 @@
 //! A connection's actor is polled for every message that its client hears, and the client's session is a part of it.
 //! The session mostly waits, so it is polled only when something that it waits for has woken it.
 //!
-//! **Invariant:** a part that was woken is polled; one that was not costs a look at a flag.
+//! **Invariant:** a part that was woken is polled; any other costs a look at a flag.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -82,7 +82,7 @@ mod tests {
                 Poll::Ready(())
             }
         }));
-        // A clone: in an unoptimised program the original need not be known as the same as its clones.
+        // A clone is kept: in an unoptimised program the original may not count as the same as its clones.
         let task = Waker::noop().clone();
         let mut poll = || {
             Pin::new(&mut part)

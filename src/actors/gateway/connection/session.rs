@@ -43,7 +43,7 @@ enum DetectedProtocol {
     /// It sends an HTTP request that is answered.
     #[cfg(feature = "web")]
     Http,
-    /// It speaks another protocol, or not in time; holds the error for it.
+    /// It speaks another protocol, or has not spoken in time; holds the error for it.
     Foreign(String),
     /// The runtime has ended the connection first.
     Finished,
@@ -51,7 +51,7 @@ enum DetectedProtocol {
 
 /// How a client is served.
 enum HowServed {
-    /// It is spoken with; what has been read of it so far is in here.
+    /// Frames are exchanged with it; this holds what has been read of it so far.
     Json(FrameReader),
     /// Its request is answered.
     #[cfg(feature = "web")]
@@ -133,8 +133,8 @@ impl ClientSession {
         }
     }
 
-    /// Says to a client that has not shown the token why it is not admitted: later, the more wrong ones came from its
-    /// address.
+    /// Tells a client that has not shown the token why it is not admitted. The more wrong tokens came from its address,
+    /// the later it is told.
     async fn refuse_unauthenticated<S>(
         &self,
         stream: &mut S,
@@ -257,9 +257,9 @@ impl ClientSession {
             .await;
     }
 
-    /// Reads until the first bytes tell what the client speaks. A client that ends before that spoke JSON, if anything.
-    /// One that is silent may stay so, unless it has something to show until `due`; one that has begun what may
-    /// become a request has to go on.
+    /// Reads until the first bytes tell what the client speaks. A client that ends before that counts as one that
+    /// speaks JSON. A silent client may stay silent, unless it has something to show until `due`; a client that has
+    /// begun what may become a request has to go on.
     async fn detect_protocol<S: AsyncRead + Unpin>(
         &self,
         stream: &mut S,
@@ -271,7 +271,7 @@ impl ClientSession {
             let read = tokio::select! {
                 biased;
                 () = self.shared.finished() => return DetectedProtocol::Finished,
-                // A few bytes decide: there is room for them.
+                // A few bytes decide, and there is room for them.
                 read = stream.read_buf(&mut first.bytes) => read,
                 () = sleep_until(deadline.unwrap_or_else(Instant::now)), if deadline.is_some() => {
                     return DetectedProtocol::Foreign(match due {

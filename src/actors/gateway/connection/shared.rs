@@ -136,12 +136,12 @@ impl Shared {
         !self.computations.borrow().is_empty()
     }
 
-    /// Nobody waits for the computations any more.
+    /// Gives up the computations: nobody waits for them any more.
     pub(super) fn abandon_computations(&self) {
         self.computations.take();
     }
 
-    /// Nothing more is read; what is queued is sent.
+    /// Ends reading; what is queued is still sent.
     pub(super) fn finish(&self) {
         self.finishing.set(true);
         self.outgoing.wake_writer();

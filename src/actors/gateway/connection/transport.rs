@@ -27,7 +27,7 @@ pub(super) trait Inbound {
     /// fails, the client is gone.
     fn read(&mut self, chunk: &mut BytesMut) -> impl Future<Output = io::Result<usize>>;
 
-    /// As [`Inbound::read`] for a client that was refused: nothing that comes is looked at.
+    /// Reads as [`Inbound::read`] does, from a client that was refused: nothing that comes is looked at.
     fn swallow(&mut self, chunk: &mut BytesMut) -> impl Future<Output = io::Result<usize>> {
         self.read(chunk)
     }

@@ -1,7 +1,7 @@
 //! Unfinished input: how much a client has begun to send and not completed, and how long it may take.
 //!
-//! Told the time; knows no clock. Time counts only while the client is waited for: one that is not read for a while
-//! loses nothing.
+//! It is told the time, and knows no clock. Time counts only while the client is waited for: a client that is not read
+//! for a while loses none.
 //!
 //! **Invariant:** what is kept of unfinished frames is charged to the client's account, as it is allocated.
 
@@ -25,12 +25,12 @@ pub(super) struct Unfinished {
 /// The bytes that a client has sent before it is clear how it is to be served.
 pub(super) struct First {
     pub(super) bytes: BytesMut,
-    /// Counts them.
+    /// The share of the account that counts them.
     pub(super) unfinished: Unfinished,
 }
 
 impl First {
-    /// Nothing has come yet; there is room for so many bytes.
+    /// Makes room for so many bytes; none have come yet.
     pub(super) fn with_room(bytes: usize, account: &Arc<Account>) -> Self {
         let mut unfinished = Unfinished::new(account);
         let bytes = BytesMut::with_capacity(bytes);
@@ -48,7 +48,7 @@ impl Unfinished {
         }
     }
 
-    /// So many bytes are kept now.
+    /// Notes that so many bytes are kept now.
     pub(super) fn keep(&mut self, bytes: usize) {
         if bytes != self.share.bytes() {
             self.share.resize(bytes);
@@ -61,7 +61,7 @@ impl Unfinished {
         self.received = 0;
     }
 
-    /// The client was waited for so long, and sent so many bytes.
+    /// Notes that the client was waited for so long, and sent so many bytes.
     pub(super) fn wait(&mut self, time: Duration, received: usize) {
         self.waited += time;
         self.received += received;

@@ -1,5 +1,5 @@
-//! The registry: every client, topic and service; fans published topics out to subscribed connections, and routes
-//! calls. `state.rs` has its state, which is made of `tables/`; `ops/` are the methods that change it.
+//! The registry: it knows every client, topic and service, fans messages out to subscribers, and routes calls.
+//! `state.rs` has its state, which is made of `tables/`; `ops/` are the methods that change it.
 //!
 //! **Invariant:** a message is encoded once, whatever the number of its subscribers, and not at all without any.
 
@@ -208,7 +208,7 @@ impl Handler<FinishAll> for Registry {
     type Result = ();
 
     fn handle(&mut self, _: FinishAll, _: &mut Context<Self>) {
-        // Oldest first: the order is the same in every run.
+        // The oldest go first, so that the order is the same in every run.
         let mut clients: Vec<_> = self.clients.iter().collect();
         clients.sort_unstable_by_key(|(id, _)| **id);
         for (_, client) in clients {

@@ -1,6 +1,7 @@
 //! The registry's state: its clients, topics, services and nodes, and what several of its ops do with them.
 //!
-//! **Invariant:** what a client has registered stands here as long as the client, and then until its turn to go.
+//! **Invariant:** what a client has registered stands here as long as the client does, and then until the cleanup takes
+//! it.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
@@ -37,9 +38,9 @@ pub struct Registry {
     pub(super) topics: Topics,
     pub(super) services: Services,
     pub(super) action_servers: ActionServers,
-    /// Left behind by those who have gone, to be cleaned up.
+    /// The registrations of clients that have gone, to be cleaned up.
     pub(super) leftovers: Leftovers,
-    /// When the next cleanup is, and the task that waits for that.
+    /// When the next cleanup is, and the task that waits for it.
     pub(super) next_cleanup: Option<(Instant, SpawnHandle)>,
     pub(super) nodes: Nodes,
     /// The last message of each latched topic that has subscribers.
@@ -68,14 +69,14 @@ pub(crate) struct Client {
     /// Topics that the runtime listens to and that this client has explicitly unadvertised: its messages there are
     /// dropped until it advertises again.
     pub(super) withdrawn: HashSet<Topic>,
-    /// In order of their names: the topics' owners hear of its going in that order.
+    /// Its subscriptions, in order of the topics' names: their owners hear of the client's going in that order.
     pub(super) subscriptions: BTreeMap<Arc<str>, Vec<Subscription>>,
     pub(super) provided: HashMap<Box<str>, Share>,
     /// Actions that it serves.
     pub(super) served_actions: HashMap<Box<str>, Share>,
     /// Statuses that it wants.
     pub(super) verbosity: Verbosity,
-    /// Dropped once no call of this client waits any more, if it has stopped sending.
+    /// A guard that is dropped once no call of this client waits, if it has stopped sending.
     pub(super) answered: Option<oneshot::Sender<()>>,
 }
 
@@ -103,7 +104,7 @@ impl Registry {
         }
     }
 
-    /// The same for at most so many clients at once.
+    /// A registry without nodes, for at most so many clients at once.
     #[must_use]
     pub fn serving_at_most(self, max_connections: usize) -> Self {
         Self {
@@ -137,12 +138,12 @@ impl Client {
         self.pass(self.outlets.account.count(frame), service);
     }
 
-    /// The same with one that has been counted already.
+    /// Sends a response that has been counted already.
     pub(super) fn pass(&self, frame: Bytes, service: Option<Service>) {
         self.outlets.respond.do_send(Response { frame, service });
     }
 
-    /// From now on the client is told in this form why a call failed, if one is given.
+    /// Sets the form in which the client is told why a call failed, if one is given.
     pub(super) fn set_error_form(&self, form: Option<ErrorForm>) {
         if let Some(form) = form {
             let wants_text = form == ErrorForm::Text;
@@ -150,13 +151,13 @@ impl Client {
         }
     }
 
-    /// Its subscription of that `id` to the topic in that spelling.
+    /// The client's subscription of that `id` to the topic in that spelling.
     pub(super) fn subscription(&self, topic: &str, id: Option<&str>) -> Option<&Subscription> {
         let mut of_topic = self.subscriptions.get(topic)?.iter();
         of_topic.find(|one| one.id.as_deref() == id)
     }
 
-    /// Takes what a registration costs whose names have so many bytes.
+    /// Takes the share of a registration whose names have so many bytes.
     pub(super) fn register(&self, bytes: usize) -> Share {
         self.outlets.account.take(REGISTRATION_BYTES + 3 * bytes)
     }
@@ -203,7 +204,7 @@ impl Registry {
         }
     }
 
-    /// Forgets a client and all that there was for it.
+    /// Forgets a client and everything about it.
     pub(super) fn forget(&mut self, id: ConnectionId) {
         self.withdraw(id);
         self.services.forget_caller(id);
@@ -254,7 +255,7 @@ impl Registry {
         self.tap.is_set() || self.topics.has_subscribers(topic)
     }
 
-    /// Nobody wants messages on that topic any more.
+    /// Notes that nobody wants messages on that topic any more.
     pub(super) fn let_rest(&mut self, topic: &str) {
         if let Some(topic) = Topic::from_name(topic) {
             self.latched.remove(&topic);
@@ -318,7 +319,7 @@ impl Registry {
     }
 }
 
-/// Who sent the frame that is being performed, and its `id`.
+/// The sender of the frame that is being performed, and the frame's `id`.
 pub(crate) struct FrameOrigin {
     pub(super) from: ConnectionId,
     pub(super) id: Option<Payload>,

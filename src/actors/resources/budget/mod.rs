@@ -28,7 +28,7 @@ pub const MAX_HELD: usize = 384 * MIB;
 /// Bytes that the program has resident at most, whatever clients do: what is counted, what an allocator adds, and the
 /// program itself. What the system keeps for sockets is not in it.
 pub const MAX_MEMORY: usize = 640 * MIB;
-/// Who holds no more bytes never gives way: 1,024 such clients fit.
+/// A client that holds no more bytes never gives way: 1,024 such clients fit.
 pub const MODEST: usize = 256 * 1024;
 /// An answer that takes no more than one such part of [`MAX_HELD`] is modest: it may be 60,000 steps long.
 pub const MODEST_PART: usize = 64;

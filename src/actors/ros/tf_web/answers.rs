@@ -36,7 +36,7 @@ pub(super) fn feedback(stamp: Stamp, id: String, feedback: TfMessage) -> FramesF
         header: Header { stamp, frame_id },
         status: WishStatus {
             goal_id: WishId { stamp, id },
-            // As ROS 1 counts: active.
+            // The status active, as ROS 1 counts.
             status: 1,
             text: "",
         },

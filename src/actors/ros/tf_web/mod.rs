@@ -1,11 +1,11 @@
 //! `tf2_web_republisher`: frames as web viewers want them, which can't put chains of frames together.
 //!
-//! Who asks by the service gets the name of a topic, on which every frame comes as seen from the world. Who sends a
-//! goal, by the action or by the topics of ROS 1's actions (which roslib 1 does), gets the frames that it names as
-//! feedback, seen from the frame that it names, at its rate.
+//! A client that asks by the service gets the name of a topic, on which every frame comes as seen from the world. Who
+//! sends a goal, by the action or by the topics of ROS 1's actions (which roslib 1 does), gets the frames that it names
+//! as feedback, seen from the frame that it names, at its rate.
 //!
-//! **Invariant:** nothing is asked of the arm while nobody wants frames; at most [`MAX_WISHES`] wishes are kept, and who
-//! has few loses none to who has many.
+//! **Invariant:** nothing is asked of the arm while nobody wants frames; at most [`MAX_WISHES`] wishes are kept, and a
+//! client with few loses none to one with many.
 
 mod answers;
 mod wire;
@@ -67,11 +67,11 @@ pub struct WishFrames {
     pub target: String,
     /// Time between two messages.
     pub period: Duration,
-    /// Who gets them.
+    /// The receiver of the frames.
     pub by: Wisher,
 }
 
-/// Who wishes for frames.
+/// A receiver of frames.
 pub enum Wisher {
     /// A client that has sent a goal of the action.
     Client(Box<ActionClient>),

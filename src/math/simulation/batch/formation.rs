@@ -1,7 +1,6 @@
-//! Arms in the lanes of a few pairs of registers, who comes into a lane, and when one leaves.
+//! Arms in the lanes of a few pairs of registers: which arm gets a lane, and when one leaves it.
 //!
-//! A lane whose arm has left goes to the next one that waits, so that arms which end early, and all but the last of
-//! those that take more steps than others, leave none of them empty.
+//! A lane whose arm has left goes to the next arm that waits. So no lane is empty before the last arms are at work.
 //!
 //! **Invariant:** a lane without an arm holds one that rests without gravity, so that it can go on stepping beside the
 //! others without ever diverging.
@@ -27,7 +26,7 @@ pub(super) const PAIRS: usize = 2;
 /// A few pairs' worth of arms of one kind, and those that wait for a lane.
 pub(super) struct Formation<'q, 'a, S: Simd, const N: usize> {
     pairs: [Lanes<Wide<S, K>, N>; PAIRS],
-    /// Who has which lane, pair after pair.
+    /// The arm in each lane, pair after pair.
     seats: Vec<Option<Seat<'a, N>>>,
     waiting: Drain<'q, Seat<'a, N>>,
 }
@@ -87,7 +86,7 @@ impl<'q, 'a, S: Simd, const N: usize> Formation<'q, 'a, S, N> {
                 }
                 let mut next = lanes.next::<WEIGHS>(kind.method, kind.controlled);
                 if !Wide::<S, K>::all_finite(&next.state.position, &next.state.velocity) {
-                    // Moved out of the way, so that otherwise nothing has to be in memory.
+                    // This is moved out of the way, so that nothing else has to be in memory.
                     let mut parted = next;
                     let first = index * Wide::<S, K>::LANES;
                     part(lanes, &mut parted, &mut self.seats[first..], step);

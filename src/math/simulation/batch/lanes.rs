@@ -1,4 +1,4 @@
-//! As many arms as a pair of registers has lanes: to and fro, and where a step leads to.
+//! The arms in the lanes of a pair of registers: how they get in and out, and how they step.
 //!
 //! **Invariant:** no lane knows of another.
 
@@ -99,7 +99,7 @@ pub(super) struct Lanes<T, const N: usize> {
     gains: Gains<N, T>,
     setpoint: Setpoint<N, T>,
     timestep: T,
-    /// The disturbance; -0 where there is none, which is what changes no number by being added to it.
+    /// The disturbance; -0 where there is none, which changes no number when it is added.
     push: [T; N],
 }
 
@@ -167,7 +167,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
         }
     }
 
-    /// Has nobody in a lane.
+    /// Empties a lane.
     pub(super) fn rest(&mut self, lane: usize) {
         self.set(lane, &Lanes::resting(0.0));
     }
@@ -196,7 +196,7 @@ impl<T: Number, const N: usize> Lanes<T, N> {
 }
 
 impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
-    /// Where the next step leads to.
+    /// The state that the next step leads to.
     #[inline(always)]
     pub(super) fn next<const WEIGHS: bool>(
         &self,
@@ -219,7 +219,7 @@ impl<S: Simd, const K: usize, const N: usize> Lanes<Wide<S, K>, N> {
             }
         };
         let effort = entries!(zero, i => effort[i] + self.push[i]);
-        // As of one arm: all methods but Euler's share one copy of the dynamics, not eight.
+        // All methods but Euler's share one copy of the dynamics here too, not eight.
         let (state, carry) = if method == Method::Euler {
             stepped(
                 #[inline(always)]

@@ -28,12 +28,11 @@ use crate::math::number::Registers;
 /// Fewest evaluations for which an arm is put into a lane: to and fro takes about as long as one does alone.
 const WORTH_A_LANE: u64 = 2;
 
-/// Most arms that wait for a lane: so many more than there are lanes that those which the last arms leave empty count
-/// for little.
+/// Most arms that wait for a lane: so many more than there are lanes that empty lanes at the end count for little.
 const QUEUE: usize = 1024;
 
 impl Registers {
-    /// [`advance`] in these.
+    /// Does [`advance`] in these registers.
     pub fn advance<'a, const N: usize>(
         self,
         arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64)>,
@@ -41,7 +40,7 @@ impl Registers {
         self.take_all(arms.into_iter().map(|(arm, steps)| (arm, steps, None)));
     }
 
-    /// [`advance_with`] in these.
+    /// Does [`advance_with`] in these registers.
     pub fn advance_with<'a, const N: usize, O>(
         self,
         arms: impl IntoIterator<Item = (&'a mut Simulation<N>, u64, O)>,
@@ -89,11 +88,11 @@ impl Registers {
     /// Takes the steps of arms of one kind, who then have left the queue.
     fn run<const N: usize>(self, kind: StepKind, queue: &mut Vec<Seat<'_, N>>) {
         if queue.len() < 2 {
-            // Nobody to share a register with.
+            // There is no other arm to share a register with.
             queue.drain(..).for_each(Seat::alone);
             return;
         }
-        // Who takes longest begins first, so that the last ones end together.
+        // The arm that takes longest begins first, so that the last ones end together.
         queue.sort_by_key(|seat| Reverse(seat.left()));
         dispatch!(self.level(), simd => Formation::new(simd, queue.drain(..)).run(kind));
     }
@@ -112,8 +111,8 @@ pub fn advance<'a, const N: usize>(arms: impl IntoIterator<Item = (&'a mut Simul
     Registers::widest().advance(arms);
 }
 
-/// As [`advance`], and shows every state that a step leads to to the arm's own observer, which may end its advance
-/// there: what [`Simulation::advance_with`] is to one arm.
+/// Does what [`advance`] does, and shows each arm's own observer the state after every step. The observer may end its
+/// arm's advance there, as in [`Simulation::advance_with`].
 ///
 /// ```
 /// use std::ops::ControlFlow;

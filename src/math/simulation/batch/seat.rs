@@ -20,7 +20,7 @@ pub(super) struct StepKind {
 }
 
 impl StepKind {
-    /// How many there are.
+    /// How many kinds there are.
     pub(super) const COUNT: usize = 4 * Method::ALL.len();
 
     pub(super) fn of<const N: usize>(arm: &Simulation<N>) -> Self {
@@ -55,7 +55,7 @@ pub(super) type Observer<'a, const N: usize> = Box<dyn FnMut(&State<N>) -> Contr
 /// An arm on its way.
 pub(super) struct Seat<'a, const N: usize> {
     pub(super) arm: &'a mut Simulation<N>,
-    /// Steps taken, and to be taken still.
+    /// Steps that have been taken, and those still to be taken.
     taken: u64,
     left: u64,
     /// How many steps its disturbance acts in.
@@ -80,7 +80,7 @@ impl<'a, const N: usize> Seat<'a, N> {
         }
     }
 
-    /// Takes the steps without anybody beside it.
+    /// Takes the steps alone, in no lane.
     pub(super) fn alone(self) {
         match self.observer {
             Some(mut observe) => self.arm.advance_with(self.left, |arm| observe(arm.state())),
@@ -109,7 +109,7 @@ impl<'a, const N: usize> Seat<'a, N> {
         self.taken < self.pushes
     }
 
-    /// Counts steps that were taken; whether the disturbance ended with the last of them.
+    /// Counts steps that were taken. Returns whether the disturbance ended with the last of them.
     pub(super) fn count(&mut self, steps: u64) -> bool {
         let was_pushed = self.is_pushed();
         self.taken += steps;
@@ -148,7 +148,7 @@ fn pushes<const N: usize>(arm: &Simulation<N>, steps: u64) -> u64 {
     if acts(steps - 1) {
         return steps;
     }
-    // Times do not fall from step to step, rounding included, so halving finds the first that is too late.
+    // Times never fall from step to step, not even by rounding, so halving finds the first that is too late.
     let (mut early, mut late) = (0, steps - 1);
     while early < late {
         let middle = early + (late - early) / 2;

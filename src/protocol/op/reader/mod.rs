@@ -1,6 +1,6 @@
 //! Reads an operation from a frame.
 //!
-//! **Invariant:** a member is looked at only for the operations that have it; of every other its syntax alone counts.
+//! **Invariant:** a member is looked at only for the operations that have it; for all others only its syntax counts.
 
 mod actions;
 mod ours;
@@ -183,7 +183,7 @@ impl<'a> OpReader<'a> {
             type_name: self.optional_text("type")?,
             throttle: self.throttle()?,
             queue_length: self.queue_length()?,
-            // As one that is merged with nothing: what is binary is not cut up.
+            // Merging it with the default drops the fragment size of a binary encoding, which is not cut up.
             encoding: Encoding::default().merged(Encoding {
                 compression: self.compression()?,
                 fragment_size: self.fragment_size()?,
@@ -227,7 +227,7 @@ impl<'a> OpReader<'a> {
         })
     }
 
-    /// A count; a larger one than fits is refused as too large a little later.
+    /// A count. One that does not fit is refused as too large a little later.
     fn index(&self, field: &'static str) -> Result<usize, Problem> {
         let raw = self.required(field)?;
         let number = json::integer(raw)

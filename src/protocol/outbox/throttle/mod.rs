@@ -1,9 +1,9 @@
 //! `throttle_rate` and `queue_length`: what one connection asked to have held back, topic by topic.
 //!
-//! Told the time; knows no clock. Used by the [outbox](crate::protocol::outbox) alone.
+//! It is told the time, and knows no clock. Only the [outbox](crate::protocol::outbox) uses it.
 //!
-//! **Invariant:** between two messages of a topic that are let go at least its interval passes, and of those held
-//! back the newest remain. Beside what is held back little memory is kept, however much was: nobody is charged for it.
+//! **Invariant:** between two messages of a topic that are let go at least its interval passes, and of those held back
+//! the newest remain. Little memory is kept beside what is held back, however much was, since nobody is charged for it.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap, VecDeque};
@@ -14,7 +14,7 @@ use bytes::Bytes;
 
 use crate::protocol::outbox::blocks::fit;
 
-/// Dues that may be out of date before they are rebuilt, besides as many as are up to date.
+/// Dues that may be out of date, beside as many as are up to date, before all are rebuilt.
 const SLACK: usize = 32;
 
 /// The throttles of one connection and what they hold back.
@@ -135,7 +135,8 @@ impl Throttles {
         held
     }
 
-    /// A new message: given back if it may go at once, else held back, in place of the oldest of its topic if need be.
+    /// Takes a new message, and gives it back if it may go at once. Otherwise it is held back, in place of the oldest
+    /// of its topic if need be.
     pub(super) fn offer(
         &mut self,
         topic: &Arc<str>,
@@ -163,7 +164,7 @@ impl Throttles {
         None
     }
 
-    /// Lets go of one message whose time has come by `now`: those due first come first.
+    /// Lets go of one message whose time has come by `now`, the one that was due first.
     pub(super) fn release(&mut self, now: Instant) -> Option<Bytes> {
         while self.next_release().is_some_and(|next| next <= now) {
             let Reverse((_, topic)) = self.releases.pop()?;
@@ -197,7 +198,7 @@ impl Throttles {
     }
 
     /// Moves the oldest messages of all, which are of one topic, into `given_up`, as long as `goes` says so of the next
-    /// one's bytes: those that were produced before the message with number `before`, and before any of another topic.
+    /// one's bytes. It stops at the message with number `before`, and where another topic has an older one.
     pub(super) fn give_up_oldest(
         &mut self,
         before: u64,

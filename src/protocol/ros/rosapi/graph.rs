@@ -51,7 +51,7 @@ pub struct ListedService {
     pub type_name: Option<Arc<str>>,
 }
 
-/// Who is there and does what.
+/// The nodes, topics and services that are there.
 pub(super) struct Graph<'a> {
     pub(super) census: &'a Census,
 }

@@ -1,7 +1,7 @@
 //! Long messages in pieces: `fragment` in both directions.
 //!
-//! [Out](split()) only to subscribers that asked for it with `fragment_size`; in, from whoever sends them, within
-//! bounds. Told the time.
+//! They [go out](split()) only to subscribers that asked for them with `fragment_size`, and are taken in from any
+//! client, within bounds. The module is told the time.
 //!
 //! **Invariant:** what is kept of unfinished messages is at most [`MAX_FRAME`] bytes in at most [`MAX_UNFINISHED`]
 //! messages, none of them for longer than [`MAX_AGE`].
@@ -39,7 +39,7 @@ pub struct Piece {
 /// Why a piece is not taken; what came of its message is forgotten.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum FragmentError {
-    /// There is no such piece.
+    /// There is no piece of such a number.
     #[error("fragment: num must be less than total, got {num} of {total}")]
     NoSuchPiece {
         /// The piece.
@@ -53,9 +53,9 @@ pub enum FragmentError {
     /// The number of pieces has changed.
     #[error("fragment: total was {before}, and now is {now}")]
     Changed {
-        /// As it was.
+        /// The number as it was.
         before: usize,
-        /// As it is.
+        /// The number as it is now.
         now: usize,
     },
     /// Too many messages at once.
@@ -111,7 +111,7 @@ impl Complete {
 }
 
 impl Fragments {
-    /// Takes a piece; the message once it is the last one missing. A piece that comes twice counts once.
+    /// Takes a piece. Returns the message with the last missing one. A piece that comes twice counts once.
     ///
     /// # Errors
     /// [`FragmentError`] where the piece breaks a bound.

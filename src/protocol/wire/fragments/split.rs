@@ -17,8 +17,8 @@ struct Fragment<'a> {
     total: usize,
 }
 
-/// A frame in pieces of at most `size` bytes of text each, one line per piece; as it is where it is no longer than
-/// that. `None` if the lines have more than `most` bytes.
+/// A frame in pieces of at most `size` bytes of text each, one line per piece. A frame that is no longer than that
+/// stays as it is. `None` if the lines have more than `most` bytes.
 #[must_use]
 pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes> {
     let text = frame.strip_suffix(b"\n").unwrap_or(frame);
@@ -59,7 +59,7 @@ pub fn split(frame: &Bytes, size: usize, id: &str, most: usize) -> Option<Bytes>
     Some(Bytes::from(lines))
 }
 
-/// Fewer bytes than this the pieces of a text can't have, so that what is too long is not made first.
+/// The least bytes that the pieces of a text can have: pieces that would be too long are not made first.
 fn least_length(text: &str, size: usize, id: &str) -> usize {
     const SHORTEST: usize = r#"{"op":"fragment","id":"","data":"","num":0,"total":0}"#.len() + 1;
     let escaped = text.bytes().filter(|byte| matches!(byte, b'"' | b'\\'));

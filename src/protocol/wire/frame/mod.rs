@@ -31,13 +31,13 @@ enum Within {
     Between,
     /// In an object that is kept.
     Object,
-    /// In an object that has been reported already: on to where it would have ended.
+    /// In an object that has been reported already, and is skipped to where it would have ended.
     SkippedObject,
     /// Behind the object of a message, which has not ended.
     Behind,
     /// In a line that is no object; its beginning is being collected.
     Line,
-    /// In a line that has been reported already: on to the newline.
+    /// In a line that has been reported already, and is skipped to the newline.
     SkippedLine,
 }
 
@@ -75,7 +75,7 @@ impl FrameReader {
         Self::with_limit(MAX_FRAME)
     }
 
-    /// The same for frames of at most `limit` bytes.
+    /// A reader for frames of at most `limit` bytes.
     #[must_use]
     pub const fn with_limit(limit: usize) -> Self {
         Self {
@@ -90,8 +90,8 @@ impl FrameReader {
         }
     }
 
-    /// The same where every line is a message: behind its object only white space may stand, and nothing is done of
-    /// one that holds anything else.
+    /// A reader for streams whose every line is a message. Only white space may stand behind its object; a message that
+    /// holds anything else is refused as a whole.
     #[must_use]
     pub const fn of_messages() -> Self {
         let mut reader = Self::new();
@@ -111,7 +111,7 @@ impl FrameReader {
         self.buffer.extend_from_slice(bytes);
     }
 
-    /// The series of messages that the stream goes on with, if it does; to be asked for before the next frame is.
+    /// The series of messages with which the stream goes on, if it does. It must be asked for before the next frame.
     pub fn series(&mut self) -> Option<Series> {
         if self.state != Within::Between {
             return None;
@@ -122,7 +122,7 @@ impl FrameReader {
         let (topic, length) = series::leading(rest)?;
         let series = Series {
             topic: topic.into(),
-            // A copy of its own: whoever keeps it keeps nothing else of the stream.
+            // The series is a copy, so that keeping it keeps nothing else of the stream.
             frames: Bytes::copy_from_slice(rest.get(..length)?),
         };
         self.at += space + length;
@@ -130,7 +130,7 @@ impl FrameReader {
         Some(series)
     }
 
-    /// Cuts off what the stream goes on with. `None` means that more bytes are needed, not that the stream has ended.
+    /// Cuts off the next part of the stream. `None` means that more bytes are needed, not that the stream has ended.
     pub fn cut(&mut self) -> Option<Cut> {
         if let Some(lines) = self.series() {
             return Some(Cut::Lines(lines));
@@ -154,7 +154,7 @@ impl FrameReader {
         self.state != Within::Between
     }
 
-    /// The end of the stream, after the last frame was taken: an unfinished frame is one malformed frame.
+    /// Ends the stream, after the last frame was taken. An unfinished frame is one malformed frame.
     pub fn finish(&mut self) -> Option<FrameError> {
         let error = match self.state {
             Within::Object | Within::Behind => Some(FrameError::StreamEnded),
@@ -285,7 +285,7 @@ impl FrameReader {
         }))
     }
 
-    /// The frame that has just balanced; of a message only once that has ended.
+    /// The frame that has just balanced; a message's comes only when the message has ended.
     fn take_frame(&mut self) -> Option<RawFrame> {
         let rest = self.rest();
         let behind = rest
@@ -294,7 +294,7 @@ impl FrameReader {
         let newline = behind == Some(&b'\n');
         let length = self.at - self.start;
         let bytes = if length > KEPT_BUFFER && length >= rest.len() {
-            // The frame keeps the buffer; what is behind it is copied instead, which is less.
+            // The frame keeps the buffer, and the bytes behind it are copied, since they are fewer.
             let mut kept = Vec::with_capacity(rest.len().max(KEPT_BUFFER));
             kept.extend_from_slice(rest);
             let mut bytes = std::mem::replace(&mut self.buffer, kept);

@@ -31,7 +31,7 @@ pub enum FrameError {
     /// The stream ended before the object was complete.
     #[error("malformed frame: the connection ended inside an object")]
     StreamEnded,
-    /// `]` where `}` was due, or the reverse.
+    /// A `]` came where `}` was due, or the reverse.
     #[error("malformed frame: {found} closes what {opener} opened")]
     Mismatch {
         /// The bracket that opened the innermost level.
@@ -45,8 +45,8 @@ pub enum FrameError {
     /// Something stood behind the object of a message that holds one.
     #[error("malformed frame: a message holds one JSON object, and something stood behind it")]
     MoreBehind,
-    /// Longer than it may be, which is [`MAX_FRAME`](crate::protocol::limits::MAX_FRAME) unless the reader has another
-    /// limit; holds that.
+    /// Longer than the limit, which it holds: [`MAX_FRAME`](crate::protocol::limits::MAX_FRAME) unless the reader has
+    /// another.
     #[error("frame longer than {0} bytes, skipped")]
     TooLong(usize),
     /// Not UTF-8.

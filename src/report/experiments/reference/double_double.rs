@@ -193,7 +193,7 @@ impl Arithmetic for DoubleDouble {
     }
 }
 
-/// As [`two_sum`], where `|a| ≥ |b|` or `a` is 0.
+/// Does what [`two_sum`] does, where `|a| ≥ |b|` or `a` is 0.
 #[inline]
 fn fast_two_sum(a: f64, b: f64) -> (f64, f64) {
     let sum = a + b;

@@ -20,7 +20,7 @@ use crate::report::experiments::reference::DoubleDouble;
 use crate::study::control_loop::ControlLoop;
 use crate::study::linear::{Linear, no_control};
 use crate::study::matrix::largest;
-use crate::study::rollout::{Deviation, Plan, Rollout};
+use crate::study::rollout::{Deviation, Rollout, RolloutRequest};
 use crate::study::stability::{Sampling, largest_timestep};
 
 pub(super) const SCENES: [Scenario; 9] = [
@@ -103,7 +103,7 @@ const NO_ARM: &str = "no such arm";
 
 fn gravity() -> Observation {
     let error = |gravity: f64, timestep: f64, duration: f64| {
-        let plan = Plan {
+        let request = RolloutRequest {
             control: ControlLoop::free(Arm::new([1.0; 2], [1.0; 2], gravity).ok()?)
                 .with_timestep(timestep),
             start: State::at_rest([0.5, -0.5]),
@@ -111,7 +111,7 @@ fn gravity() -> Observation {
             samples: 101,
             reference: true,
         };
-        let mut rollout = Rollout::new(plan).ok()?;
+        let mut rollout = Rollout::new(request).ok()?;
         while rollout.advance(u64::MAX) > 0 {}
         Some(rollout.deviation()?.largest())
     };
@@ -150,14 +150,14 @@ fn tiny_gravity() -> Option<f64> {
 }
 
 fn tiny_steps() -> Observation {
-    let plan = Plan {
+    let request = RolloutRequest {
         control: ControlLoop::free(Arm::<2>::default()).with_timestep(1e-6),
         start: State::at_rest([0.3 - FRAC_PI_2, 0.0]),
         duration: 10.0,
         samples: 101,
         reference: true,
     };
-    let Ok(mut rollout) = Rollout::new(plan) else {
+    let Ok(mut rollout) = Rollout::new(request) else {
         return verdict(false, "not run".to_owned());
     };
     while rollout.advance(u64::MAX) > 0 {}

@@ -41,7 +41,7 @@ impl<const N: usize> Handler<Call<Reset<N>>> for ArmSim<N> {
             self.reset();
         }
         let values = *self.simulation.state();
-        self.once_settled(ctx, move || reply.conclude(Echo { values, rejected }));
+        self.after_barriers(ctx, move || reply.conclude(Echo { values, rejected }));
     }
 }
 

@@ -51,7 +51,7 @@ impl<const N: usize> Handler<Call<Pause>> for ArmSim<N> {
         let (reply, echo) = (call.reply, self.pause(call.ask));
         let answer = move || reply.conclude(echo);
         if self.paused {
-            self.once_settled(ctx, answer);
+            self.after_barriers(ctx, answer);
         } else {
             answer();
         }

@@ -7,7 +7,7 @@ use std::pin::Pin;
 use actix::prelude::*;
 use glam::DVec2;
 
-use crate::actors::arm::sim::messages::{GoalJudged, Pose, Settle};
+use crate::actors::arm::sim::messages::{Barrier, GoalJudged, Pose};
 use crate::math::goal::{Cadence, Goal, Outcome};
 use crate::math::kinematics::forward;
 use crate::math::simulation::Simulation;
@@ -21,7 +21,7 @@ pub(crate) struct Goals<const N: usize> {
     /// Everything before the last reset.
     pub(crate) past: Past,
     /// The nodes that tell clients of goals, to be asked whether all news have been passed on.
-    pub(crate) owners: Vec<Recipient<Settle>>,
+    pub(crate) owners: Vec<Recipient<Barrier>>,
     /// Progress on its way, whose arrival is to be waited for.
     pub(crate) underway: Option<Pin<Box<RecipientRequest<GoalJudged<N>>>>>,
 }
@@ -36,8 +36,8 @@ pub(crate) struct Past {
 }
 
 impl Past {
-    /// A longer past is forgotten \[s\]: in thirty years and more no clock tells parts of a second. Long steps by hand
-    /// come to that soon, and to infinity.
+    /// A longer past is forgotten \[s\]: after thirty years a clock no longer tells parts of a second. Long timesteps
+    /// lead there soon.
     const LONGEST: f64 = 1e9;
 
     /// A reset comes, so long after the one before \[s\].

@@ -43,7 +43,7 @@ pub type ArmListener<const N: usize> = Box<dyn FnMut(ArmNews<N>) -> bool + Send>
 #[rtype(result = "()")]
 pub struct Tell<const N: usize>(pub Option<ArmListener<N>>);
 
-/// Who hears the news, and how far they have come.
+/// The listener, and how far the news have come.
 pub(crate) struct Journal<const N: usize> {
     listener: ArmListener<N>,
     /// Steps taken up to the latest reset.

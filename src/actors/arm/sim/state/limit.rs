@@ -11,7 +11,7 @@ use crate::study::control_loop::ControlLoop;
 /// The arm's memory of its limit.
 #[derive(Default)]
 pub(crate) struct LimitWatch<const N: usize> {
-    /// Who predicts, if anybody does.
+    /// The node that predicts, if there is one.
     pub(crate) study: Option<Recipient<HeldLimit<N>>>,
     /// The loop that was last asked about, and when.
     pub(crate) asked: Option<(ControlLoop<N>, Instant)>,

@@ -28,8 +28,8 @@ pub(crate) enum AuthError {
     Crowded,
 }
 
-/// Reads until `due` up to a first frame that shows the token; `first` has been read already, and is empty then. What
-/// came behind the frame is in the reader.
+/// Reads until `due` up to a first frame that shows the token; `first` has been read already, and is empty afterwards.
+/// The reader keeps what came behind the frame.
 pub(crate) async fn authenticate<S: AsyncRead + Unpin>(
     token: &Token,
     stream: &mut S,

@@ -1,8 +1,8 @@
 //! The rate of failed authentication: wrong tokens of one address are answered ten a second and no faster.
 //!
 //! Only wrong tokens wait. The right one is admitted at once, from wherever it comes: whoever guesses on the holder's
-//! own machine must not lock the holder out. Guessing is slow by this, and hopeless by the
-//! [length](crate::protocol::op::token::MIN_TOKEN) of a token: that no answer comes is an answer too.
+//! own machine must not lock the holder out. The wait makes guessing slow, and the
+//! [length](crate::protocol::op::token::MIN_TOKEN) of a token makes it hopeless.
 //!
 //! **Invariant:** so many addresses are kept in mind and no more, whoever guesses from wherever.
 
@@ -20,17 +20,17 @@ pub const ATTEMPT_INTERVAL: Duration = Duration::from_millis(100);
 /// Wrong tokens that are answered at once after a while without any: people mistype, and a page that was open before
 /// the token changed asks with the old one.
 pub const FREE_ATTEMPTS: u32 = 5;
-/// Addresses that are kept in mind, some 64 KiB of them. Who has more of them is not slowed down by this.
+/// Addresses that are kept in mind, some 64 KiB of them. An attacker with more of them is not slowed down.
 pub const MAX_ADDRESSES: usize = 1024;
 
-/// Addresses with failed attempts of late. For each, when all of them would have been answered at one every
-/// [`ATTEMPT_INTERVAL`]: it runs ahead of now with every attempt.
+/// Addresses with recent failed attempts. Each has the time at which all its attempts are answered, at one every
+/// [`ATTEMPT_INTERVAL`]; every attempt moves it further ahead of now.
 #[derive(Debug, Default)]
 pub(crate) struct FailedAttempts(Mutex<HashMap<IpAddr, Instant>>);
 
 impl FailedAttempts {
-    /// How long the answer to a wrong token waits that came from there now; `None` if there are so many that it is
-    /// not answered.
+    /// How long the answer to a wrong token waits that came from there now; `None` if it is not answered, because
+    /// too many came before.
     pub(crate) fn wait(&self, from: IpAddr) -> Option<Duration> {
         let (now, from) = (Instant::now(), network(from));
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
@@ -51,7 +51,7 @@ impl FailedAttempts {
     }
 }
 
-/// The address, or of IPv6 its /64, which one site has at least.
+/// The address itself, or the /64 of an IPv6 address: every site has at least that.
 fn network(address: IpAddr) -> IpAddr {
     match address.to_canonical() {
         IpAddr::V6(address) => {

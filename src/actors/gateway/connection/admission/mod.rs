@@ -1,7 +1,7 @@
 //! Admission: the conditions under which a client is served, whichever protocol it speaks.
 //!
-//! **Invariant:** with a token set, nothing is done for a client that has not shown it, and those that have not,
-//! however many and however silent, keep nobody out who has.
+//! **Invariant:** with a token set, nothing is done for a client that has not shown it. Such clients, however many and
+//! however silent, keep nobody out who has shown it.
 
 pub(super) mod authentication;
 mod failed_attempts;
@@ -55,7 +55,7 @@ pub struct Newcomers {
 }
 
 impl Newcomers {
-    /// With so many slots for those that have not shown the token yet.
+    /// Makes room for so many clients that have not shown the token yet.
     #[must_use]
     pub fn of(unauthenticated: usize) -> Self {
         Self {

@@ -18,7 +18,7 @@ pub(crate) struct Slots {
 }
 
 impl Slots {
-    /// So many slots, all of them free.
+    /// Makes so many slots, all of them free.
     pub(crate) fn new(most: usize) -> Self {
         Self {
             most,
@@ -55,7 +55,7 @@ pub(crate) struct HeldSlot<'a> {
 }
 
 impl HeldSlot<'_> {
-    /// Ends when somebody else has the slot. To be awaited until then, not beyond.
+    /// Ends when somebody else has the slot. It must not be awaited again after that.
     pub(crate) async fn evicted(&self) {
         self.notice.notified().await;
     }

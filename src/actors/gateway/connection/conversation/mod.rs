@@ -1,4 +1,4 @@
-//! A client that is spoken with: one task reads what it sends, the writer sends what it is to get.
+//! The conversation with a client: one task reads what it sends, and the writer sends what is for it.
 //!
 //! **Invariant:** where one of the two ends, the other has a bounded time.
 
@@ -45,7 +45,7 @@ impl ClientSession {
         Reader::new(id, shared, self.finish.clone(), frames, unfinished)
     }
 
-    /// Reads and writes until the client is gone or has all that it is owed.
+    /// Reads and writes until the client is gone or has all that is for it.
     pub(super) async fn talk<I, O>(&self, reader: Reader, input: I, output: O, first: BytesMut)
     where
         I: Inbound + 'static,
@@ -106,10 +106,10 @@ impl ClientSession {
         };
         let status = Respond::error(connection, &why, None);
         let _ = self.shared.registry.send(status).await;
-        // All that was on its way to the client has come when this is answered.
+        // Once this is answered, all that was on its way to the client has come.
         let _ = self.shared.registry.send(Disconnect(connection)).await;
         let _ = self.finish.send(Finish).await;
-        // A long frame in the middle of which it has stopped would have to be kept until it goes on.
+        // The client may have stopped in the middle of a long frame, which would have to be kept until it goes on.
         if shared.account.held() <= MODEST {
             let _ = timeout(LAST_STATUS_TIME, ended).await;
         }
@@ -130,7 +130,7 @@ impl ClientSession {
     }
 }
 
-/// A task that ends, where it stands, with whoever has this.
+/// A task that is aborted when this is dropped.
 struct Spawned<T>(JoinHandle<T>);
 
 impl<T> Drop for Spawned<T> {

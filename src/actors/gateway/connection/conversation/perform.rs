@@ -76,7 +76,7 @@ impl Reader {
             }
             Err(OpError::Goal { action, problem }) => {
                 let (id, why, status) = (id.as_ref(), problem.to_string(), GoalStatus::Unknown);
-                // Over WebSocket nobody is told statuses who has not asked for them.
+                // Over WebSocket only a client that has asked for statuses is sent any.
                 self.complain(&why, id).await;
                 let result = messages::action_result(&action, id, &why, status as u8, false);
                 self.say(result, None).await;
@@ -92,8 +92,8 @@ impl Reader {
         self.shared.account.take(2 * length)
     }
 
-    /// Returns `incoming` unless it is a fragment. Of a fragment, returns the whole frame once the last piece is
-    /// there; then `share` is that frame's.
+    /// Returns `incoming` unless it is a fragment. For a fragment, returns the whole frame once the last piece is
+    /// there; `share` is then that frame's.
     async fn assemble(&mut self, incoming: Incoming, share: &mut Share) -> Option<Incoming> {
         let Ok(Op::Fragment(piece)) = incoming.op else {
             return Some(incoming);
@@ -140,7 +140,7 @@ impl Reader {
         read
     }
 
-    /// Refuses the client, which has not done what it has to, or speaks something else.
+    /// Refuses the client: it has not done what it has to, or speaks another protocol.
     pub(super) fn refuse(&self, why: &str) {
         self.shared
             .refuse(messages::status(Level::Error, why, None));
@@ -193,8 +193,8 @@ fn read(frame: RawFrame) -> Result<Incoming, FrameError> {
     frame.decode().map(|frame| op::read(&frame.text))
 }
 
-/// A frame that came in pieces is one like any other: the same bounds hold, and the same leniency. `None` if there is
-/// nothing but white space; of a text with more than one frame nothing is done.
+/// Reads a frame that came in pieces, under the same bounds and with the same leniency as any other. `None` if there is
+/// nothing but white space. Nothing is done of a text with more than one frame.
 fn read_whole(text: &str) -> Option<Result<Incoming, FrameError>> {
     let mut frames = FrameReader::new();
     frames.push(text.as_bytes());

@@ -1,5 +1,4 @@
-//! The reading task of a connection: frames as they come, one op at a time. [`perform`](super::perform) has what is
-//! done about each.
+//! The reading task of a connection: frames as they come, one op at a time. [`perform`](super::perform) acts on each.
 //!
 //! **Invariant:** the next frame is looked at only when the last op has taken effect (pure computations excepted), so
 //! all that a client asks of the runtime happens in the order in which it asked. A series of messages counts as one op.
@@ -33,7 +32,7 @@ pub(crate) struct Reader {
     pub(super) fragments: Fragments,
     /// Counts the frames and messages that are not complete yet.
     unfinished: Unfinished,
-    /// A JSON object has come. This is no HTTP request then: its head would have come first.
+    /// Whether a JSON object has come: then this is no HTTP request, whose head would have come first.
     pub(super) speaks_json: bool,
     /// The stream has ended; what came before may still wait.
     has_ended: bool,
@@ -67,7 +66,7 @@ impl Reader {
     /// Reads until the client ends or is refused, then lets the connection finish; `first` has been read already.
     pub(super) async fn run<I: Inbound>(mut self, mut input: I, first: BytesMut) {
         match self.converse(&mut input, first).await {
-            Ok(()) => self.settle().await,
+            Ok(()) => self.await_responses().await,
             // A broken stream takes no answers, and nobody waits for those that don't come.
             Err(_) => self.shared.abandon_computations(),
         }
@@ -106,7 +105,7 @@ impl Reader {
             }
             self.keep_unfinished(&chunk);
             if full {
-                // A long frame comes in many chunks, all of them at hand.
+                // The many chunks of a long frame may all be at hand.
                 turns::read().await;
             }
             if self.shared.is_finishing() {
@@ -181,8 +180,8 @@ impl Reader {
     }
 
     /// The client has stopped sending, and may still be reading: withdraws what it registered, since it can no longer
-    /// answer or withdraw, and waits for the responses that it is owed.
-    async fn settle(&self) {
+    /// answer or withdraw, and waits for the responses that are still to come.
+    async fn await_responses(&self) {
         let answered = async {
             if let Ok(handled) = self.shared.registry.send(Retire(self.id)).await {
                 handled.effect().await;
@@ -196,8 +195,8 @@ impl Reader {
         }
     }
 
-    /// Cuts off what is complete, once the client's frames may be performed. Until then `chunk` takes the bytes that
-    /// follow: a little of it, so that its end is seen.
+    /// Cuts off what is complete, once the client's frames may be performed. Until then `chunk` takes some of the bytes
+    /// that follow, so that the end of the stream is seen.
     async fn next<I: Inbound>(
         &mut self,
         input: &mut I,
@@ -209,8 +208,9 @@ impl Reader {
         Ok(self.frames.cut())
     }
 
-    /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`]. An error if the client
-    /// is gone; one that has ended its stream is taken for gone when nothing was for [`RESPONSES_TIME`].
+    /// Waits until something was written or computed, and reads on meanwhile, up to [`CHUNK`]. It is an error if the
+    /// client is gone. A client that has ended its stream counts as gone when nothing was written or computed for
+    /// [`RESPONSES_TIME`].
     async fn wait_for_room<I: Inbound>(
         &mut self,
         input: &mut I,

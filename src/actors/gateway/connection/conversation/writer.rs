@@ -3,8 +3,8 @@
 //!
 //! [`run`] is part of the connection's actor: it is polled after each message that the actor has handled, so what was
 //! put into the outbox is offered to the socket in the same turn. Where it waits in a queue
-//! ([`turns`](crate::actors::gateway::turns)), it is polled in its turn. A client that takes nothing wakes it when it
-//! does.
+//! ([`turns`](crate::actors::gateway::turns)), it is polled in its turn. A client that has taken nothing wakes it by
+//! taking something.
 //!
 //! **Invariant:** a write that the client does not take holds up nothing but this connection, and not for ever.
 
@@ -36,7 +36,7 @@ pub(super) async fn run<O: Outbound>(mut output: O, shared: &Shared) -> bool {
     }
 }
 
-/// Waits where many are written to. Responses wait for no turn.
+/// Waits for a turn where many clients are written to. Responses wait for none.
 async fn wait_for_turn(shared: &Shared) {
     let outgoing = &shared.outgoing;
     if let Some(bytes) = outgoing.topics_alone()
@@ -55,8 +55,8 @@ async fn tend<O: Outbound>(output: &mut O, shared: &Shared) -> bool {
     }
 }
 
-/// Waits until there is something to write, or nothing more will be. Both are looked at here: the news of it may have
-/// come while the transport had something to say.
+/// Waits until there is something to write, or until nothing more will come. Both are looked at here, since the news
+/// may have come while the transport was being written.
 async fn wait(shared: &Shared) {
     let outgoing = &shared.outgoing;
     let news = outgoing.news(|| !outgoing.is_empty() || shared.is_done());
@@ -118,7 +118,7 @@ async fn stalled(shared: &Shared) {
             Some(limit) => tokio::select! {
                 biased;
                 () = sleep_until(limit) => {
-                    // It may have taken some of what is being written.
+                    // The client may have taken some of what is being written.
                     if patience() == Some(limit) {
                         return;
                     }

@@ -1,7 +1,7 @@
 //! The memory that a client is charged for what waits for it, and the count of what was dropped.
 //!
 //! **Invariant:** after [`Charge::update`] the client's account and its backlog say what waits. Responses are in the
-//! account before, each by itself.
+//! account already, each by itself.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -51,8 +51,8 @@ impl Charge {
             writing: outbox.writing_cost(),
             responses: outbox.response_cost(),
         };
-        // Other threads read these counters. Mostly nothing waits, before and after: the store, and with it a cache
-        // miss, is saved then.
+        // Other threads read these counters. Mostly nothing waits, neither before nor after: then no store is made,
+        // which would cost a cache miss.
         if self.counted.replace(now) != now {
             self.backlog.store(now.responses, Ordering::Relaxed);
             self.account.queue(topics.0, topics.1, now.writing);
@@ -64,7 +64,7 @@ impl Charge {
         self.account.queue(0, 0, 0);
     }
 
-    /// So many topic messages were dropped.
+    /// Counts so many topic messages as dropped.
     pub(super) fn count_dropped(&self, dropped: u64) {
         if dropped > 0 {
             self.gauges.add_dropped(dropped);

@@ -1,8 +1,8 @@
 //! Topic messages that wait to be encoded for the client, one after the other, on another thread.
 //!
 //! **Invariant:** the messages of a topic keep their order: behind one that is being encoded they wait for it. Other
-//! topics wait only where they have to be encoded too, and answers never: whoever asks for long messages in another
-//! form hears of the arm in time all the same.
+//! topics wait only where they have to be encoded too, and answers never wait. So a client that asks for long messages
+//! in another form still hears of the arm in time.
 
 use std::rc::{Rc, Weak};
 
@@ -55,7 +55,7 @@ impl Outgoing {
                 };
                 self.charge.count_dropped(made.lost);
                 let frames = &made.messages;
-                // The first may be due; all others but the newest would be replaced by those.
+                // The first may be due. The newest would replace all others, which are left out.
                 let last = newest.map_or(0, |newest| frames.len().saturating_sub(newest));
                 let wanted = frames.iter().enumerate();
                 for (_, frame) in wanted.filter(|(at, _)| *at == 0 || *at >= last) {
@@ -67,7 +67,7 @@ impl Outgoing {
     }
 }
 
-/// The task; the connection may end before it.
+/// The task that encodes. The connection may end before it.
 struct EncodingTask(Weak<Outgoing>);
 
 impl Drop for EncodingTask {
@@ -89,12 +89,12 @@ impl EncodingTask {
             };
             drop(outgoing);
             if let Frames::Encoded(encoded, newest) = &message.frames {
-                // Throttling keeps the newest: it has to see all of them.
+                // Throttling keeps the newest, so it has to see all of them.
                 if newest.is_none() && encoded.at_hand().is_none() {
                     self.wait_for_room().await;
                 }
                 if encoded.messages().await.messages.len() > FREE_FRAMES {
-                    // Many clients may have as many to go through.
+                    // Many other clients may have as many messages to go through.
                     turns::read().await;
                 }
             }
@@ -113,8 +113,8 @@ impl EncodingTask {
         }
     }
 
-    /// Waits while enough waits for the client, unless other topics bring more than it takes: among their messages this
-    /// one has its place too.
+    /// Waits while enough waits for the client, unless other topics bring more than it takes: then this message has its
+    /// place among theirs.
     async fn wait_for_room(&self) {
         let mut dropped = None;
         while let Some(outgoing) = self.0.upgrade() {

@@ -1,9 +1,8 @@
 //! The outgoing side of one client: all that waits to be written to it, and the writer.
 //!
 //! The connection's handlers put things in and the [writer](super::conversation) takes them out. The writer is polled
-//! after each message that the actor has handled, so it looks for itself; whatever changes something from another task
-//! says so by [`Outgoing::wake_writer`]. Where it waits in a queue, it is polled in its turn as well, and the actor is
-//! not.
+//! after each message that the actor has handled, so it sees what they have put in. Another task that changes something
+//! calls [`Outgoing::wake_writer`]. A writer that waits in a queue is polled in its turn too, without its actor.
 //!
 //! Topic messages come in by [`Outgoing::accept`], which is in `encoding.rs` with the task that encodes them.
 //!
@@ -39,7 +38,7 @@ use crate::actors::resources::budget::{Account, MESSAGES_LEFT, free_elsewhere};
 use crate::actors::resources::gauges::Gauges;
 use crate::protocol::outbox::Outbox;
 
-/// An outbox of no more is freed where it stands: that takes a fraction of a millisecond.
+/// A smaller outbox is freed at once, which takes a fraction of a millisecond.
 const FEW_BYTES: usize = 256 * 1024;
 
 /// The outgoing side of one client; one thread, so plain cells do.
@@ -47,7 +46,8 @@ pub(super) struct Outgoing {
     outbox: RefCell<Outbox>,
     /// Topic messages that have to be encoded first.
     unencoded: RefCell<Unencoded>,
-    /// One frame a write, for old clients: they end their frames with no newline, and take one read for one frame.
+    /// Whether each write has one frame only. Old clients, which end their frames with no newline, take what one read
+    /// returns for one frame.
     singly: Cell<bool>,
     /// When the connection was made.
     since: Instant,
@@ -85,7 +85,7 @@ impl Outgoing {
     pub(super) fn push(&self, topic: &Arc<str>, frame: Bytes) {
         self.counting_dropped(|outbox| outbox.push(topic, frame, self.now(outbox).into_std()));
         if self.outbox.borrow().is_throttled() {
-            // It may be held back, and the writer has to know until when.
+            // A message may be held back, and the writer has to know until when.
             self.wake_writer();
         }
     }
@@ -206,8 +206,8 @@ impl Outgoing {
         self.patience.note_taken();
     }
 
-    /// Until when a client that has taken nothing since `last_byte` is borne with: while responses wait, or while it
-    /// is finishing.
+    /// When a client that has taken nothing since `last_byte` is given up; none while no response waits and it is not
+    /// finishing.
     pub(super) fn patience(&self, last_byte: Instant, is_finishing: bool) -> Option<Instant> {
         self.patience.end(last_byte, is_finishing)
     }
@@ -226,7 +226,7 @@ impl Outgoing {
 
     // ---- the writer -------------------------------------------------------------------------------------------------
 
-    /// From now on this is the writer, until what is given is dropped.
+    /// Makes this the writer, until the returned guard is dropped.
     pub(super) fn begin_writing(
         self: &Rc<Self>,
         writer: impl Future<Output = ()> + 'static,
@@ -252,7 +252,7 @@ impl Outgoing {
             let this: Weak<Self> = Rc::downgrade(self);
             self.queue().join(bytes, this);
         }
-        // It is polled in its turn, and behind the handler of a response.
+        // The writer is polled in its turn, and behind the handler of a response.
         let may_go_on = || !self.turn.is_waiting() || self.has_responses();
         while !may_go_on() {
             self.news(may_go_on).await;
@@ -276,8 +276,8 @@ impl Outgoing {
         self.charge.update(&outbox, &unencoded);
     }
 
-    /// Gives up what is asked for when all clients together hold too much: topic messages as often as need be, and
-    /// ends once it is the connection; gives how many bytes it held.
+    /// Gives up what is asked for when all clients together hold too much. It gives up topic messages as often as it is
+    /// asked to, and ends once the connection itself is asked for. Returns how many bytes the client held.
     pub(super) async fn gives_way(&self) -> usize {
         while !self.charge.account.asked().await {
             let mut outbox = self.outbox.borrow_mut();
@@ -304,7 +304,7 @@ impl Outgoing {
         free_elsewhere((waiting, freed));
     }
 
-    /// The time, which is looked at for throttling alone.
+    /// The time; only throttling needs it.
     fn now(&self, outbox: &Outbox) -> Instant {
         if outbox.is_throttled() {
             Instant::now()

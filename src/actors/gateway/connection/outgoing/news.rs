@@ -20,7 +20,7 @@ impl News {
         }
     }
 
-    /// Has whoever waits look again.
+    /// Has the waiting task look again.
     pub(super) fn announce(&self) {
         self.are_there.set(true);
         self.listener.borrow().wake_by_ref();

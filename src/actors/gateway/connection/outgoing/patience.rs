@@ -10,7 +10,7 @@ use crate::actors::gateway::limits::{LINGER, STALL_LIMIT};
 
 /// The times from which patience is counted.
 pub(super) struct Patience {
-    /// Since when responses have been waiting without a break.
+    /// The time since which responses have been waiting without a break.
     responses_since: Cell<Option<Instant>>,
     /// When the client last took a byte of a write that goes on.
     taken: Cell<Instant>,
@@ -40,7 +40,7 @@ impl Patience {
         self.taken.set(Instant::now());
     }
 
-    /// When a client is given up that has taken nothing since `last_byte`; `None` where it is waited for.
+    /// When a client that has taken nothing since `last_byte` is given up; `None` if it never is.
     pub(super) fn end(&self, last_byte: Instant, is_finishing: bool) -> Option<Instant> {
         let last_byte = last_byte.max(self.taken.get());
         match self.responses_since.get() {

@@ -8,14 +8,14 @@ use std::cell::{Cell, RefCell};
 use crate::actors::gateway::messages::Underway;
 use crate::actors::gateway::turns::WritersQueue;
 
-/// Whether the writer waits, in which queue it would, and who waits for it.
+/// Whether the writer waits, in which queue it does so, and which publishers wait for it.
 #[derive(Default)]
 pub(super) struct WritersTurn {
     /// The writer waits in its queue.
     in_queue: Cell<bool>,
     /// Messages whose publishers wait until they have been offered to the socket.
     underway: RefCell<Vec<Underway>>,
-    /// Some of what waits has been encoded: that is of clients, and goes to many at one moment.
+    /// Some of what waits has been encoded: such messages come from clients, and go to many at one moment.
     is_encoded: Cell<bool>,
 }
 

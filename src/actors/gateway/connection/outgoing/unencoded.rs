@@ -16,23 +16,23 @@ pub(super) struct Unencoded {
     waiting: Blocks<Deliver>,
     /// Their bytes, as they came.
     bytes: usize,
-    /// By topic, how many wait or are being encoded; topics without any are left out.
+    /// How many messages of each topic wait or are being encoded; topics without any are left out.
     topics: HashMap<Arc<str>, usize>,
-    /// Messages that have left: they are numbered as they come.
+    /// How many messages have left: they are numbered as they come.
     left: usize,
-    /// By topic, the first message that is not too old.
+    /// The number of the first message of each topic that is not too old.
     too_old: HashMap<&'static str, usize>,
     /// Whether there is a task at work.
     pub(super) at_work: bool,
 }
 
 impl Unencoded {
-    /// Adds a message, or a series of them; gives how many messages had to go for it.
+    /// Adds a message, or a series of them. Returns how many messages had to go for it.
     pub(super) fn push(&mut self, message: Deliver) -> u64 {
         self.bytes += message.frames.plain().len();
         *self.topics.entry(Arc::clone(&message.topic)).or_default() += 1;
         self.waiting.push_back(message);
-        // The longest message that there can be has a place too.
+        // Even the longest message has room.
         self.keep(MAX_TOPIC_BYTES + PLACE_BYTES)
     }
 
@@ -69,7 +69,7 @@ impl Unencoded {
         }
     }
 
-    /// A message of this topic is dealt with.
+    /// Notes that a message of this topic is dealt with.
     pub(super) fn end(&mut self, topic: &str) {
         if let Some(messages) = self.topics.get_mut(topic) {
             *messages -= 1;
@@ -123,7 +123,7 @@ mod tests {
         assert!(!unencoded.has("/t"));
     }
 
-    /// Nobody is charged for places that nothing takes.
+    /// A client is not charged for places that are empty.
     #[test]
     fn the_places_go_with_the_messages() {
         let mut unencoded = Unencoded::default();

@@ -26,12 +26,12 @@ impl WriterTask {
         }
     }
 
-    /// From now on this is the writer.
+    /// Makes this the writer.
     pub(super) fn begin(&self, writer: impl Future<Output = ()> + 'static) {
         self.writer.replace(Some(Box::pin(writer)));
     }
 
-    /// There is no writer any more.
+    /// Takes the writer away.
     pub(super) fn end(&self) {
         self.writer.take();
     }

@@ -8,18 +8,18 @@ const LONGEST_HEAD: usize = 14;
 /// Follows the frames. Source: RFC 6455, section 5.2.
 #[derive(Debug, Default)]
 pub(super) struct FrameHeads {
-    /// The head that comes, as far as it has.
+    /// The head that is coming, as far as it has come.
     head: [u8; LONGEST_HEAD],
     come: usize,
-    /// Bytes of its payload that have come, and that are still to come.
+    /// Bytes of the frame's payload that have come, and those that are still to come.
     received: u64,
     left: u64,
-    /// A further frame belongs to the message: none so far had its last.
+    /// Whether a further frame belongs to the message: its last has not come.
     goes_on: bool,
 }
 
 impl FrameHeads {
-    /// More bytes have come: the longest part of one frame's payload that is there so far.
+    /// Follows more bytes. Returns the longest part of one frame's payload that is there so far.
     pub(super) fn follow(&mut self, mut bytes: &[u8]) -> u64 {
         let mut longest = 0;
         loop {

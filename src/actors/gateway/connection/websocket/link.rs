@@ -1,4 +1,4 @@
-//! A WebSocket's stream, which both halves of its client share: one is reading a ping while the other is writing.
+//! A WebSocket's stream, shared by both halves of its client: one may read a ping while the other writes.
 //!
 //! **Invariant:** no borrow of the socket outlives a poll.
 
@@ -36,7 +36,7 @@ pub(super) struct Link<S> {
     pub(super) socket: RefCell<WebSocketStream<Watched<S>>>,
     /// When the peer last sent or took a byte.
     pub(super) life: Rc<Cell<Instant>>,
-    /// The peer is to be asked for a sign of life.
+    /// Whether the peer is to be asked for a sign of life.
     pub(super) ping_is_due: Cell<bool>,
     /// Why the connection ends, for the peer to know.
     pub(super) close_reason: Cell<(CloseCode, &'static str)>,
@@ -70,9 +70,9 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Link<S> {
         })
     }
 
-    /// The next message; `None` once the connection is closed. All is received in turns: what is read at a time may be
-    /// a thousand pings, each of which is answered. Those of a long message are shared with other readers: with its
-    /// last byte, whichever that is, the library unmasks and checks all of it.
+    /// The next message; `None` once the connection is closed. Everything is received in turns, since one read may
+    /// bring a thousand pings, each of which is answered. A long message takes turns with other readers: at its last
+    /// byte the library unmasks and checks all of it.
     pub(super) async fn next(&self) -> Option<Result<Message, Error>> {
         loop {
             if !self.socket.borrow().get_ref().is_turn_over() {

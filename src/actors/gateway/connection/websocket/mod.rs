@@ -1,8 +1,8 @@
-//! HTTP and WebSocket clients: a request is answered and that is all, or the stream becomes a WebSocket and its
-//! client is one like any other.
+//! HTTP and WebSocket clients: a request is answered and no more, or the stream becomes a WebSocket, whose client is
+//! served like any other.
 //!
-//! A WebSocket message is a frame. What is asked of the protocol beside that is done here: both sides of the stream
-//! keep sharing one socket, for reading a ping means writing a pong; a peer that shows no sign of life is given up.
+//! A WebSocket message is a frame. The rest of the protocol is done here. Both halves share one socket, since reading a
+//! ping means writing a pong. A peer that shows no sign of life is given up.
 //!
 //! **Invariant:** over WebSocket no status is sent before the client has asked for such.
 
@@ -39,8 +39,8 @@ use crate::web::serve;
 
 /// Ping interval: below the idle timeouts of NATs and proxies.
 pub(super) const PING_INTERVAL: Duration = Duration::from_secs(15);
-/// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong: that can
-/// be a long way behind in a full pipe.
+/// How long a peer that was asked may be silent. Any byte that it sends or takes counts, not only the pong, which can
+/// be far behind in a full pipe.
 pub(super) const PONG_TIME: Duration = Duration::from_secs(30);
 impl ClientSession {
     /// Does what a client has asked for over HTTP; `behind` came after its request.
@@ -97,7 +97,7 @@ struct Input<S> {
     link: Rc<Link<S>>,
     shared: Rc<Shared>,
     next_ping: Instant,
-    /// Since when a sign of life has been waited for.
+    /// The time since which a sign of life has been waited for.
     asked: Option<Instant>,
     /// When the last read ended; none while one is under way, also one that was given up.
     unread_since: Option<Instant>,
@@ -244,7 +244,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
     const END_IS_ANSWERED: bool = true;
 
     async fn write(&mut self, frames: &[Bytes]) -> Option<usize> {
-        // Pongs that wait would take the room of what is put there.
+        // Waiting pongs would take the room of the message.
         self.link.flush().await?;
         let mut written = 0;
         let mut waiting = frames.iter().cloned();
@@ -284,7 +284,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
     }
 
     async fn tend(&mut self) -> Option<()> {
-        // Another may be due by the time that one has gone out.
+        // Another pong may be due by the time that this one has gone out.
         while self.link.ping_is_due.take() {
             self.link.flush().await?;
             self.link.put(Message::Ping(Bytes::new()))?;
@@ -308,7 +308,7 @@ impl<S: AsyncRead + AsyncWrite + Unpin> Outbound for Output<S> {
         if !self.shared.is_refused() {
             return Ok(());
         }
-        // Nothing that it sends is looked at any more, a close frame included: the stream's own end has to do.
+        // Nothing that the peer sends is looked at any more, not even a close frame: the end of the stream is enough.
         poll_fn(|cx| Pin::new(self.link.socket.borrow_mut().get_mut()).poll_shutdown(cx)).await
     }
 }
@@ -322,8 +322,8 @@ fn kind_of(frame: &Bytes) -> Data {
     }
 }
 
-/// As much of a frame as there is room for in one WebSocket frame, and whether a message ends there. A text may be
-/// several messages, one per line.
+/// The part of a frame that one WebSocket frame has room for, and whether a message ends there. A text may be several
+/// messages, one per line.
 fn first_piece(frame: &Bytes, is_text: bool, room: usize) -> (Bytes, bool) {
     let offered = frame.slice(..frame.len().min(room));
     if !is_text {

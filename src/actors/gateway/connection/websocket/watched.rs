@@ -27,8 +27,8 @@ pub(super) const READ_BUFFER: usize = 8 * 1024;
 /// Bytes that are read before others have a turn: they may be ten thousand empty frames, of which no message comes.
 const TURN: usize = 32 * 1024;
 
-/// A stream that notes when its other side last gave a sign of life: sent a byte, or took one after having taken
-/// none. And what it has sent of a message that is not complete yet.
+/// A stream that notes when its other side last gave a sign of life, and how much it has sent of a message that is not
+/// complete. To send a byte is a sign of life, and so is to take one after a write found no room.
 pub(super) struct Watched<S> {
     stream: S,
     /// Bytes that have come before, and are read first.
@@ -36,7 +36,7 @@ pub(super) struct Watched<S> {
     life: Rc<Cell<Instant>>,
     /// Hears of every byte that the other side takes.
     outgoing: Rc<Outgoing>,
-    /// The last write found no room: the next that does shows that there is somebody.
+    /// Whether the last write found no room: the next that does find some is a sign of life.
     is_blocked: bool,
     unfinished: Unfinished,
     /// Bytes that belong to no complete message yet, or to one that has just been read.
@@ -48,7 +48,7 @@ pub(super) struct Watched<S> {
     longest: usize,
     /// Arrival time of the first byte of what is not complete, plus all time spent not reading.
     began: Option<Instant>,
-    /// They belong to one that has just been read.
+    /// Whether the pending bytes belong to a message that has just been read.
     is_complete: bool,
     /// Bytes that wait to be written, and their buffer, which may be twice as long.
     unsent: Share,
@@ -87,7 +87,7 @@ impl<S> Watched<S> {
             unsent,
             turn: TURN,
         };
-        watched.settle(0);
+        watched.set_pending(0);
         watched
     }
 
@@ -111,15 +111,15 @@ impl<S> Watched<S> {
         self.turn == 0
     }
 
-    /// Bytes that the library looks at once the message has come that they belong to, if it is a long one.
+    /// Bytes that the library has to look at once their message has come, if it is a long one.
     pub(super) fn long(&self) -> Option<usize> {
         (self.pending > TURN).then_some(self.pending)
     }
 
-    /// All of a message has been read; so many bytes of it have not been dealt with.
+    /// Notes that all of a message has been read; `left` bytes of it have not been dealt with.
     pub(super) fn complete(&mut self, left: usize) {
         self.is_complete = true;
-        self.settle(left);
+        self.set_pending(left);
     }
 
     /// Reading goes on after so long a time: what was complete has been dealt with.
@@ -128,22 +128,23 @@ impl<S> Watched<S> {
         if std::mem::take(&mut self.is_complete) {
             // The next message may have come with its end, in part.
             self.began = self.heads.is_within().then(Instant::now);
-            self.settle(0);
+            self.set_pending(0);
         }
     }
 
     /// A control frame with so much payload has come: it may stand between the parts of a message.
     pub(super) fn control(&mut self, payload: usize) {
         self.turn = self.turn.saturating_sub(CONTROL_COST);
-        self.settle(self.pending.saturating_sub(CONTROL_HEAD + payload));
+        self.set_pending(self.pending.saturating_sub(CONTROL_HEAD + payload));
     }
 
-    fn settle(&mut self, pending: usize) {
+    /// Counts what is kept, now that `pending` bytes belong to no complete message.
+    fn set_pending(&mut self, pending: usize) {
         self.pending = pending;
         if pending == 0 && !self.heads.is_within() {
             self.began = None;
         }
-        // It is kept twice, as it came and as a message; what is no part of either, the heads of empty frames, is not
+        // Input is kept twice, as it came and as a message. The heads of empty frames are part of neither, and are not
         // kept.
         let unfinished = (2 * pending).min(3 * MAX_FRAME);
         let behind = if self.behind.is_empty() { 0 } else { CHUNK };
@@ -162,7 +163,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
         cx: &mut Context<'_>,
         buffer: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
-        // Nobody is woken for it: who reads begins the next turn.
+        // No waker is needed: the reader itself begins the next turn.
         if self.is_turn_over() {
             return Poll::Pending;
         }
@@ -173,7 +174,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             let length = self.behind.len().min(buffer.remaining());
             buffer.put_slice(&self.behind.split_to(length));
             if self.behind.is_empty() {
-                // Its memory goes.
+                // The memory is freed.
                 self.behind = Bytes::new();
             }
             Poll::Ready(Ok(()))
@@ -186,7 +187,7 @@ impl<S: AsyncRead + Unpin> AsyncRead for Watched<S> {
             self.began.get_or_insert(now);
             self.follow(buffer.filled().get(before..).unwrap_or_default());
             let pending = self.pending + received;
-            self.settle(pending);
+            self.set_pending(pending);
         }
         polled
     }

@@ -82,7 +82,7 @@ impl Registry {
     ) -> Result<(), Refusal> {
         let service = call.service.as_str();
         let name = &*names::absolute(service);
-        // One that has stopped sending provides nothing any more, though its services may not be withdrawn yet.
+        // A provider that has stopped sending provides nothing, though its services may not be withdrawn yet.
         let provider = self.services.provider(name).cloned().and_then(|provider| {
             let client = self.clients.get(&provider.connection)?;
             client

@@ -1,6 +1,6 @@
 //! Cleanup: ends calls whose time is over, and the leftovers of clients that have gone.
 //!
-//! **Invariant:** however many end at one instant, everybody else has a turn after every few of them.
+//! **Invariant:** however many end at one instant, all others have a turn after every few of them.
 
 use actix::prelude::*;
 use tokio::time::{Instant, sleep_until};
@@ -8,7 +8,7 @@ use tokio::time::{Instant, sleep_until};
 use crate::actors::gateway::registry::refusal::Refusal;
 use crate::actors::gateway::registry::state::Registry;
 
-/// Calls, goals and registrations that are ended in a row: a third of a millisecond's.
+/// Calls, goals and registrations that are ended in a row, which takes a third of a millisecond.
 const ENDED_IN_A_ROW: usize = 128;
 
 impl Registry {

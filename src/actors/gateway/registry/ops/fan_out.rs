@@ -1,5 +1,5 @@
-//! How a message reaches everybody who subscribes: once encoded for each spelling of the topic and each encoding
-//! asked for.
+//! Fan-out: a message is encoded once for each spelling of its topic and each encoding asked for, and goes to every
+//! subscriber.
 //!
 //! **Invariant:** without subscribers nothing is encoded, and all subscribers who asked for the same share the same
 //! bytes.
@@ -28,7 +28,7 @@ pub(crate) struct Pace {
 }
 
 impl Pace {
-    /// Goes with the message to a subscriber.
+    /// Makes the guard that goes with the message to a subscriber.
     fn underway(&mut self) -> Underway {
         self.deliveries += 1;
         let (underway, _) = self.underway.get_or_insert_with(|| {
@@ -38,7 +38,7 @@ impl Pace {
         Arc::clone(underway)
     }
 
-    /// The message's publisher waits for `handled`, and until it is underway to nobody any more.
+    /// Has the message's publisher wait for `handled`, and until every subscriber has the message.
     pub(crate) fn and(self, handled: Handled) -> Handled {
         let end = self.underway.map(|(_, end)| end);
         handled.and_by_subscribers(end, self.deliveries)
@@ -66,9 +66,8 @@ impl Registry {
         }
     }
 
-    /// Delivers a message, or a series of them, to everybody who subscribes to `topic`, an absolute name, under
-    /// whichever spelling; `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait, which a
-    /// live arm can't.
+    /// Delivers a message, or a series of them, to every subscriber of `topic`, an absolute name, whatever its
+    /// spelling. `encode` makes the JSON for a spelling. `pace` is for a publisher that can wait; a live arm can't.
     pub(crate) fn fan_out(
         &self,
         topic: &str,
@@ -105,7 +104,7 @@ impl Registry {
         }
     }
 
-    /// A latched topic's last message, to a subscriber who came after it.
+    /// Delivers a latched topic's last message to a subscriber who came after it.
     pub(crate) fn deliver_latched(&self, spelling: &Arc<str>, to: ConnectionId) {
         let latched =
             Topic::from_name(spelling).and_then(|topic| Some((topic, self.latched.get(&topic)?)));
@@ -144,7 +143,7 @@ impl Registry {
         Encoded::new(spelling, plain, encoding, type_name, counters)
     }
 
-    /// A message to be delivered counts once, until the last copy is gone.
+    /// A message that is being delivered counts once, until the last copy is gone.
     pub(crate) fn count(&self, frame: Bytes) -> Bytes {
         self.gauges.memory().count(frame)
     }

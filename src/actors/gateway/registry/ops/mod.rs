@@ -73,8 +73,8 @@ impl Registry {
                 }
                 Ok(())
             }
-            // Pieces are put together before they get here; a token is asked for before, and where nothing is asked,
-            // anything shown will do.
+            // Pieces have been put together before, and so has a token been checked; where none is asked for, any token
+            // will do.
             Op::Fragment(_) | Op::Auth { .. } => Ok(()),
             Op::ServiceResponse {
                 service,

@@ -1,7 +1,7 @@
 //! Actions that clients serve: who serves which, and the goals that are on their way.
 //!
-//! **Invariant:** a forwarded goal ends by the result of its own server, or with that client, and only once. Goals
-//! outlive who sent them; then nobody hears of them any more.
+//! **Invariant:** a forwarded goal ends by the result of its own server, or with that client, and only once. A goal
+//! outlives its sender, but then nobody hears of it any more.
 
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::protocol::wire::payload::Payload;
 
 /// A goal that was forwarded to its server and has not ended yet.
 pub(crate) struct ForwardedGoal {
-    /// Who sent it.
+    /// The client that sent it.
     pub(crate) sender: ConnectionId,
     /// The sender's id for it.
     pub(crate) id: Option<Payload>,
@@ -32,7 +32,7 @@ pub(crate) struct ForwardedGoal {
 /// Action servers, and goals on their way.
 #[derive(Default)]
 pub(crate) struct ActionServers {
-    /// By absolute name.
+    /// The servers, by absolute name of the action.
     servers: HashMap<Box<str>, Provider>,
     goals: HashMap<u64, ForwardedGoal>,
     by_sender: Numbers,
@@ -41,7 +41,7 @@ pub(crate) struct ActionServers {
 }
 
 impl ActionServers {
-    /// Makes `server` the one who serves the action; the newest registration wins. Gives the one before.
+    /// Makes `server` the one who serves the action; the newest registration wins. Returns the former server.
     pub(crate) fn serve(&mut self, action: &str, server: Provider) -> Option<Provider> {
         self.servers.insert(action.into(), server)
     }
@@ -65,7 +65,7 @@ impl ActionServers {
         self.by_sender.count(sender)
     }
 
-    /// Takes a goal in; gives the id under which it goes to its server.
+    /// Adds a goal. Returns the id under which it goes to its server.
     pub(crate) fn remember(&mut self, goal: ForwardedGoal) -> String {
         self.goals_made += 1;
         let number = self.goals_made;
@@ -108,7 +108,7 @@ impl ActionServers {
         self.goals.get(&number)
     }
 
-    /// Takes a goal out, which has ended.
+    /// Removes a goal that has ended.
     pub(crate) fn take(&mut self, number: u64) -> Option<ForwardedGoal> {
         let goal = self.goals.remove(&number)?;
         self.by_sender.remove(goal.sender, number);

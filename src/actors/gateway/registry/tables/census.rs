@@ -28,13 +28,13 @@ pub(crate) struct Tally {
     taken: Option<Arc<Census>>,
 }
 
-/// Who uses a topic.
+/// Clients that use a topic.
 struct Users {
     publishers: usize,
     subscribers: usize,
     /// The first type that was named and is known: messages are encoded by it.
     known: Option<Type>,
-    /// As it is told; its type as the first that named one has it.
+    /// The topic as rosapi lists it, with the first type that was named.
     listed: Arc<ListedTopic>,
 }
 
@@ -130,7 +130,7 @@ impl Tally {
         self.services.insert(Arc::clone(&listed.name), listed);
     }
 
-    /// Nobody provides it any more.
+    /// Notes that nobody provides the service any more.
     pub(crate) fn withdraw(&mut self, service: &str) {
         self.taken = None;
         self.services.remove(service);
@@ -143,20 +143,20 @@ impl Tally {
         self.actions.insert(Arc::clone(&listed.name), listed);
     }
 
-    /// Nobody serves it any more.
+    /// Notes that nobody serves the action any more.
     pub(crate) fn drop_action(&mut self, action: &str) {
         self.taken = None;
         self.actions.remove(action);
     }
 
-    /// The runtime's own services are these, if any are given.
+    /// Sets the runtime's own services, if any are given.
     pub(crate) fn set_replayed(&mut self, replayed: Option<Arc<BTreeSet<Service>>>) {
         self.taken = None;
         self.replayed = replayed;
     }
 
-    /// All that there is, up to the limit of what is listed, unless it is more than `at_most`. It is made anew only if
-    /// something has changed since.
+    /// Topics and services, up to the limit of what is listed; none if there are more than `at_most`. The list is made
+    /// anew only if something has changed.
     pub(crate) fn census(&mut self, at_most: usize) -> Option<Arc<Census>> {
         if self.topics.len() + self.services.len() + self.actions.len() > at_most {
             return None;

@@ -60,7 +60,7 @@ impl Leftovers {
     }
 }
 
-/// The next of all leftovers; `take` takes the next of what one client has left.
+/// Takes the next of all leftovers; `take` takes the next of one client's.
 fn next<L, T>(left: &mut VecDeque<L>, take: impl Fn(&mut L) -> Option<T>) -> Option<T> {
     while let Some(first) = left.front_mut() {
         if let Some(one) = take(first) {

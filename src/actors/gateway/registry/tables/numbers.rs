@@ -28,12 +28,12 @@ impl Numbers {
         self.0.get(&client).map_or(0, BTreeSet::len)
     }
 
-    /// The client's, newest first.
+    /// The client's numbers, newest first.
     pub(crate) fn newest(&self, client: ConnectionId) -> impl Iterator<Item = u64> {
         self.0.get(&client).into_iter().flatten().rev().copied()
     }
 
-    /// Takes all that are the client's.
+    /// Takes all numbers of the client.
     pub(crate) fn take(&mut self, client: ConnectionId) -> BTreeSet<u64> {
         self.0.remove(&client).unwrap_or_default()
     }

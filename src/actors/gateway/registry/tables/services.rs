@@ -22,13 +22,13 @@ pub(crate) struct Forwarded {
     pub(crate) provider: ConnectionId,
     /// The service's name as the caller spells it.
     pub(crate) service: Box<str>,
-    /// When the caller's patience ends. The registry may look later than that, where the process has stood still.
+    /// When the caller's patience ends. The registry may look later, if the process has stood still.
     pub(crate) deadline: Instant,
     /// Its share of its caller's account.
     pub(crate) _share: Share,
 }
 
-/// Who provides a service.
+/// The provider of a service.
 #[derive(Clone)]
 pub(crate) struct Provider {
     pub(crate) connection: ConnectionId,
@@ -39,7 +39,7 @@ pub(crate) struct Provider {
 /// Providers and outstanding calls.
 #[derive(Default)]
 pub(crate) struct Services {
-    /// By absolute name.
+    /// The providers, by absolute name of the service.
     providers: HashMap<Box<str>, Provider>,
     outstanding: BTreeMap<u64, Forwarded>,
     by_caller: Numbers,
@@ -85,7 +85,7 @@ impl Services {
         let id = Some(id).filter(|id| id.get().len() <= LONGEST_CALL_ID)?;
         let id: String = serde_json::from_str(id.get()).ok()?;
         let number: u64 = id.strip_prefix(OWN_ID_PREFIX)?.parse().ok()?;
-        // One id a call: `+1` and `01` are numbers too.
+        // Each call has one id, though `+1` and `01` are numbers too.
         (id == Self::call_id(number)).then_some(number)
     }
 

@@ -1,4 +1,4 @@
-//! Who subscribes to what: the registry's table of topics.
+//! The registry's table of topics and their subscribers.
 //!
 //! **Invariant:** a connection stands at most once under a topic, however often it subscribed.
 
@@ -23,7 +23,7 @@ pub(crate) struct Subscription {
     pub(crate) throttle: Duration,
     pub(crate) queue_length: usize,
     pub(crate) encoding: Encoding,
-    /// Keeps its `fragment_size` among those that the topic has.
+    /// A guard that keeps its `fragment_size` among those of the topic.
     pub(crate) size: Option<Arc<usize>>,
     /// Its share of the account.
     pub(crate) _share: Share,
@@ -58,7 +58,7 @@ fn encoding_of(subscriptions: &[Subscription]) -> Encoding {
 #[derive(Default)]
 pub(crate) struct Topics {
     subscribers: HashMap<Arc<str>, Vec<Subscriber>>,
-    /// By absolute name: the `fragment_size`s in use, for as long as a subscription has them.
+    /// The `fragment_size`s in use, by absolute name of the topic, for as long as a subscription has them.
     sizes: HashMap<Box<str>, Vec<Weak<usize>>>,
 }
 
@@ -88,9 +88,9 @@ impl Topics {
         (name, new)
     }
 
-    /// The `fragment_size` that a subscription gets which asks for `size` and gives up `given_up`; the subscription
-    /// keeps it. If the topic of that absolute name has [`MAX_FRAGMENT_SIZES`] others, powers of two aside, it is the
-    /// power of two below: nobody is refused because of what others ask for.
+    /// The `fragment_size` of a subscription that asks for `size` and gives up `given_up`; the subscription keeps it.
+    /// If the topic of that absolute name has [`MAX_FRAGMENT_SIZES`] others, powers of two aside, it is the power of
+    /// two below. So nobody is refused because of what others ask for.
     pub(crate) fn share_size(
         &mut self,
         topic: &str,
@@ -123,7 +123,7 @@ impl Topics {
         })
     }
 
-    /// Nobody subscribes to the topic of that absolute name any more.
+    /// Notes that nobody subscribes to the topic of that absolute name any more.
     pub(crate) fn forget_sizes(&mut self, topic: &str) {
         self.sizes.remove(topic);
     }

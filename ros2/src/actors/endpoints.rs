@@ -1,21 +1,21 @@
-//! Places in the graph, which bridges take.
+//! Endpoints of the bridges in the graph.
 //!
-//! **Invariant:** no number of a place is used twice.
+//! **Invariant:** no number of an endpoint is used twice.
 
 use pendularm::protocol::catalog::Node;
 
-use crate::convention::{EndpointKind, GraphNode, Named, Place, Seat};
+use crate::convention::{Endpoint, EndpointKind, GraphNode, Named, Place};
 use crate::interfaces::ServiceInterface;
 
-/// Hands out places in the graph, each under a number of its own.
-pub(super) struct Seats {
+/// Makes endpoints, each under a number of its own.
+pub(super) struct Endpoints {
     pub(super) place: Place,
     /// The number of the last one.
     pub(super) last: usize,
 }
 
-impl Seats {
-    /// The next place, for a topic.
+impl Endpoints {
+    /// The next endpoint, for a topic.
     pub(super) fn next(
         &mut self,
         owner: Node,
@@ -23,23 +23,23 @@ impl Seats {
         name: &str,
         type_name: &str,
         hash: &str,
-    ) -> Seat {
+    ) -> Endpoint {
         self.last += 1;
         let of = Named {
             name,
             type_name,
             hash,
         };
-        self.place.seat(graph_node(owner), self.last, kind, of)
+        self.place.endpoint(graph_node(owner), self.last, kind, of)
     }
 
-    /// The next place, for a service.
+    /// The next endpoint, for a service.
     pub(super) fn service(
         &mut self,
         owner: Node,
         name: &str,
         interface: &ServiceInterface,
-    ) -> Seat {
+    ) -> Endpoint {
         let kind = EndpointKind::Service;
         self.next(owner, kind, name, interface.name, &interface.hash)
     }

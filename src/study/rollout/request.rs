@@ -1,6 +1,6 @@
-//! The request for an offline run, and why it is refused.
+//! The request for a rollout, and why it is refused.
 //!
-//! **Invariant:** a plan that passes has a bounded number of steps and samples, and no number that is not finite.
+//! **Invariant:** a request that passes has a bounded number of steps and samples, and no number that is not finite.
 
 use crate::math::arm::State;
 use crate::math::count::in_f64;
@@ -14,9 +14,9 @@ pub const MAX_STEPS: u64 = 10_000_000;
 /// Most samples of one run, some 30 MB of JSON.
 pub const MAX_SAMPLES: u64 = 100_000;
 
-/// A run to be made.
+/// The request for a run: its loop, its start, its length and its samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan<const N: usize> {
+pub struct RolloutRequest<const N: usize> {
     /// The loop that the steps obey.
     pub control: ControlLoop<N>,
     /// The arm's state at the start.
@@ -78,7 +78,7 @@ pub enum RolloutError {
     },
 }
 
-impl<const N: usize> Plan<N> {
+impl<const N: usize> RolloutRequest<N> {
     /// How many whole steps the duration holds. A quotient that falls short of a whole number by rounding counts as
     /// that.
     ///
