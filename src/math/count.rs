@@ -16,3 +16,18 @@ pub const fn in_f64(count: u64) -> f64 {
 pub const fn length_in_f64(length: usize) -> f64 {
     in_f64(length as u64)
 }
+
+/// How many of the numbers `0..count` there are for which `holds`, which it does up to some number and then no more.
+#[must_use]
+pub fn partition_point(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
+    let (mut holding, mut end) = (0, count);
+    while holding < end {
+        let middle = holding + (end - holding) / 2;
+        if holds(middle) {
+            holding = middle + 1;
+        } else {
+            end = middle;
+        }
+    }
+    holding
+}

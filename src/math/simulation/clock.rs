@@ -2,10 +2,8 @@
 //!
 //! **Invariant:** time is `base + k timestep`, never a running sum, and finite.
 
-use std::ops::ControlFlow;
-
 use super::Simulation;
-use crate::math::count::in_f64;
+use crate::math::count::{in_f64, partition_point};
 
 impl<const N: usize> Simulation<N> {
     /// Simulation time since the reset \[s\].
@@ -19,36 +17,16 @@ impl<const N: usize> Simulation<N> {
         self.base + in_f64(self.steps_since_base.saturating_add(steps)) * self.timestep
     }
 
-    /// Whether so many more steps lead to a finite time, and so does each on the way: time does not fall from step to
-    /// step, rounding included.
-    #[must_use]
-    pub fn has_time_for(&self, steps: u64) -> bool {
-        self.time_after(steps).is_finite()
-    }
-
-    /// Does what [`Simulation::advance_with`] does where time ends before the last step: asks before each whether there
-    /// is time for it.
-    #[cold]
-    pub(super) fn take_last_steps(
-        &mut self,
-        steps: u64,
-        mut observe: impl FnMut(&Self) -> ControlFlow<()>,
-    ) -> u64 {
-        for taken in 0..steps {
-            if !self.has_time_for(1) {
-                self.diverge();
-                return taken;
-            }
-            let mut shown = ControlFlow::Continue(());
-            let one = self.take_steps(1, |arm| {
-                shown = observe(arm);
-                shown
-            });
-            if one == 0 || shown.is_break() {
-                return taken + one;
-            }
+    /// How many of so many steps lead to a finite time: all of them, unless time ends before.
+    // Within the loop that steps it would take registers: two instructions a step.
+    #[inline(never)]
+    pub(super) fn steps_with_time(&self, steps: u64) -> u64 {
+        let leads_to_finite = |step: u64| self.time_after(step + 1).is_finite();
+        if steps == 0 || leads_to_finite(steps - 1) {
+            return steps;
         }
-        steps
+        // Times do not fall from step to step, rounding included.
+        partition_point(steps, leads_to_finite)
     }
 
     /// Changes the length of a step \[s\], greater than 0, from the next step on; time goes on from where it is. The

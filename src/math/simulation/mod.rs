@@ -147,38 +147,41 @@ impl<const N: usize> Simulation<N> {
         if self.divergence.is_some() {
             return 0;
         }
-        if self.has_time_for(steps) {
-            self.take_steps(steps, observe)
+        let with_time = self.steps_with_time(steps);
+        // Asked once for all steps.
+        let taken = if leaves_out_first_angle(&self.arm) {
+            self.take_steps::<false>(with_time, observe)
         } else {
-            self.take_last_steps(steps, observe)
+            self.take_steps::<true>(with_time, observe)
+        };
+        match taken {
+            ControlFlow::Break(taken) => taken,
+            ControlFlow::Continue(()) => {
+                if with_time < steps {
+                    self.diverge();
+                }
+                with_time
+            }
         }
     }
 
-    fn take_steps(&mut self, steps: u64, observe: impl FnMut(&Self) -> ControlFlow<()>) -> u64 {
-        // This is asked once for all steps.
-        if leaves_out_first_angle(&self.arm) {
-            self.take_steps_of::<false>(steps, observe)
-        } else {
-            self.take_steps_of::<true>(steps, observe)
-        }
-    }
-
-    fn take_steps_of<const WEIGHS: bool>(
+    /// Takes so many steps; breaks with the number of those that were taken where it ends before.
+    fn take_steps<const WEIGHS: bool>(
         &mut self,
         steps: u64,
         mut observe: impl FnMut(&Self) -> ControlFlow<()>,
-    ) -> u64 {
+    ) -> ControlFlow<u64> {
         // The choice of method and of control stays inside: hoisted, the loop was measured to be no faster.
         for taken in 0..steps {
             if !self.take_step::<WEIGHS>() {
                 self.diverge();
-                return taken;
+                return ControlFlow::Break(taken);
             }
             if observe(self).is_break() {
-                return taken + 1;
+                return ControlFlow::Break(taken + 1);
             }
         }
-        steps
+        ControlFlow::Continue(())
     }
 
     /// Notes that the next step is not taken, nor any after it.

@@ -66,7 +66,7 @@ impl Registers {
             let evaluations = steps.saturating_mul(arm.method.evaluations().into());
             let kind = StepKind::of(arm);
             // A lane has no clock.
-            let alone = evaluations < WORTH_A_LANE || !arm.has_time_for(steps);
+            let alone = evaluations < WORTH_A_LANE || arm.steps_with_time(steps) < steps;
             let seat = Seat::new(arm, steps, observer);
             if alone {
                 seat.alone();

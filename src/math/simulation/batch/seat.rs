@@ -5,6 +5,7 @@
 use std::ops::ControlFlow;
 
 use crate::math::arm::State;
+use crate::math::count::partition_point;
 use crate::math::integrator::Method;
 use crate::math::simulation::Simulation;
 use crate::math::simulation::increments::leaves_out_first_angle;
@@ -148,15 +149,6 @@ fn pushes<const N: usize>(arm: &Simulation<N>, steps: u64) -> u64 {
     if acts(steps - 1) {
         return steps;
     }
-    // Times never fall from step to step, not even by rounding, so halving finds the first that is too late.
-    let (mut early, mut late) = (0, steps - 1);
-    while early < late {
-        let middle = early + (late - early) / 2;
-        if acts(middle) {
-            early = middle + 1;
-        } else {
-            late = middle;
-        }
-    }
-    early
+    // Times do not fall from step to step, rounding included.
+    partition_point(steps, acts)
 }
