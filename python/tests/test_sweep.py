@@ -249,7 +249,7 @@ def test_a_folder_knows_the_code_of_a_metric(tmp_path):
     for other in [last(2.0), last(1.0, "first"), first, second]:
         with pytest.raises(ValueError, match="holds another sweep: it differs in metric"):
             pendularm.sweep(metric=other, **ask)
-    # Of a masked array NumPy gives the bytes of what it would fill in: True, in one of truths.
+    # NumPy gives the bytes that it would fill a masked array with: True, in one of truths.
     hidden = [last(np.ma.array([True], mask=mask)) for mask in (True, False)]
     assert len({fingerprint("metric", one) for one in hidden}) == 2
     kept = json.loads((tmp_path / "sweep.json").read_text())

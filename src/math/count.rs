@@ -20,7 +20,11 @@ pub const fn length_in_f64(length: usize) -> f64 {
 /// How many of the numbers `0..count` there are for which `holds`, which it does up to some number and then no more.
 #[must_use]
 pub fn partition_point(count: u64, holds: impl Fn(u64) -> bool) -> u64 {
-    let (mut holding, mut end) = (0, count);
+    // Mostly for all of them.
+    if count == 0 || holds(count - 1) {
+        return count;
+    }
+    let (mut holding, mut end) = (0, count - 1);
     while holding < end {
         let middle = holding + (end - holding) / 2;
         if holds(middle) {

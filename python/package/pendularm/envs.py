@@ -209,7 +209,7 @@ class _Vector(VectorEnv[Observation, Action, Any]):
             self._task = self.task_of(num_envs, links, threads)
         except ValueError as refusal:
             raise _named(refusal, "n_arms", "num_envs") from None
-        # What no arm comes to in a lifetime is no limit.
+        # No arm takes so many steps in a lifetime: the largest number is no limit.
         self._most_steps = sys.maxsize if most_steps == -1 else min(most_steps, sys.maxsize)
         self.num_envs = num_envs
         self.render_mode = render_mode

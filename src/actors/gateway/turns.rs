@@ -2,9 +2,10 @@
 //!
 //! One thread serves every client, and a light call passes it some eight times on its way. If two hundred busy clients,
 //! or a thousand subscribers of a message, all went on every time around, the call would wait for all of them eight
-//! times. So a reader waits in one queue if it has a whole chunk or many frames at hand, or if its message has gone to
-//! many. A writer waits in another once much has been written of late. A writer whose messages all come from nodes has
-//! a third queue: the arm publishes on, and its subscribers do not wait behind what others have sent to hundreds.
+//! times. So a reader waits in one queue if it has a whole chunk or many frames at hand, if its message has gone to
+//! many, or once much has been read of late. A writer waits in another once much has been written of late. A writer
+//! whose messages all come from nodes has a third queue: the arm publishes on, and its subscribers do not wait behind
+//! what others have sent to hundreds.
 //!
 //! **Invariant:** between two looks at what else there is to do, each queue lets only so many go on, first come, first
 //! served, and no writer goes on once those before it have taken [`WRITING_TIME`].
@@ -77,10 +78,10 @@ impl Waits for WaitingWriter {
 /// A queue of this thread.
 struct TurnQueue<W> {
     at_a_time: usize,
-    /// How many may go on without waiting, and how many of them are left.
+    /// The allowance of a pass, and how much of it is left: bytes for readers, writes for writers.
     free: usize,
     left: Cell<usize>,
-    /// The queue, each waiter with the bytes that it is going to write.
+    /// The queue, each waiter with the bytes that it is going to read or write.
     waiting: RefCell<VecDeque<(usize, W)>>,
     /// Whether there is a task at work.
     at_work: Cell<bool>,

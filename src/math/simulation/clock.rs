@@ -21,12 +21,8 @@ impl<const N: usize> Simulation<N> {
     // Within the loop that steps it would take registers: two instructions a step.
     #[inline(never)]
     pub(super) fn steps_with_time(&self, steps: u64) -> u64 {
-        let leads_to_finite = |step: u64| self.time_after(step + 1).is_finite();
-        if steps == 0 || leads_to_finite(steps - 1) {
-            return steps;
-        }
         // Times do not fall from step to step, rounding included.
-        partition_point(steps, leads_to_finite)
+        partition_point(steps, |step| self.time_after(step + 1).is_finite())
     }
 
     /// Changes the length of a step \[s\], greater than 0, from the next step on; time goes on from where it is. The

@@ -229,15 +229,13 @@ impl WishFrames {
 impl<const N: usize> TfRepublisher<N> {
     /// The place of the oldest wish of the client that has most of them; all that are published count as one's.
     fn oldest_of_most(&self) -> Option<usize> {
-        let clients = self.wishes.iter().map(|(wish, _)| wish.client());
+        let mut clients = self.wishes.iter().map(|(wish, _)| wish.client());
         let mut counts: HashMap<_, usize> = HashMap::new();
         for client in clients.clone() {
             *counts.entry(client).or_default() += 1;
         }
         let most = counts.values().max().copied();
-        clients
-            .into_iter()
-            .position(|client| counts.get(&client).copied() == most)
+        clients.position(|client| counts.get(&client).copied() == most)
     }
 
     fn forget_published(&mut self, id: Option<&str>) {

@@ -145,10 +145,6 @@ fn pushes<const N: usize>(arm: &Simulation<N>, steps: u64) -> u64 {
     let Some(disturbance) = arm.disturbance else {
         return 0;
     };
-    let acts = |step: u64| arm.time_after(step) < disturbance.ends;
-    if acts(steps - 1) {
-        return steps;
-    }
     // Times do not fall from step to step, rounding included.
-    partition_point(steps, acts)
+    partition_point(steps, |step| arm.time_after(step) < disturbance.ends)
 }
